@@ -11,7 +11,7 @@ import numpy as np
 from app.db.json_columns import pack
 from app.db.session import Session, now
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.codec import TrackInputs, inputs_to_json, make_track, track_to_json
 from app.features.tracks.queries import insert_track
@@ -86,7 +86,7 @@ def flight_groups(count: int = 90, noise_px: float = 0.3, match: str = "rig") ->
 
 def add_flight(store: Store, name: str = "flight", count: int = 40) -> int:
     """A dataset of frames of the flight, solved and tracked; returns the id of its track."""
-    ingest(store, name, flight_groups(count), source="test", actor="local")
+    import_groups(store, name, flight_groups(count), source="test", actor="local")
     solve_dataset(store, name)
     make_tracks(store, name, None, "local", lambda *_: None)
     (track,) = list_tracks(store, name)

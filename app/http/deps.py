@@ -19,7 +19,7 @@ from fastapi import Depends, Header, Path, Query, Request
 from app.config import Settings
 from app.db.store import Store
 from app.errors import BusyError, InputError
-from app.features.agreement.service import compare_left
+from app.features.agreement.service import compare_uncompared_groups
 from app.features.exports.jobs import ExportFolder, resume_exports
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.groups.view_paint import PaintFollower
@@ -184,7 +184,7 @@ class Services:
     def _compare_uncompared_annotations(self) -> None:
         """Compare annotations that an earlier run was stopped before."""
         try:
-            compare_left(self.store, self.paint)
+            compare_uncompared_groups(self.store, self.paint)
         except Exception:
             log.exception("annotations could not be compared")
 

@@ -16,7 +16,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from app.db.store import Store
 from app.errors import ForbiddenError, NotFoundError
-from app.features.datasets.service import no_dataset
+from app.features.datasets.service import unknown_dataset_error
 from app.features.people.logins import Login
 from app.features.people.ownership import (
     NamedResource,
@@ -207,7 +207,7 @@ def missing_error(store: Store, owned: list[OwnedMention]) -> NotFoundError | No
         named = item.mention.named
         if item.ownership is None and named.kind is not OwnedKind.NEW_DATASET:
             if named.kind is OwnedKind.DATASET:
-                return no_dataset(store, str(named.by)[:200])
+                return unknown_dataset_error(store, str(named.by)[:200])
             return NotFoundError(f"there is no {named.kind} {quoted(str(named.by), 80)}")
     return None
 

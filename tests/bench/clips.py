@@ -26,7 +26,7 @@ from scipy.stats import chi2
 from app.config import Settings
 from app.db.store import Store
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.paint.service import read_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -168,7 +168,7 @@ def in_a_dataset(
             cv2.imwrite(str(file), image[:, :, ::-1])
             view = View(key, Station(key, _size(image), lines=lines), media=Media(str(file)))
             groups.append(Group(key, (view,), match=clip))
-        ingest(store, "clips", groups, source="frames", actor="bench")
+        import_groups(store, "clips", groups, source="frames", actor="bench")
         change_policy(store, "clips", TOUCHLINE, if_match=None, actor="bench")
         read_paint(store, "clips", actor="bench", workers=1)
         solve_dataset(store, "clips")

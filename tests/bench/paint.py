@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from app.config import Settings
 from app.db.store import Store
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.paint.service import get_paint, read_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -98,7 +98,7 @@ def _through_a_dataset(scenes: Sequence[Scene]) -> list[Solution]:
     """Solutions of a dataset whose pictures were read, in the order of the scenes."""
     with tempfile.TemporaryDirectory() as place, closing(_opened(Path(place) / "home")) as store:
         groups = [_with_pictures(scene, Path(place), n) for n, scene in enumerate(scenes)]
-        ingest(store, "bench", groups, source="sample", actor="bench")
+        import_groups(store, "bench", groups, source="sample", actor="bench")
         change_policy(store, "bench", TOUCHLINE, if_match=None, actor="bench")
         began = time.perf_counter()
         read_paint(store, "bench", actor="bench")

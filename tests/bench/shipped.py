@@ -19,7 +19,7 @@ from app.db.store import Store
 from app.features.datasets.queries import group_ids
 from app.features.datasets.service import need_dataset
 from app.features.groups.state import read_states
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solve.jobs import solve_fully
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, PAPER, TOUCHLINE
@@ -63,7 +63,7 @@ def bench_shipped(sizes: Sequence[tuple[int, int]] = SIZES) -> None:
 def solved(store: Store, name: str, made: Sequence[Made]) -> list[Solution]:
     """The solutions that a dataset of these groups has once it was imported and solved."""
     groups = [one.group for one in made]
-    ingest(store, name, groups, source="", actor="local", policy=TOUCHLINE)
+    import_groups(store, name, groups, source="", actor="local", policy=TOUCHLINE)
     solve_fully(store, name, None, lambda *_: None)
     with store.read() as session:
         states = read_states(session, group_ids(session, need_dataset(session, name)))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.service import make_tracks
 from app.soccer.annotation import BallAnnotation
@@ -40,7 +40,7 @@ def fill_flights(home: Path) -> None:
     ]
     store = Store.open(Settings(home=home))
     try:
-        ingest(store, "flights", [*early, *late], source="test", actor="local")
+        import_groups(store, "flights", [*early, *late], source="test", actor="local")
         solve_dataset(store, "flights")
         make_tracks(store, "flights", None, "local", lambda *_: None)
     finally:

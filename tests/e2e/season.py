@@ -6,7 +6,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -26,7 +26,7 @@ def fill_season(home: Path) -> None:
     store = Store.open(Settings(home=home))
     try:
         groups = [_group(number) for number in range(1, SEASON + 1)]
-        ingest(store, "season", groups, source="test", actor="local")
+        import_groups(store, "season", groups, source="test", actor="local")
         solve_dataset(store, "season")
     finally:
         store.close()

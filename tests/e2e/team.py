@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.independent_annotations.service import begin_annotation
@@ -77,4 +77,4 @@ def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
         state = submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
-    return after_submission(store, copy)
+    return compare_or_adopt_submission(store, copy)

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.independent_annotations.service import begin_annotation, submit_annotation
 from tests.e2e.screen import passing, until, withdraw_verdict
 from tests.e2e.team import annotate
@@ -68,7 +68,7 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
         for person in ("kim", "lou"):
             take = begin_annotation(store, group, person=person)
             submit_annotation(store, take.id, actor=person)
-            came_to = after_submission(store, take.group)
+            came_to = compare_or_adopt_submission(store, take.group)
         assert came_to == "agreed"
     finally:
         store.close()

@@ -16,7 +16,7 @@ from PIL import Image
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.edits_export import export_edits
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.policies.service import policy_to_yaml
 from app.formats.camera_json import camera_to_json
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
@@ -95,7 +95,7 @@ def _exported(folder: Path) -> Iterator[Case]:
 def _carried(folder: Path) -> Iterator[Case]:
     store = Store.open(Settings(home=folder / "home"))
     try:
-        ingest(store, "seed", [broadcast(), static()], source="seed", actor="local")
+        import_groups(store, "seed", [broadcast(), static()], source="seed", actor="local")
         export_edits(store, "seed", folder / "touchline")
         yield Case("touchline", _files(folder / "touchline"))
     finally:

@@ -34,7 +34,7 @@ from app.features.comments.service import add_reply, begin_thread
 from app.features.exports.jobs import request_export
 from app.features.groups.history import read_history
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.imports.upload_queries import UploadWriter
 from app.features.pitches.service import read_pitches
 from app.features.policies.service import read_policy
@@ -111,7 +111,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         webhooks=[HOOK],
     )
     store = Store.open(chosen)
-    ingest(store, "small", read_soccernet_v3(tree, Report()), source="tree", actor="local")
+    import_groups(store, "small", read_soccernet_v3(tree, Report()), source="tree", actor="local")
     solve_dataset(store, "small")
     app = create_app(chosen)
     services = app.state.services

@@ -18,7 +18,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.batches.service import NewBatch, make_batch
 from app.features.comments.service import begin_thread
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.roles import Role
@@ -78,7 +78,7 @@ def fill(store: Store, home: Path) -> None:
     """Three things of nearly every kind."""
     scenes = make_scenes(groups=4, seed=4)
     for name in ("small", "second", "third"):
-        ingest(store, name, [scene.group for scene in scenes], source="x", actor="local")
+        import_groups(store, name, [scene.group for scene in scenes], source="x", actor="local")
     solve_dataset(store, "small")
     group = scenes[0].group
     for number in range(PAGED_ALREADY):

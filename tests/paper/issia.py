@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
 from app.evaluation.frame import Frame
 from app.features.datasets.service import get_dataset
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.predictions.frames import live_truth
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
@@ -45,7 +45,7 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
     """Import, solve and evaluate ISSIA; None where its files are not there."""
     if not folder.is_dir():
         return None
-    ingest(
+    import_groups(
         store,
         DATASET,
         open_issia(folder, IssiaOptions(), Report()).groups(),

@@ -9,7 +9,7 @@ from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
 from app.evaluation.frame import Detection, Frame
 from app.features.datasets.service import get_dataset
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.predictions.frames import EvaluationTruth, live_truth
 from app.features.solutions.service import solve_dataset
 from app.sample.scene import Scene
@@ -42,7 +42,7 @@ def run_study(
 ) -> Study:
     """Make the dataset in an empty store, solve it, and evaluate both detectors."""
     scenes = make_scenes(groups=groups, seed=seed, faults=faults)
-    ingest(store, DATASET, [scene.group for scene in scenes], source="study", actor="study")
+    import_groups(store, DATASET, [scene.group for scene in scenes], source="study", actor="study")
     solve_dataset(store, DATASET)
     with store.read() as session:
         truth = live_truth(session, get_dataset(store, DATASET), "passing", None)

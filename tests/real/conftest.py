@@ -9,7 +9,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import Report
@@ -29,6 +29,6 @@ def build_issia(folder: Path) -> None:
     """Read and solve all of it."""
     store = Store.open(Settings(home=folder / "home"))
     groups = open_issia(ISSIA, IssiaOptions(), Report()).groups()
-    ingest(store, "issia", groups, source="x", actor="ann")
+    import_groups(store, "issia", groups, source="x", actor="ann")
     solve_dataset(store, "issia")
     store.close()

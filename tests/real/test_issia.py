@@ -15,7 +15,7 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.groups.state import GroupState, read_states
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_ids
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
@@ -104,7 +104,7 @@ class TestExport:
     def test_every_annotated_frame_is_a_row_and_the_manifest_counts_them(self, groups, tmp_path):
         few = [group for group in groups if len(group.views) >= 2][:40]
         store = Store.open(Settings(home=tmp_path / "home"))
-        ingest(store, "issia", few, source=str(DATA), actor="test")
+        import_groups(store, "issia", few, source=str(DATA), actor="test")
         solve_dataset(store, "issia")
         out = tmp_path / "out"
         export_dataset(store, "issia", "issia-3d", out, everything=True)

@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export_dataset
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.imports.merge import merge_edits
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -60,7 +60,7 @@ def homes(tmp_path_factory: pytest.TempPathFactory):
     )
     groups = open_issia(DATA, IssiaOptions(), Report()).groups()
     some = (group for group in groups if int(group.key) % EVERY == 0)
-    ingest(one, "issia", some, source="x", actor="ann")
+    import_groups(one, "issia", some, source="x", actor="ann")
     solve_dataset(one, "issia")
     reject(one)
     carried = tmp_path_factory.mktemp("carried") / "issia.zip"

@@ -18,7 +18,7 @@ from pwdlib.hashers.argon2 import Argon2Hasher
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.logins import Logins
@@ -189,7 +189,7 @@ class Apart:
         """Something of everything in both datasets."""
         group = make_scenes(groups=1, seed=3, faults=False)[0].group
         for name in (MINE, THEIRS):
-            ingest(self.store, name, [group], source="files", actor="local")
+            import_groups(self.store, name, [group], source="files", actor="local")
             solve_dataset(self.store, name)
         rows = f"image,x,y,w,h,score\n{group.match}/{group.views[0].key},600,300,9,9,0.5\n"
         for number, name in enumerate((MINE, THEIRS), start=1):

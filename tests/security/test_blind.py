@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.people.roles import Action, Role
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.service import solve_dataset
@@ -28,7 +28,7 @@ WORDS = ("613.25", "301.75", "berta")
 def team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
     with opened(tmp_path_factory.mktemp("blind")) as made:
         group = make_scenes(groups=1, seed=3, faults=False)[0].group
-        ingest(made.store, "demo", [group], source="files", actor="local")
+        import_groups(made.store, "demo", [group], source="files", actor="local")
         solve_dataset(made.store, "demo")
         made.add("lea", Role.NONE, demo=Role.LEAD)
         made.add("anna", Role.REVIEWER)

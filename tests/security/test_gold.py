@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.independent_annotations import known_truth as mixing
 from app.features.independent_annotations.queries import GOLD, read_annotations
 from app.features.people.roles import Role
@@ -84,7 +84,7 @@ def ingested(team: Apart, files: Path) -> list[int]:
             path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
             views.append(replace(view, media=Media(str(path))))
         groups.append(replace(scene.group, views=tuple(views)))
-    ingest(team.store, "demo", groups, source="files", actor="local")
+    import_groups(team.store, "demo", groups, source="files", actor="local")
     solve_dataset(team.store, "demo")
     return list(range(1, len(groups) + 1))
 

@@ -16,7 +16,7 @@ from starlette.types import ASGIApp
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs import runner as job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
@@ -159,7 +159,7 @@ def prepared_home(
     store = Store.open(Settings(home=home))
     for name, chosen in (("broadcast", group), ("static", static_group)):
         more = [chosen, *(replace(chosen, key=f"{chosen.key}{n}") for n in range(2))]
-        ingest(store, name, more, source="test", actor="local")
+        import_groups(store, name, more, source="test", actor="local")
         solve_dataset(store, name)
     store.close()
     return home

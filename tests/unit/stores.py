@@ -18,7 +18,7 @@ from app.features.datasets.service import get_dataset
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_groups
 from app.features.solutions.queries import SolutionModel
 from app.features.solutions.service import solve_dataset
@@ -212,7 +212,7 @@ def fill(store: Store, once: Once) -> Fill:
 
 
 def _ingested(store: Store, groups: tuple[Group, ...], solved: bool) -> list[int]:
-    ingest(store, "demo", groups, source="test", actor="ann")
+    import_groups(store, "demo", groups, source="test", actor="ann")
     if solved:
         solve_dataset(store, "demo")
     page = list_groups(store, get_dataset(store, "demo").id, limit=500)

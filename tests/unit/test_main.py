@@ -12,7 +12,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.service import get_dataset
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.main import create_app
 from tests.waiting import SECONDS
 
@@ -39,7 +39,7 @@ class TestCreateApp:
     ) -> None:
         settings = Settings(home=tmp_path / "unsolved")
         store = Store.open(settings)
-        ingest(store, "small", [group], source="test", actor="local")
+        import_groups(store, "small", [group], source="test", actor="local")
         app = create_app(settings, static=static_folder)
         with client_of(app) as client:
             assert client.get(f"{API}/groups/1").json()["solution"]["passes"] is True

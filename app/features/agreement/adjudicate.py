@@ -10,10 +10,10 @@ from app.errors import ForbiddenError, NotFoundError
 from app.features.agreement.queries import OPEN, list_agreements, list_group_agreements
 from app.features.agreement.service import (
     Comparison,
-    adopt_and_settle,
+    adopt_and_decide,
     compare_states,
+    list_undecided_annotations,
     read_limits,
-    submitted_annotations,
 )
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
@@ -63,7 +63,7 @@ class AgreementCase:
     own: bool
 
 
-def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
+def list_open_cases(store: Store, dataset: str | int) -> list[OpenCase]:
     """The groups of a dataset that wait for a decision, those that disagree most first."""
     number = dataset_id(store, dataset)
     with store.read() as session:
@@ -72,7 +72,8 @@ def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     for row in rows:
         batch = row.batch_id or None
         people = tuple(
-            annotation.person for annotation in submitted_annotations(store, row.group_id, batch)
+            annotation.person
+            for annotation in list_undecided_annotations(store, row.group_id, batch)
         )
         found.append(
             OpenCase(
@@ -82,7 +83,7 @@ def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     return found
 
 
-def get_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
+def read_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
     """What is to be decided about a group.
 
     Raises:
@@ -96,7 +97,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
         limits = read_limits(session, original.dataset_id)
     if row is None:
         raise NotFoundError(f"group {group_id} does not wait for adjudication")
-    annotations = submitted_annotations(store, group_id, row.batch_id or None)
+    annotations = list_undecided_annotations(store, group_id, row.batch_id or None)
     if len(annotations) < 2:
         raise NotFoundError(
             f"group {group_id} does not wait for adjudication: fewer than two annotations are"
@@ -117,7 +118,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
     )
 
 
-def decide_case(
+def adjudicate_case(
     store: Store,
     group_id: int,
     annotation_id: int,
@@ -136,7 +137,7 @@ def decide_case(
         ForbiddenError: It is one's own, and others could decide.
         ConflictError: Somebody was faster.
     """
-    case = get_case(store, group_id, actor=actor)
+    case = read_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
     place = next(
@@ -147,7 +148,7 @@ def decide_case(
         raise NotFoundError(
             f"annotation {annotation_id} is not among the annotations that wait for adjudication"
         )
-    return adopt_and_settle(
+    return adopt_and_decide(
         store,
         group_id,
         case.batch,
@@ -179,8 +180,8 @@ def adopt_into_group(
         )
     if not waits:
         return adopt_annotation(store, annotation.id, actor=actor, paint=paint)
-    ready = submitted_annotations(store, annotation.group_id, annotation.batch_id)
-    return adopt_and_settle(
+    ready = list_undecided_annotations(store, annotation.group_id, annotation.batch_id)
+    return adopt_and_decide(
         store,
         annotation.group_id,
         annotation.batch_id,
@@ -201,7 +202,7 @@ def return_for_correction(
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
         ForbiddenError: Others have to decide, or it is their own.
     """
-    case = get_case(store, group_id, actor=actor)
+    case = read_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
     annotation = next((one for one in case.annotations if one.id == annotation_id), None)

@@ -126,7 +126,7 @@ def put_agreement(session: Session, values: Mapping[str, Any]) -> None:
     session.execute(insert(table), [dict(values)])
 
 
-def list_groups_in_states(state: str) -> Select[int]:
+def select_groups_in_state(state: str) -> Select[int]:
     """Ids of the groups whose annotations came to a state, in any batch."""
     return select(AgreementModel.group_id).where(AgreementModel.state == state)
 
@@ -148,7 +148,7 @@ def delete_open_agreement(session: Session, group_id: int, batch_id: int) -> Non
     session.execute(delete(table).where(*where))
 
 
-def decide_agreement(
+def save_adjudication(
     session: Session, group_id: int, batch_id: int, values: Mapping[str, Any]
 ) -> int:
     """Write what was decided; returns the id of the group's dataset."""
@@ -158,7 +158,7 @@ def decide_agreement(
     return int(session.execute(done).scalar_one())
 
 
-def settle_unchosen_annotations(session: Session, take_ids: Sequence[int], at: str) -> None:
+def complete_unchosen_annotations(session: Session, take_ids: Sequence[int], at: str) -> None:
     """Takes that were compared and not taken are over."""
     rest = (
         IndependentAnnotationModel.id.in_(take_ids),
@@ -167,7 +167,7 @@ def settle_unchosen_annotations(session: Session, take_ids: Sequence[int], at: s
     session.execute(update(IndependentAnnotationModel).where(*rest).values(settled=at))
 
 
-def never_compared(session: Session) -> list[tuple[int, int | None]]:
+def list_groups_to_compare(session: Session) -> list[tuple[int, int | None]]:
     """Group and batch (None: none) of annotations that several people submitted and nobody compared."""
     annotation, row = IndependentAnnotationModel, AgreementModel
     same = (row.group_id == annotation.group_id) & (
@@ -189,7 +189,7 @@ def never_compared(session: Session) -> list[tuple[int, int | None]]:
     return [(found.group_id, found.batch_id) for found in session.execute(statement)]
 
 
-def never_adopted(session: Session) -> list[int]:
+def list_copies_to_adopt(session: Session) -> list[int]:
     """Copies that were submitted in batches which ask for one annotation a group, and wait."""
     annotation = IndependentAnnotationModel
     ready = (
@@ -201,7 +201,7 @@ def never_adopted(session: Session) -> list[int]:
     return list(session.scalars(statement.where(*ready, BatchModel.verdicts == 1)))
 
 
-def required_verdicts(session: Session, batch_id: int) -> int | None:
+def read_required_verdicts(session: Session, batch_id: int) -> int | None:
     """How many annotations of each group a batch asks for; None where there is no such batch."""
     verdicts: int | None = session.scalar(
         select(BatchModel.verdicts).where(BatchModel.id == batch_id)

@@ -25,7 +25,7 @@ from app.features.agreement.service import AnnotationPair, Comparison, compare_g
 from app.features.agreement.summary import (
     GroupAgreement,
     PeopleAgreement,
-    agreement_csv,
+    agreement_to_csv,
     summarize_agreement,
 )
 from app.features.groups.routes import ETAG
@@ -264,7 +264,7 @@ def get_agreement(
 def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None) -> Response:
     """The same as CSV, a row for each group."""
     headers = {"Content-Disposition": 'attachment; filename="touchline-agreement.csv"'}
-    text = agreement_csv(summarize_agreement(store, dataset, of_batch))
+    text = agreement_to_csv(summarize_agreement(store, dataset, of_batch))
     return Response(text, headers=headers, media_type=CSV_FILE)
 
 
@@ -291,7 +291,7 @@ def put_limits(
 @paged()
 def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
-    return WaitingList.model_validate({"items": adjudicate.list_waiting(store, dataset)})
+    return WaitingList.model_validate({"items": adjudicate.list_open_cases(store, dataset)})
 
 
 @router.get(
@@ -303,7 +303,7 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
-    return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))
+    return document(CaseDocument.of(adjudicate.read_case(store, group, actor=actor)))
 
 
 @router.post(
@@ -316,7 +316,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
 @responds(group_response)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
-    return adjudicate.decide_case(
+    return adjudicate.adjudicate_case(
         services.store,
         group,
         decision.annotation,

@@ -21,18 +21,18 @@ from app.features.agreement.queries import (
     DECIDED,
     OPEN,
     AgreementRow,
-    decide_agreement,
+    complete_unchosen_annotations,
     find_limits,
+    list_copies_to_adopt,
     list_group_agreements,
-    never_adopted,
-    never_compared,
+    list_groups_to_compare,
     put_agreement,
     put_limits,
-    required_verdicts,
-    settle_unchosen_annotations,
+    read_required_verdicts,
+    save_adjudication,
 )
-from app.features.batches.completion_queries import settle_in_batch
-from app.features.batches.own_annotations import adopt_submitted
+from app.features.batches.completion_queries import complete_group_in_batch
+from app.features.batches.own_annotations import adopt_submitted_annotations
 from app.features.batches.service import get_batch
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
@@ -42,7 +42,7 @@ from app.features.independent_annotations.adopt import adopt_annotation, copy_ve
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
-    annotations_of_group,
+    list_annotations_of_group,
 )
 from app.features.independent_annotations.service import find_annotation_of_copy
 from app.features.solutions.codec import to_json
@@ -177,7 +177,9 @@ class StoredComparison:
     pairs: tuple[AnnotationComparison, ...]
 
 
-def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
+def compare_or_adopt_submission(
+    store: Store, copy_id: int, paint: PaintFollower | None = None
+) -> str | None:
     """What follows from a copy that was submitted: where nobody else annotates the group it is taken
     over, else the group is weighed; None where there is nothing to weigh yet.
 
@@ -192,7 +194,9 @@ def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = N
         return None
     try:
         if annotation.batch_id is not None:
-            adopt_submitted(store, get_batch(store, annotation.batch_id), annotation.person)
+            adopt_submitted_annotations(
+                store, get_batch(store, annotation.batch_id), annotation.person
+            )
         return compare_submitted(store, annotation.group_id, annotation.batch_id, paint)
     except ReviewError as error:
         # It is tried again with the person's next group, and when the server starts.
@@ -208,10 +212,10 @@ def compare_submitted(
     Each pair is compared, and all of them have to agree. ``paint`` reads the paint of edited lines
     again, as for every edit. May be called again at any time: what was compared already stays.
     """
-    annotations = submitted_annotations(store, group_id, batch_id)
+    annotations = list_undecided_annotations(store, group_id, batch_id)
     with store.read() as session:
         required = (
-            REQUIRED if batch_id is None else required_verdicts(session, batch_id) or REQUIRED
+            REQUIRED if batch_id is None else read_required_verdicts(session, batch_id) or REQUIRED
         )
         known = _stored_agreement(session, group_id, batch_id)
     if len(annotations) < max(REQUIRED, required) or (known and known.state != OPEN):
@@ -225,7 +229,7 @@ def compare_submitted(
     values = _agreement_columns(original, annotations, found)
     if not any(pair.disagreements for pair in found.pairs):
         try:
-            adopt_and_settle(
+            adopt_and_decide(
                 store,
                 group_id,
                 batch_id,
@@ -245,7 +249,7 @@ def compare_submitted(
     return OPEN if _open_case(store, annotations, values) else None
 
 
-def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
+def compare_uncompared_groups(store: Store, paint: PaintFollower | None = None) -> int:
     """Compare what was submitted before a server was stopped, and was not compared any more; and
     take over what waits for that.
 
@@ -253,9 +257,9 @@ def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
         How many groups were compared.
     """
     with store.read() as session:
-        left, waiting = never_compared(session), never_adopted(session)
+        left, waiting = list_groups_to_compare(session), list_copies_to_adopt(session)
     for copy_id in waiting:
-        after_submission(store, copy_id, paint)
+        compare_or_adopt_submission(store, copy_id, paint)
     compared = 0
     for group_id, batch_id in left:
         try:
@@ -265,12 +269,12 @@ def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
     return compared
 
 
-def submitted_annotations(
+def list_undecided_annotations(
     store: Store, group_id: int, batch_id: int | None
 ) -> list[IndependentAnnotation]:
     """What was submitted of a group in a batch (None: in none), and not decided about, in order."""
     with store.read() as session:
-        annotations = annotations_of_group(session, group_id)
+        annotations = list_annotations_of_group(session, group_id)
     found = [
         annotation
         for annotation in annotations
@@ -281,7 +285,7 @@ def submitted_annotations(
     return sorted(found, key=lambda annotation: (annotation.submitted or "", annotation.id))
 
 
-def adopt_and_settle(
+def adopt_and_decide(
     store: Store,
     group_id: int,
     batch_id: int | None,
@@ -318,10 +322,10 @@ def adopt_and_settle(
     def done(session: Session) -> None:
         if found is not None:
             put_agreement(session, found)
-        dataset = decide_agreement(session, group_id, batch_id or 0, values)
-        settle_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
+        dataset = save_adjudication(session, group_id, batch_id or 0, values)
+        complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
-            settle_in_batch(session, batch_id, group_id, actor=actor, at=at)
+            complete_group_in_batch(session, batch_id, group_id, actor=actor, at=at)
         append(session, [Entry(KIND, actor, at, body, dataset, group_id)])
         if judge:
             note = f"as {taken.person} judged it"
@@ -342,7 +346,7 @@ def _open_case(
     """Let a group wait for a decision; False where somebody went on or decided meanwhile."""
     group_id, batch_id = values["group_id"], annotations[0].batch_id
     with store.write() as session:
-        now_there = annotations_of_group(session, group_id)
+        now_there = list_annotations_of_group(session, group_id)
         known = _stored_agreement(session, group_id, batch_id)
         if any(annotation not in now_there for annotation in annotations) or (
             known and known.state != OPEN

@@ -141,7 +141,7 @@ def summarize_agreement(store: Store, dataset: str | int, batch: int | None = No
     )
 
 
-def agreement_csv(found: Agreement) -> str:
+def agreement_to_csv(found: Agreement) -> str:
     """A row for each group, the worst first; text that would be a formula is none."""
     names = [f"{name}_{end}" for name in MEASURES for end in ("median", "tail")]
     head = (

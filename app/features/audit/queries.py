@@ -55,7 +55,7 @@ class AuditRow:
 _SHOWN = shown_actor(LogModel.actor, LogModel.at)
 
 
-def audit_rows(
+def list_audit_rows(
     session: Session, query: AuditQuery, visibility: Visibility, before: int | None, limit: int
 ) -> list[AuditRow]:
     """Entries that fit, the newest first, of the datasets that somebody sees."""

@@ -47,16 +47,16 @@ class AuditDocument(ListDocument[AuditEntry]):
     )
 
 
-async def get_led(request: Request) -> Visibility:
+async def led_datasets_of_request(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
     login = current_login(request.scope)
     return EVERYTHING if login is None else login.roles.led_datasets()
 
 
-Led = Annotated[Visibility, Depends(get_led)]
+Led = Annotated[Visibility, Depends(led_datasets_of_request)]
 
 
-def audit_query(
+def parse_audit_query(
     store: AppStore,
     dataset: Annotated[
         str | None, Query(max_length=200, description="Name or id of the dataset.")
@@ -92,7 +92,7 @@ def _time_text(at: datetime | None) -> str | None:
         return at.replace(tzinfo=UTC).isoformat(timespec="microseconds")
 
 
-Asked = Annotated[AuditQuery, Depends(audit_query)]
+Asked = Annotated[AuditQuery, Depends(parse_audit_query)]
 
 
 @router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
@@ -130,7 +130,7 @@ def export_audit(
     ending: Literal["csv", "jsonl"], store: AppStore, led: Led, query: Asked, search: Search = ""
 ) -> StreamingResponse:
     """The same, all of it, as a table (no cell of which is a formula) or as JSON Lines."""
-    found = audit.every_entry(store, query, led, search)
+    found = audit.iterate_audit_entries(store, query, led, search)
     lines = _csv_lines(found) if ending == "csv" else _json_lines(found)
     kind = "text/csv; charset=utf-8" if ending == "csv" else "application/x-ndjson"
     saved = {"Content-Disposition": f'attachment; filename="touchline-audit.{ending}"'}

@@ -16,7 +16,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.audit.queries import AuditQuery as AuditQuery
-from app.features.audit.queries import AuditRow, audit_rows
+from app.features.audit.queries import AuditRow, list_audit_rows
 from app.features.comments.queries import find_group
 from app.features.people.queries import person_by_id
 from app.features.people.roles import PERSON, require_no_token
@@ -46,7 +46,7 @@ def add_audit_event(
     append(session, [Entry(DEED, actor, now(), {"did": did, **what}, dataset_id)])
 
 
-def note_job(
+def log_job_request(
     session: Session, actor: str, job: int, kind: str, title: str, dataset_id: int | None
 ) -> None:
     """Write into the log who asked for a job."""
@@ -195,7 +195,7 @@ def read_audit(
     looked = 0
     with store.read() as session:
         while looked < MOST_LOOKED_AT:
-            rows = audit_rows(session, query, visibility, before, batch)
+            rows = list_audit_rows(session, query, visibility, before, batch)
             for row in rows:
                 entry = _audit_entry(row)
                 if _contains_words(entry, words):
@@ -216,7 +216,7 @@ def require_group(store: Store, group_id: int) -> None:
             raise NotFoundError.group(group_id)
 
 
-def every_entry(
+def iterate_audit_entries(
     store: Store, query: AuditQuery, visibility: Visibility, search: str = ""
 ) -> Iterator[AuditEntry]:
     """All of it, a page at a time, so that a long log fits into memory.

@@ -129,11 +129,14 @@ def gold(
         with connect_to_server(server) as client:
             print_values(choose_gold(client, dataset, body), json_)
         return
-    from app.features.independent_annotations.known_truth import GoldChoice, mark_known
+    from app.features.independent_annotations.known_truth import (
+        GoldChoice,
+        mark_groups_with_known_truth,
+    )
 
     choice = GoldChoice(TruthSource(source), version, query, size, start)
     with opened_store() as store:
-        found = mark_known(store, dataset, choice, actor=current_actor())
+        found = mark_groups_with_known_truth(store, dataset, choice, actor=current_actor())
     print_values({"groups": [*found.groups], "left_out": found.left_out}, json_)
 
 

@@ -37,7 +37,9 @@ _CLOSE = delete(LeaseModel).where(
 )
 
 
-def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at: str) -> None:
+def complete_judged_groups(
+    session: Session, states: Mapping[int, str], *, actor: str, at: str
+) -> None:
     """Groups were judged: in open batches that ask for one verdict their work is over.
 
     A group that is deferred, or not judged any more, waits again. Whoever has a settled group open
@@ -62,7 +64,9 @@ def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at
             _announce_done(session, near, actor=actor, at=at)
 
 
-def settle_in_batch(session: Session, batch_id: int, group_id: int, *, actor: str, at: str) -> None:
+def complete_group_in_batch(
+    session: Session, batch_id: int, group_id: int, *, actor: str, at: str
+) -> None:
     """The work on a group of a batch is over."""
     mine = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
     waits = (*mine, BatchGroupModel.settled.is_(None))

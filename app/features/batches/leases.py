@@ -15,27 +15,27 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, HeldGroupError, NotFoundError
 from app.features.batches.own_annotations import (
+    begin_next_own_annotation,
+    count_own_groups,
     find_own_annotation,
+    hide_others_progress,
     list_returned_groups,
-    next_own,
-    own_total,
-    submit_own,
-    takes_part,
-    visible_batch,
+    makes_own_annotations,
+    submit_own_annotation,
 )
 from app.features.batches.queries import (
     WaitingGroup,
+    delete_ended_leases,
     end_leases,
     end_person_lease,
     find_batch_group,
-    forget_ended,
-    keep_lease,
+    find_next_waiting_group,
     list_group_leases,
     mark_submitted,
-    waiting_group,
+    save_lease,
 )
 from app.features.batches.service import WORK, Batch, Part, Presence, read_batch
-from app.features.independent_annotations.adopt import checked_reason, log_return
+from app.features.independent_annotations.adopt import log_return, strip_and_check_reason
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import ReturnedGroup, read_returned
 from app.features.people.visibility_queries import is_blind
@@ -122,14 +122,14 @@ class Leases:
         """
         with self._store.write(lasting=False) as session:
             batch = _open_batch(session, batch_id)
-            if not takes_part(batch, worker.parts(batch)):
+            if not makes_own_annotations(batch, worker.parts(batch)):
                 return self._next(session, batch, worker, after)
             back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
                 row = _require_batch_group(session, batch, mine)
                 return self._renewed(session, batch, row, Part.ANNOTATOR, worker)
-        annotation = next_own(self._store, batch, worker.name)
+        annotation = begin_next_own_annotation(self._store, batch, worker.name)
         if annotation is None:
             return Lease(batch, None, Part.ANNOTATOR)
         with self._store.read() as session:
@@ -139,8 +139,8 @@ class Leases:
         self, session: Session, batch: Batch, worker: BatchMember, after: int | None
     ) -> Lease:
         at = self._now()
-        forget_ended(session, at)
-        found = open_for(session, batch, worker, at, after=after)
+        delete_ended_leases(session, at)
+        found = find_next_open_group(session, batch, worker, at, after=after)
         if found is None:
             return Lease(batch, None)
         row, part = found
@@ -183,7 +183,7 @@ class Leases:
             NotFoundError: There is no such batch.
         """
         with self._store.write(lasting=False) as session:
-            batch = visible_batch(session, read_batch(session, batch_id, with_here=False))
+            batch = hide_others_progress(session, read_batch(session, batch_id, with_here=False))
             end_person_lease(session, batch_id, group, worker.name)
             return Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
 
@@ -203,7 +203,7 @@ class Leases:
         if own is not None:
             lease = Lease(batch, group)
             with self._store.write() as session:
-                submit_own(session, own, actor=actor, done=done)
+                submit_own_annotation(session, own, actor=actor, done=done)
                 session.respond(lease)
             return lease
         with self._store.write() as session:
@@ -236,7 +236,7 @@ class Leases:
             ConflictError: It is not submitted, its work is over, or the batch is closed.
             InputError: The sentence is too long.
         """
-        checked = checked_reason(reason)
+        checked = strip_and_check_reason(reason)
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
             row = _require_batch_group(session, batch, group)
@@ -256,7 +256,7 @@ class Leases:
     ) -> Lease:
         """The response once somebody's lease has ended with what they said of the group."""
         end_person_lease(session, batch_id, group, worker.name)
-        batch = visible_batch(session, read_batch(session, batch_id))
+        batch = hide_others_progress(session, read_batch(session, batch_id))
         lease = Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
         session.respond(lease)
         return lease
@@ -266,7 +266,7 @@ class Leases:
     ) -> Lease:
         at, group = self._clock(), row.group_id
         until = text_of(at + LASTS)
-        keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
+        save_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
         here = _read_presences(session, batch, group, text_of(at))
         if row.submitted_by is None:
             return Lease(batch, group, part, until, here)
@@ -280,7 +280,7 @@ class Leases:
         return text_of(self._clock())
 
 
-def open_for(
+def find_next_open_group(
     session: Session, batch: Batch, worker: BatchMember, at: str, *, after: int | None = None
 ) -> tuple[Any, Part] | None:
     """The row of the group that somebody gets next of a batch, and what they do with it.
@@ -311,7 +311,7 @@ def open_for(
             continue
         # Where nobody annotates, a reviewer gets everything that waits.
         submitted = (part is Part.REVIEWER) if batch.annotators else None
-        found = waiting_group(
+        found = find_next_waiting_group(
             session, batch.id, batch.dataset_id, worker.name, at, submitted=submitted, after=place
         )
         if found is not None:
@@ -323,7 +323,7 @@ def _copy_lease(
     session: Session, batch: Batch, annotation: IndependentAnnotation, worker: BatchMember
 ) -> Lease:
     """Of a copy, which nobody else can have open."""
-    of = own_total(session, batch, worker.name)
+    of = count_own_groups(session, batch, worker.name)
     return Lease(batch, annotation.copy_id, Part.ANNOTATOR, place=annotation.place, of=of)
 
 
@@ -348,7 +348,7 @@ def _open_batch(session: Session, batch_id: int) -> Batch:
     batch = read_batch(session, batch_id, with_here=False)
     if not batch.is_open:
         raise ConflictError(f'the batch "{batch.name}" is closed')
-    return visible_batch(session, batch)
+    return hide_others_progress(session, batch)
 
 
 def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
@@ -374,7 +374,7 @@ def _require_given(session: Session, batch: Batch, group: int, worker: BatchMemb
     Raises:
         NotFoundError: As of a group that is not in it.
     """
-    if not is_blind(batch.dataset_id) or not takes_part(batch, worker.parts(batch)):
+    if not is_blind(batch.dataset_id) or not makes_own_annotations(batch, worker.parts(batch)):
         return
     if group not in list_returned_groups(session, batch, worker.name):
         raise _no_group(batch, group)

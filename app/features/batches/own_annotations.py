@@ -16,19 +16,22 @@ from app.features.batches.service import Batch, Part, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
     BatchTerms,
-    begin_next,
+    begin_next_annotation,
     count_gold_left,
-    unseen_gold_outside_batches,
+    list_unseen_gold_outside_batches,
 )
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
-    annotation_of_copy,
-    annotations_of_batch,
-    count_left,
+    count_groups_left,
+    find_annotation_of_copy_row,
+    list_annotations_of_batch,
 )
 from app.features.independent_annotations.service import read_annotation
-from app.features.independent_annotations.submission_queries import require_open, submit_copy
+from app.features.independent_annotations.submission_queries import (
+    require_annotation_open,
+    submit_copy,
+)
 from app.features.people.visibility_queries import READER, sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.soccer.actors import person_of
@@ -37,19 +40,21 @@ OVER = ("accepted", "rejected")
 """Verdicts after which a group waits for nobody."""
 
 
-def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
+def makes_own_annotations(batch: Batch, parts: Collection[Part]) -> bool:
     """Whether somebody with these parts makes annotations of their own in a batch."""
     if batch.verdicts == 1 and batch.gold_every is None:
         return False
     return Part.ANNOTATOR in parts or (Part.REVIEWER in parts and not batch.annotators)
 
 
-def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation | None:
+def begin_next_own_annotation(
+    store: Store, batch: Batch, person: str
+) -> IndependentAnnotation | None:
     """The own annotation that somebody shall work on now; None: there is nothing left for them.
 
     Where one annotation a group is asked for, what they have submitted is taken over first.
     """
-    adopt_submitted(store, batch, person)
+    adopt_submitted_annotations(store, batch, person)
     with store.read() as session:
         groups = _list_waiting_groups(session, batch)
     terms = BatchTerms(
@@ -61,7 +66,7 @@ def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation |
         batch.created,
         batch.gold_every,
     )
-    return begin_next(store, terms, person=person)
+    return begin_next_annotation(store, terms, person=person)
 
 
 def list_returned_groups(session: Session, batch: Batch, person: str) -> list[int]:
@@ -69,25 +74,25 @@ def list_returned_groups(session: Session, batch: Batch, person: str) -> list[in
     return [row.group_id for row in list_returned_rows(session, [batch.id], person_of(person))]
 
 
-def own_left(session: Session, batch: Batch, person: str) -> int:
+def count_own_groups_left(session: Session, batch: Batch, person: str) -> int:
     """Of how many groups somebody may still make an annotation of their own, begun ones and those
     that they have back included."""
     name = person_of(person)
-    begun, free = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    begun, free = count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
     left = begun + free + len(list_returned_groups(session, batch, person))
     if batch.gold_every is None:
         return left
-    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     kinds = [annotation.kind for annotation in annotations if annotation.person == name]
     fresh = len(
-        unseen_gold_outside_batches(
+        list_unseen_gold_outside_batches(
             session, batch.dataset_id, name, _list_waiting_groups(session, batch)
         )
     )
     return left + count_gold_left(kinds, batch.gold_every, free, fresh)
 
 
-def visible_batch(session: Session, batch: Batch) -> Batch:
+def hide_others_progress(session: Session, batch: Batch) -> Batch:
     """A batch as whoever asks may see it.
 
     Of one that they annotate blind they see their own part alone: counts of the groups change with
@@ -98,12 +103,12 @@ def visible_batch(session: Session, batch: Batch) -> Batch:
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
         return batch
-    return replace(own_part(session, batch, reader.person), query="")
+    return replace(with_own_counts(session, batch, reader.person), query="")
 
 
-def own_part(session: Session, batch: Batch, person: str) -> Batch:
+def with_own_counts(session: Session, batch: Batch, person: str) -> Batch:
     """A batch with the counts of somebody's own annotations: what they submitted is done."""
-    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     name = person_of(person)
     back = set(list_returned_groups(session, batch, person))
     done = [
@@ -113,7 +118,7 @@ def own_part(session: Session, batch: Batch, person: str) -> Batch:
     ]
     return replace(
         batch,
-        groups=len(done) + own_left(session, batch, person),
+        groups=len(done) + count_own_groups_left(session, batch, person),
         submitted=0,
         settled=len(done),
         last=max(done, default=None),
@@ -121,18 +126,18 @@ def own_part(session: Session, batch: Batch, person: str) -> Batch:
     )
 
 
-def seen_batches(store: Store, dataset: str | int) -> list[Batch]:
+def list_visible_batches(store: Store, dataset: str | int) -> list[Batch]:
     """The batches of a dataset as whoever asks may see them."""
     found = list_batches(store, dataset)
     with store.read() as session:
-        return [visible_batch(session, batch) for batch in found]
+        return [hide_others_progress(session, batch) for batch in found]
 
 
-def seen_batch(store: Store, batch_id: int) -> Batch:
+def get_visible_batch(store: Store, batch_id: int) -> Batch:
     """A batch as whoever asks may see it; raises NotFoundError where there is none."""
     batch = get_batch(store, batch_id)
     with store.read() as session:
-        return visible_batch(session, batch)
+        return hide_others_progress(session, batch)
 
 
 def _list_waiting_groups(session: Session, batch: Batch) -> list[int]:
@@ -144,7 +149,7 @@ def _list_waiting_groups(session: Session, batch: Batch) -> list[int]:
     ]
 
 
-def own_total(session: Session, batch: Batch, person: str) -> int | None:
+def count_own_groups(session: Session, batch: Batch, person: str) -> int | None:
     """How many groups of a batch somebody annotates on their own, those that are done included.
 
     None where gold groups are mixed in: they add to what is done and not to what is left.
@@ -152,12 +157,12 @@ def own_total(session: Session, batch: Batch, person: str) -> int | None:
     if batch.gold_every is not None:
         return None
     name = person_of(person)
-    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     done = len([row for row in annotations if row.person == name and row.submitted is not None])
-    return done + sum(count_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
+    return done + sum(count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
 
 
-def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
+def adopt_submitted_annotations(store: Store, batch: Batch, person: str) -> None:
     """Take over what somebody submitted, where nobody else annotates the same groups.
 
     What an annotator has not judged waits for a reviewer then, as if they had submitted the group.
@@ -167,7 +172,7 @@ def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
     with store.read() as session:
         ready = [
             row
-            for row in annotations_of_batch(session, batch.id, batch.dataset_id)
+            for row in list_annotations_of_batch(session, batch.id, batch.dataset_id)
             if row.person == person_of(person)
             and (row.kind, row.settled) == (INDEPENDENT, None)
             and row.submitted is not None
@@ -185,13 +190,13 @@ def find_own_annotation(
     session: Session, batch: Batch, group: int, person: str
 ) -> IndependentAnnotation | None:
     """The own annotation of a person in a batch whose copy a group is; None: it is none."""
-    row = annotation_of_copy(session, group)
+    row = find_annotation_of_copy_row(session, group)
     if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
         return None
     return read_annotation(session, row.id)
 
 
-def submit_own(
+def submit_own_annotation(
     session: Session, annotation: IndependentAnnotation, *, actor: str, done: bool
 ) -> None:
     """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
@@ -200,6 +205,6 @@ def submit_own(
         ConflictError: It was submitted before, or is not and shall be taken back.
     """
     if not done:
-        require_open(annotation)
+        require_annotation_open(annotation)
         raise ConflictError("this annotation is not submitted yet")
     submit_copy(session, read_annotation(session, annotation.id), actor=actor, at=now())

@@ -13,19 +13,27 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.features.batches.leases import BatchMember
-from app.features.batches.own_annotations import own_left, own_part, takes_part, visible_batch
+from app.features.batches.own_annotations import (
+    count_own_groups_left,
+    hide_others_progress,
+    makes_own_annotations,
+    with_own_counts,
+)
 from app.features.batches.queries import (
     NumberedBatchGroup,
-    batches_that_wait,
-    datasets_with_batches,
-    entries_of_work,
-    last_work,
+    find_last_work_time,
+    list_datasets_with_open_batches,
     list_returned_rows,
+    list_unfinished_batches,
+    list_work_entries,
     read_batch_groups,
 )
 from app.features.batches.service import Batch, Part, read_batch, read_batches
 from app.features.datasets.service import dataset_id
-from app.features.independent_annotations.queries import annotations_of_batch, open_annotations
+from app.features.independent_annotations.queries import (
+    list_annotations_of_batch,
+    list_open_annotations,
+)
 from app.features.independent_annotations.service import ReturnedGroup, read_returned
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.webhooks.queries import (
@@ -58,14 +66,14 @@ class BatchStall:
     since: str
 
 
-def last_activity(session: Session, batch: Batch) -> str:
+def find_last_activity(session: Session, batch: Batch) -> str:
     """When somebody did something in a batch last, opening a group included; else when it was made."""
-    times = [batch.created, batch.last, last_work(session, batch.id)]
+    times = [batch.created, batch.last, find_last_work_time(session, batch.id)]
     times += [one.seen for one in batch.here]
     return max(time for time in times if time is not None)
 
 
-def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> BatchStall | None:
+def find_stall(batch: Batch, last: str, at: datetime, hours: float) -> BatchStall | None:
     """Whether a batch has stalled at a time; None: it has not, is done, or is closed.
 
     Args:
@@ -83,7 +91,7 @@ def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> BatchStall 
     return None
 
 
-def notify_of_stalls(store: Store, at: datetime) -> int:
+def notify_of_stalled_batches(store: Store, at: datetime) -> int:
     """Tell webhooks of the batches that have stalled, of each stall once; returns how many messages."""
     with store.read() as session:
         wanted = {row.dataset_id for row in list_active_webhooks(session)}
@@ -98,8 +106,8 @@ def notify_of_stalls(store: Store, at: datetime) -> int:
 def _find_stalled_groups(
     session: Session, datasets: list[int], at: datetime, hours: float
 ) -> list[tuple[Batch, BatchStall]]:
-    batches = [read_batch(session, one) for one in batches_that_wait(session, datasets)]
-    found = [(one, stall_of(one, last_activity(session, one), at, hours)) for one in batches]
+    batches = [read_batch(session, one) for one in list_unfinished_batches(session, datasets)]
+    found = [(one, find_stall(one, find_last_activity(session, one), at, hours)) for one in batches]
     return [(batch, stall) for batch, stall in found if stall is not None]
 
 
@@ -168,7 +176,7 @@ class TeamBatch:
     people: list[Pace] = field(default_factory=list)
 
 
-def my_work(
+def list_own_batches(
     store: Store, worker_in: Callable[[int], BatchMember], visibility: Visibility = EVERYTHING
 ) -> list[MyBatch]:
     """Open batches that are somebody's, those that are due first, first.
@@ -179,17 +187,23 @@ def my_work(
         visibility: Which datasets they see.
     """
     with store.read() as session:
-        ids = [one for one in datasets_with_batches(session) if visibility.sees(one)]
+        ids = [one for one in list_datasets_with_open_batches(session) if visibility.sees(one)]
         found = []
         for batch in read_batches(session, ids):
             worker = worker_in(batch.dataset_id)
             parts = worker.parts(batch)
             if batch.is_open and parts:
-                own = takes_part(batch, parts)
-                left = own_left(session, batch, worker.name) if own else _count_left(batch, parts)
+                own = makes_own_annotations(batch, parts)
+                left = (
+                    count_own_groups_left(session, batch, worker.name)
+                    if own
+                    else _count_left(batch, parts)
+                )
                 back = _returned_groups(session, batch, worker.name)
-                seen = own_part(session, batch, worker.name) if own else batch
-                found.append(MyBatch(visible_batch(session, seen), sorted(parts), left, back))
+                seen = with_own_counts(session, batch, worker.name) if own else batch
+                found.append(
+                    MyBatch(hide_others_progress(session, seen), sorted(parts), left, back)
+                )
         return found
 
 
@@ -197,12 +211,14 @@ def _returned_groups(session: Session, batch: Batch, name: str) -> list[Returned
     """What of a batch somebody has back, in its order."""
     person = person_of(name)
     waiting = [row.group_id for row in list_returned_rows(session, [batch.id], person)]
-    waiting += [copy.group_id for copy in open_annotations(session, [batch.id], person)]
+    waiting += [copy.group_id for copy in list_open_annotations(session, [batch.id], person)]
     back = read_returned(session, waiting) if waiting else {}
     return [back[group] for group in waiting if group in back]
 
 
-def team_work(store: Store, dataset: str | int, *, at: datetime | None = None) -> list[TeamBatch]:
+def list_team_batches(
+    store: Store, dataset: str | int, *, at: datetime | None = None
+) -> list[TeamBatch]:
     """Every batch of a dataset with who has done what of it."""
     moment = datetime.now(UTC) if at is None else at
     with store.read() as session:
@@ -218,10 +234,10 @@ def _count_left(batch: Batch, parts: Iterable[Part]) -> int:
 
 
 def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
-    stall = stall_of(batch, last_activity(session, batch), at, hours)
+    stall = find_stall(batch, find_last_activity(session, batch), at, hours)
     since = stall.since if stall is not None and stall.why is StallReason.IDLE else None
-    entries = entries_of_work(session, batch.id, batch.created)
-    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    entries = list_work_entries(session, batch.id, batch.created)
+    annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     return TeamBatch(
         batch, since, _measure_paces(entries, read_batch_groups(session, batch.id), annotations)
     )
@@ -266,10 +282,12 @@ def _measure_pace(
     submitted: Mapping[str, set[int]],
 ) -> Pace:
     done, given = judged.get(name, set()), submitted.get(name, set())
-    return Pace(name, len(given), len(done), len(done | given), worked(times).total_seconds() / 60)
+    return Pace(
+        name, len(given), len(done), len(done | given), sum_working_time(times).total_seconds() / 60
+    )
 
 
-def worked(times: Iterable[str]) -> timedelta:
+def sum_working_time(times: Iterable[str]) -> timedelta:
     """How long somebody worked who did something at these times: the time between each two that
     follow each other, where that is no longer than ``PAUSE``.
 

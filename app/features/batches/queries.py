@@ -143,13 +143,13 @@ def find_dataset_batches(session: Session, dataset_ids: Collection[int]) -> Sequ
     return session.rows(BatchRow, _BATCHES.where(mine).order_by(*order))
 
 
-def datasets_with_batches(session: Session) -> list[int]:
+def list_datasets_with_open_batches(session: Session) -> list[int]:
     """Ids of the datasets in which a batch is open."""
     found = select(BatchModel.dataset_id).where(BatchModel.state == OPEN).distinct()
     return list(session.scalars(found))
 
 
-def batches_that_wait(session: Session, dataset_ids: Collection[int]) -> list[int]:
+def list_unfinished_batches(session: Session, dataset_ids: Collection[int]) -> list[int]:
     """Ids of the open batches of datasets in which a group or a track waits."""
     waits = exists().where(
         BatchGroupModel.batch_id == BatchModel.id, BatchGroupModel.settled.is_(None)
@@ -180,7 +180,7 @@ def delete_batch(session: Session, batch_id: int) -> None:
     session.execute(delete(BatchModel).where(BatchModel.id == batch_id))
 
 
-def set_people(session: Session, batch_id: int, part: str, person_ids: Iterable[int]) -> None:
+def set_batch_people(session: Session, batch_id: int, part: str, person_ids: Iterable[int]) -> None:
     """Give a batch to people, and to nobody else in that part."""
     table = BatchPersonModel
     session.execute(delete(table).where(table.batch_id == batch_id, table.part == part))
@@ -222,7 +222,7 @@ def insert_tracks(session: Session, batch_id: int, track_ids: Sequence[int]) -> 
     session.execute(insert(BatchTrackModel), rows)
 
 
-def tracks_given(session: Session, dataset_id: int) -> dict[int, list[tuple[int, int]]]:
+def list_batches_of_tracks(session: Session, dataset_id: int) -> dict[int, list[tuple[int, int]]]:
     """The open batches of a dataset that each track is in: their ids, and its place in them."""
     statement = (
         select(BatchTrackModel.track_id, BatchTrackModel.batch_id, BatchTrackModel.place)
@@ -236,7 +236,7 @@ def tracks_given(session: Session, dataset_id: int) -> dict[int, list[tuple[int,
     return found
 
 
-def groups_given(session: Session, dataset_id: int) -> set[int]:
+def list_groups_in_open_batches(session: Session, dataset_id: int) -> set[int]:
     """Ids of the groups that wait in an open batch of a dataset."""
     statement = (
         select(BatchGroupModel.group_id)
@@ -338,7 +338,7 @@ class WaitingGroup(NamedTuple):
     submitted_by: str | None
 
 
-def waiting_group(
+def find_next_waiting_group(
     session: Session,
     batch_id: int,
     dataset_id: int,
@@ -418,7 +418,7 @@ def list_leases(session: Session, batch_ids: Collection[int], at: str) -> Sequen
     return session.rows(LeaseModel, _LEASES_IN, {"ids": list(batch_ids), "at": at})
 
 
-def keep_lease(
+def save_lease(
     session: Session, batch_id: int, group_id: int, person: str, *, at: str, until: str
 ) -> None:
     """Take a lease, or let the one last on that the person has."""
@@ -442,7 +442,7 @@ def end_person_lease(session: Session, batch_id: int, group_id: int, person: str
     return bool(done.rowcount)
 
 
-def forget_ended(session: Session, at: str) -> None:
+def delete_ended_leases(session: Session, at: str) -> None:
     """Delete the leases that have run out."""
     session.execute(_ENDED, {"at": at})
 
@@ -456,14 +456,14 @@ class WorkEntry(NamedTuple):
     kind: str
 
 
-def entries_of_work(session: Session, batch_id: int, since: str) -> Sequence[WorkEntry]:
+def list_work_entries(session: Session, batch_id: int, since: str) -> Sequence[WorkEntry]:
     """Entries of the log about a batch's groups, and people's own copies of them, since some time, in order."""
     columns = (LogModel.actor, LogModel.at, LogModel.group_id, LogModel.kind)
     statement = select(*columns).where(*_worked_on_conditions(batch_id), LogModel.at >= since)
     return session.rows(WorkEntry, statement.order_by(LogModel.at))
 
 
-def last_work(session: Session, batch_id: int) -> str | None:
+def find_last_work_time(session: Session, batch_id: int) -> str | None:
     """When somebody did something with a group of a batch last, or with a copy of one."""
     last: str | None = session.scalar(
         select(func.max(LogModel.at)).where(*_worked_on_conditions(batch_id))
@@ -479,12 +479,12 @@ def _worked_on_conditions(batch_id: int) -> tuple[ColumnElement[bool], ...]:
     return LogModel.group_id.in_(mine.union_all(copies)), LogModel.kind.in_(_DONE_KINDS)
 
 
-def groups_in_batches(batch_ids: Collection[int]) -> Select[int]:
+def select_groups_in_batches(batch_ids: Collection[int]) -> Select[int]:
     """Ids of the groups of batches."""
     return select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(batch_ids))
 
 
-def place_column(batch_id: int) -> ColumnElement[Any]:
+def batch_place_column(batch_id: int) -> ColumnElement[Any]:
     """The place of a row of the queue in a batch; NULL where it is in none of it."""
     return (
         select(BatchGroupModel.place)

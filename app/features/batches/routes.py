@@ -10,7 +10,7 @@ from fastapi import APIRouter, BackgroundTasks, Depends, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.db.store import Store
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches import own_annotations, progress
 from app.features.batches import service as batches
 from app.features.batches.leases import BatchMember, Lease, Leases
@@ -253,7 +253,7 @@ class BatchMembers:
 
     def of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""
-        return self.here(batches.dataset_of_batch(store, batch))
+        return self.here(batches.find_dataset_of_batch(store, batch))
 
 
 async def _batch_workers(request: Request) -> BatchMembers:
@@ -274,7 +274,9 @@ def _announce_lease(services: Services, lease: Lease) -> Lease:
 @paged()
 def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
-    return MyWork.model_validate({"items": progress.my_work(store, members.here, visibility)})
+    return MyWork.model_validate(
+        {"items": progress.list_own_batches(store, members.here, visibility)}
+    )
 
 
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
@@ -282,7 +284,9 @@ def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
 @paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
-    return WorkBatchList.model_validate({"items": own_annotations.seen_batches(store, dataset)})
+    return WorkBatchList.model_validate(
+        {"items": own_annotations.list_visible_batches(store, dataset)}
+    )
 
 
 def _created_response(batch: Batch) -> Response:
@@ -318,7 +322,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     """Every batch of a dataset: who has done what, how fast, and which batch has stalled."""
     items = [
         {**vars(one), "here": one.batch.here, "gold_every": one.batch.gold_every}
-        for one in progress.team_work(store, dataset)
+        for one in progress.list_team_batches(store, dataset)
     ]
     return TeamWork.model_validate({"items": items})
 
@@ -332,7 +336,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
 @may(Action.READ, batch=OwnedKind.WORK)
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
-    return own_annotations.seen_batch(store, batch)
+    return own_annotations.get_visible_batch(store, batch)
 
 
 @router.patch(
@@ -431,7 +435,7 @@ def submit_group(
 ) -> Lease:
     """Say that a group is annotated, so that a reviewer gets it."""
     worker = members.of_batch(services.store, batch)
-    background.add_task(after_submission, services.store, group, services.paint)
+    background.add_task(compare_or_adopt_submission, services.store, group, services.paint)
     return _announce_lease(
         services, Leases(services.store).submit(batch, group, worker, actor=actor)
     )

@@ -21,19 +21,19 @@ from app.features.batches.queries import (
     delete_batch,
     find_batch,
     find_dataset_batches,
-    groups_given,
     insert_batch,
     insert_groups,
     insert_tracks,
     list_batch_people,
+    list_batches_of_tracks,
+    list_groups_in_open_batches,
     list_leases,
     read_batch_groups,
-    set_people,
-    tracks_given,
+    set_batch_people,
     update_batch,
 )
-from app.features.datasets.service import checked_title, dataset_id
-from app.features.independent_annotations.queries import gold_heads
+from app.features.datasets.service import dataset_id, strip_and_check_title
+from app.features.independent_annotations.queries import list_gold_heads
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
 from app.features.people.roles import Action, role_allows
@@ -184,7 +184,7 @@ def get_batch(store: Store, batch_id: int) -> Batch:
         return read_batch(session, batch_id)
 
 
-def dataset_of_batch(store: Store, batch_id: int) -> int:
+def find_dataset_of_batch(store: Store, batch_id: int) -> int:
     """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
     with store.read_one() as session:
         row = find_batch(session, batch_id)
@@ -250,7 +250,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         made = insert_batch(session, values)
         (insert_groups if new.tracks is None else insert_tracks)(session, made, ids)
         for part, chosen in people.items():
-            set_people(session, made, part, chosen)
+            set_batch_people(session, made, part, chosen)
         batch = read_batch(session, made)
         _log_change(session, batch, "made", actor)
         _notify_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
@@ -263,7 +263,9 @@ def _choose_ids(session: Session, dataset: int, new: NewBatch, query: Query) -> 
     """Ids of the groups or tracks that are given out."""
     if new.tracks is None:
         found = Listing(session, dataset, query.conditions).ids(query.order)
-        given: Collection[int] = groups_given(session, dataset) if new.skip_given else set()
+        given: Collection[int] = (
+            list_groups_in_open_batches(session, dataset) if new.skip_given else set()
+        )
     else:
         found = list(dict.fromkeys(new.tracks))
         known = {row.id for row in list_rows(session, dataset)}
@@ -271,7 +273,7 @@ def _choose_ids(session: Session, dataset: int, new: NewBatch, query: Query) -> 
             raise InputError(
                 f"track {strange[0]} does not belong to this dataset", pointer="/tracks"
             )
-        given = tracks_given(session, dataset) if new.skip_given else set()
+        given = list_batches_of_tracks(session, dataset) if new.skip_given else set()
     ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
     if not ids:
         raise _no_tracks_error(found) if new.tracks is not None else _no_groups_error(found)
@@ -305,7 +307,7 @@ def change_batch(
     before = get_batch(store, batch_id)
     values: dict[str, Any] = {}
     if name is not None:
-        values["name"] = checked_title(name, "a batch")
+        values["name"] = strip_and_check_title(name, "a batch")
     if due is not None or never_due:
         values["due"] = None if due is None else due.isoformat()
     if state is not None:
@@ -325,7 +327,7 @@ def change_batch(
         if values:
             update_batch(session, batch_id, values)
         for part, chosen in people.items():
-            set_people(session, batch_id, part, chosen)
+            set_batch_people(session, batch_id, part, chosen)
         batch = read_batch(session, batch_id)
         _log_change(session, batch, "closed" if state == CLOSED else "changed", actor)
         known = (*before.annotators, *before.reviewers)
@@ -414,7 +416,7 @@ def _person_ids(store: Store, dataset: int, part: Part, names: Iterable[str]) ->
 
 
 def _check_request(new: NewBatch) -> None:
-    checked_title(new.name, "a batch")
+    strip_and_check_title(new.name, "a batch")
     if not 1 <= new.verdicts <= MOST_VERDICTS:
         raise InputError(
             f"a batch needs 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
@@ -444,7 +446,7 @@ def _check_gold(every: int | None) -> None:
 
 def _require_gold(session: Session, dataset: int) -> None:
     """Raise ConflictError where a dataset has no gold group to mix in."""
-    if not gold_heads(session, dataset):
+    if not list_gold_heads(session, dataset):
         raise ConflictError(
             "no group of this dataset is a gold group",
             hint="Mark gold groups first, mark those of a sample or a frozen version, or create"

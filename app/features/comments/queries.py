@@ -11,7 +11,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.tables import PersonModel
 from app.features.people.visibility_queries import shown_actor
 
@@ -173,7 +173,7 @@ def read_threads(
     return [StoredThread(**row._mapping, comments=tuple(comments[row.id])) for row in rows]
 
 
-def all_threads(session: Session) -> dict[int, ThreadRecord]:
+def read_all_threads(session: Session) -> dict[int, ThreadRecord]:
     """Every thread by its id, under the names that were written."""
     thread, comment = ThreadModel, CommentModel
     found = {}
@@ -227,7 +227,7 @@ def insert_thread(
     time: str,
 ) -> int:
     """Insert an open thread without a comment; returns its id."""
-    identity = next_id(session, ThreadModel)
+    identity = find_next_row_id(session, ThreadModel)
     x, y = (None, None) if at is None else at
     values = {"id": identity, "dataset_id": group.dataset_id, "group_id": group.group_id}
     session.execute(insert(ThreadModel), {**values, "view": view, "x": x, "y": y, "created": time})
@@ -236,7 +236,7 @@ def insert_thread(
 
 def insert_comment(session: Session, thread_id: int, actor: str, text: str, time: str) -> int:
     """Insert a comment; returns its id."""
-    identity = next_id(session, CommentModel)
+    identity = find_next_row_id(session, CommentModel)
     values = {"id": identity, "thread_id": thread_id, "actor": actor, "at": time, "text": text}
     session.execute(insert(CommentModel), values)
     return identity
@@ -259,7 +259,9 @@ def set_mentions(session: Session, comment_id: int, people: Iterable[int]) -> No
         session.execute(insert(CommentMentionModel), rows)
 
 
-def set_resolved(session: Session, thread_id: int, time: str | None, actor: str | None) -> None:
+def set_thread_resolved(
+    session: Session, thread_id: int, time: str | None, actor: str | None
+) -> None:
     """Settle a thread, or open it again (None)."""
     session.execute(
         update(ThreadModel)
@@ -273,7 +275,7 @@ def delete_thread(session: Session, thread_id: int) -> None:
     session.execute(delete(ThreadModel).where(ThreadModel.id == thread_id))
 
 
-def count_open(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
+def count_open_threads(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
     """How many open threads groups have, by group; those without one are left out."""
     statement = (
         select(ThreadModel.group_id, func.count())
@@ -283,7 +285,7 @@ def count_open(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
     return {row[0]: row[1] for row in session.execute(statement)}
 
 
-def groups_with_threads(state: str | None = None) -> Select[int]:
+def select_groups_with_threads(state: str | None = None) -> Select[int]:
     """Ids of the groups that have a thread: an ``open`` one, a ``resolved`` one, or (None) any."""
     statement = select(ThreadModel.group_id)
     if state is None:
@@ -292,7 +294,7 @@ def groups_with_threads(state: str | None = None) -> Select[int]:
     return statement.where(is_open if state == "open" else ~is_open)
 
 
-def groups_that_mention(name: str | None = None) -> Select[int]:
+def select_groups_with_mentions(name: str | None = None) -> Select[int]:
     """Ids of the groups of which an open thread mentions a person, or (None) anybody."""
     statement = (
         select(ThreadModel.group_id)

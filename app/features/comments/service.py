@@ -21,15 +21,15 @@ from app.features.comments.queries import StoredThread as StoredThread
 from app.features.comments.queries import (
     ThreadGroup,
     ThreadRecord,
-    all_threads,
     change_comment,
     delete_thread,
     find_group,
     insert_comment,
     insert_thread,
+    read_all_threads,
     read_threads,
     set_mentions,
-    set_resolved,
+    set_thread_resolved,
 )
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
@@ -50,7 +50,7 @@ _MENTION = re.compile(r"(?<![\w@.-])@([a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?)", 
 WRONG = "not as the log says"
 
 
-def names_in(text: str) -> list[str]:
+def extract_mentions(text: str) -> list[str]:
     """The names that a text mentions, each once.
 
     Example:
@@ -154,7 +154,7 @@ def resolve_thread(
         )
         if (thread.resolved is not None) != resolved:
             time = now()
-            set_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
+            set_thread_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
             did = "resolved" if resolved else "reopened"
             _log_comment(session, group, actor, time, did=did, thread=thread_id)
         return _respond_with_thread(session, group_id, thread_id)
@@ -179,7 +179,7 @@ def edit_comment(
         if text != comment.text:
             time = now()
             change_comment(session, comment_id, text, time)
-            people = _ids_of_readers(session, group, names_in(text))
+            people = _ids_of_readers(session, group, extract_mentions(text))
             set_mentions(session, comment_id, people.values())
             entry = {"comment": comment_id, "text": text}
             _log_comment(session, group, actor, time, did="edited", thread=thread_id, **entry)
@@ -222,7 +222,7 @@ def _insert_comment(
 ) -> None:
     time = now()
     comment_id = insert_comment(session, thread_id, actor, text, time)
-    people = _ids_of_readers(session, group, names_in(text))
+    people = _ids_of_readers(session, group, extract_mentions(text))
     set_mentions(session, comment_id, people.values())
     entry = {"comment": comment_id, "text": text, **where}
     _log_comment(session, group, actor, time, did="said", thread=thread_id, **entry)
@@ -332,16 +332,16 @@ def examine_threads(store: Store) -> Check:
 def _compare_with_log(session: Session, restore: str) -> Check:
     try:
         with as_written():
-            logged = logged_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
+            logged = threads_from_log(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
     except StorageError as error:
         return Check("threads", False, error.message, error.hint or restore)
-    present = all_threads(session)
+    present = read_all_threads(session)
     keys = sorted(logged.keys() | present.keys())
     apart = [str(key) for key in keys if logged.get(key) != present.get(key)]
     return compare_records("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
 
 
-def logged_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
+def threads_from_log(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
     """The threads that follow from the log, by id.
 
     Args:

@@ -103,7 +103,7 @@ def policy_from_row(text: str) -> Policy:
         return policy_from_json(parse(text))
 
 
-def dataset_rows(session: Session) -> Sequence[DatasetModel]:
+def list_dataset_rows(session: Session) -> Sequence[DatasetModel]:
     """The rows of all datasets, those of copies too, by name."""
     return session.rows(DatasetModel, _ROWS.order_by(DatasetModel.name))
 
@@ -124,7 +124,7 @@ def find_dataset(session: Session, dataset: str | int) -> DatasetModel | None:
     return session.row(DatasetModel, statement)
 
 
-def next_dataset_id(session: Session, *, copies: bool = False) -> int:
+def find_next_dataset_id(session: Session, *, copies: bool = False) -> int:
     """The id that the next dataset gets, or the next one of ``copies``."""
     column = DatasetModel.id
     mine = column > COPIES if copies else column <= COPIES
@@ -138,7 +138,7 @@ def insert_dataset_row(
     session: Session, name: str, policy: Policy, at: str, *, copies: bool = False
 ) -> int:
     """Insert a dataset, one of ``copies`` if so; returns its id."""
-    identity = next_dataset_id(session, copies=copies)
+    identity = find_next_dataset_id(session, copies=copies)
     values = {"id": identity, "name": name, "created": at, **_policy_columns(policy)}
     session.execute(insert(DatasetModel), [values])
     return identity
@@ -173,12 +173,12 @@ def has_match(session: Session, dataset_id: int, match: str) -> bool:
     return bool(session.scalar(select(found)))
 
 
-def dataset_name(session: Session, dataset_id: int) -> str:
+def read_dataset_name(session: Session, dataset_id: int) -> str:
     """The name of a dataset that is there."""
     return session.scalars(select(DatasetModel.name).where(DatasetModel.id == dataset_id)).one()
 
 
-def dataset_names(session: Session) -> dict[int, str]:
+def read_dataset_names(session: Session) -> dict[int, str]:
     """The name of every dataset, by id."""
     statement = select(DatasetModel.id, DatasetModel.name)
     return {row.id: row.name for row in session.execute(statement)}
@@ -188,7 +188,7 @@ def _policy_columns(policy: Policy) -> dict[str, str]:
     return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
 
 
-def owning_dataset_id(session: Session, kind: str, identity: int) -> int | None:
+def find_owning_dataset(session: Session, kind: str, identity: int) -> int | None:
     """Id of the dataset of a group, view, station and so on; None where there is no such thing."""
     found: int | None = session.scalar(_DATASET_OF[kind], {"id": identity})
     return found
@@ -202,7 +202,7 @@ class JobOwner(NamedTuple):
     kind: str
 
 
-def owner_of_job(session: Session, job_id: int) -> JobOwner | None:
+def find_job_owner(session: Session, job_id: int) -> JobOwner | None:
     """Whose a job is; None where there is none.
 
     A job whose dataset is gone is nobody's: admins alone, who ask for no owner, see it.
@@ -219,7 +219,7 @@ class VersionName(NamedTuple):
     hash: str
 
 
-def versions_like(session: Session, text: str) -> Sequence[VersionName]:
+def find_versions_by_text(session: Session, text: str) -> Sequence[VersionName]:
     """The versions that a text may name."""
     if "\0" in text:
         return []
@@ -261,8 +261,8 @@ def record_used_ids(session: Session) -> None:
         for table in Base.metadata.sorted_tables
         if list(table.primary_key.columns.keys()) == ["id"]
     }
-    newest[DatasetModel.__tablename__] = next_dataset_id(session) - 1
-    copies = next_dataset_id(session, copies=True) - 1
+    newest[DatasetModel.__tablename__] = find_next_dataset_id(session) - 1
+    copies = find_next_dataset_id(session, copies=True) - 1
     newest[COPIES_USED] = copies if copies > COPIES else None
     for name, identity in newest.items():
         if identity and identity >= used.get(name, 0):
@@ -276,7 +276,7 @@ def move_access(session: Session, dataset_id: int) -> int:
     It has to be made in the same transaction.
     """
     session.execute(DeferReferences())
-    heir_id = next_dataset_id(session)
+    heir_id = find_next_dataset_id(session)
     for name in _ACCESS:
         table = _TABLES[name]
         mine = table.c.dataset_id == dataset_id
@@ -324,7 +324,7 @@ def _must_be_deleted_first(table: Table) -> bool:
     )
 
 
-def unused_calibrations(session: Session) -> list[str]:
+def list_unused_calibrations(session: Session) -> list[str]:
     """Keys of calibrations that no solution rests on; none while groups wait to be solved.
 
     A solver may have read them already for the solution that it is about to save.
@@ -332,7 +332,7 @@ def unused_calibrations(session: Session) -> list[str]:
     return [] if _has_unsolved(session) else list(session.scalars(_UNUSED))
 
 
-def delete_if_unused(session: Session, keys: Sequence[str]) -> int:
+def delete_unused_calibrations_among(session: Session, keys: Sequence[str]) -> int:
     """Delete those of some calibrations that are spare still; returns how many.
 
     Those that a version needs go on in it (a trigger sees to that).
@@ -351,7 +351,7 @@ def _has_unsolved(session: Session) -> bool:
     return session.scalar(waiting) is not None
 
 
-def unread_uploads(session: Session, settings: Settings) -> list[str]:
+def list_unused_uploads(session: Session, settings: Settings) -> list[str]:
     """Ids of uploads that are kept for their frames, though no view has its frame there and none is a
     recording."""
     folders = {folder for path in _paths_in_use(session) for folder in path.parents}
@@ -362,7 +362,7 @@ def unread_uploads(session: Session, settings: Settings) -> list[str]:
     ]
 
 
-def unused_frames(session: Session, settings: Settings) -> list[str]:
+def list_unused_frame_files(session: Session, settings: Settings) -> list[str]:
     """Folders and files of the home's recordings that no view and no recording uses."""
     used = {path.parent.name for path in _paths_in_use(session)}
     cameras = ShotCamerasModel
@@ -384,7 +384,7 @@ def _paths_in_use(session: Session) -> list[Path]:
     return [Path(path) for path in found if path and not is_address(path)]
 
 
-def expire_cache(settings: Settings) -> int:
+def delete_expired_cache_entries(settings: Settings) -> int:
     """Delete derived files that were made longer ago than the settings allow; returns how many."""
     oldest = time.time() - settings.cache_days * DAY
     gone = 0

@@ -15,22 +15,22 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
 from app.features.datasets.queries import (
-    dataset_names,
-    dataset_rows,
-    delete_if_unused,
+    delete_unused_calibrations_among,
     find_dataset,
     group_ids,
     has_match,
     insert_dataset_row,
+    list_dataset_rows,
+    list_unused_calibrations,
     policy_from_row,
-    unused_calibrations,
+    read_dataset_names,
     update_policy,
 )
 from app.features.independent_annotations.queries import (
     CopiesOf,
-    copy_dataset_ids,
     insert_copy_dataset,
-    list_copies,
+    list_copy_dataset_ids,
+    list_copy_datasets,
 )
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
 from app.features.queue.queries import count_states
@@ -67,11 +67,11 @@ def need_match(states: Iterable[State], match: str | None, dataset: str) -> list
     """
     chosen = filter_by_match(states, match)
     if match is not None and not chosen:
-        raise no_match(dataset, match)
+        raise unknown_match_error(dataset, match)
     return chosen
 
 
-def no_match(dataset: str, match: str) -> NotFoundError:
+def unknown_match_error(dataset: str, match: str) -> NotFoundError:
     """The error where a dataset has no match of some name."""
     return NotFoundError(f'"{dataset}" has no match {match}')
 
@@ -104,7 +104,7 @@ def require_name(
         )
 
 
-def checked_title(text: str, what: str) -> str:
+def strip_and_check_title(text: str, what: str) -> str:
     """What people read as the name of something, without white space around it.
 
     Args:
@@ -193,8 +193,8 @@ def list_datasets(
     others (their practice) the list has theirs.
     """
     with store.read() as session:
-        hidden = frozenset(own) - copy_dataset_ids(session) if own else frozenset[int]()
-        rows = [row for row in dataset_rows(session) if row.id <= COPIES or row.id in hidden]
+        hidden = frozenset(own) - list_copy_dataset_ids(session) if own else frozenset[int]()
+        rows = [row for row in list_dataset_rows(session) if row.id <= COPIES or row.id in hidden]
         return _datasets_with_counts(session, [row for row in rows if visibility.sees(row.id)])
 
 
@@ -220,10 +220,10 @@ def dataset_id(store: Store, dataset: str | int) -> int:
         return need_dataset(session, dataset)
 
 
-def no_dataset(store: Store, dataset: str | int) -> NotFoundError:
+def unknown_dataset_error(store: Store, dataset: str | int) -> NotFoundError:
     """That there is no such dataset, or not for whoever asks."""
     with store.read() as session:
-        return NotFoundError.dataset(dataset, dataset_names(session))
+        return NotFoundError.dataset(dataset, read_dataset_names(session))
 
 
 def need_dataset(session: Session, dataset: str | int) -> int:
@@ -248,7 +248,7 @@ def require_matches(
     found = read_dataset_head(session, dataset)
     for match in matches or ():
         if not has_match(session, found.id, match):
-            raise no_match(found.name, match)
+            raise unknown_match_error(found.name, match)
     return found
 
 
@@ -263,7 +263,7 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
 def _require_dataset_row(session: Session, dataset: str | int) -> Any:
     row = find_dataset(session, dataset)
     if row is None:
-        raise NotFoundError.dataset(dataset, dataset_names(session))
+        raise NotFoundError.dataset(dataset, read_dataset_names(session))
     return row
 
 
@@ -296,7 +296,7 @@ def find_licence(match: str) -> str:
     return LICENCES.get(_source_of_match(match), UNKNOWN_LICENCE)
 
 
-def licence_text(matches: Iterable[str]) -> str:
+def join_licences(matches: Iterable[str]) -> str:
     """The terms of all sources, one after another."""
     return " ".join(sorted({find_licence(match) for match in matches})) or UNKNOWN_LICENCE
 
@@ -321,13 +321,15 @@ def delete_unused_calibrations(store: Store, wanted: Callable[[], bool] = lambda
     left once it is no longer ``wanted``.
     """
     with store.read() as session:
-        keys = unused_calibrations(session)
+        keys = list_unused_calibrations(session)
     gone = 0
     for start in range(0, len(keys), CALIBRATIONS_AT_ONCE):
         if not wanted():
             break
         with store.write() as session:
-            gone += delete_if_unused(session, keys[start : start + CALIBRATIONS_AT_ONCE])
+            gone += delete_unused_calibrations_among(
+                session, keys[start : start + CALIBRATIONS_AT_ONCE]
+            )
     return gone
 
 
@@ -384,7 +386,7 @@ def delete_dataset(
         )
     identity = dataset_id(store, found.id)
     with store.read() as session:
-        copies = list_copies(session, identity)
+        copies = list_copy_datasets(session, identity)
     with without_response():
         for row in copies:
             delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)

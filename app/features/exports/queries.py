@@ -19,7 +19,7 @@ _OVERRIDDEN = func.coalesce(QueueModel.override == QueueModel.gate, false())
 _QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)
 
 
-def newest_entry_time(session: Session, dataset_id: int) -> str | None:
+def find_newest_entry_time(session: Session, dataset_id: int) -> str | None:
     """Time of the newest thing that was said about a dataset; freezing it, and comments, say nothing of it."""
     statement = select(func.max(LogModel.at)).where(
         LogModel.dataset_id == dataset_id, LogModel.kind.not_in(_NO_WORD)
@@ -27,13 +27,13 @@ def newest_entry_time(session: Session, dataset_id: int) -> str | None:
     return session.scalar(statement)
 
 
-def exported_groups(session: Session, dataset_id: int, everything: bool) -> list[int]:
+def list_exported_groups(session: Session, dataset_id: int, everything: bool) -> list[int]:
     """Ids of the groups that an export takes: all, or the accepted ones that may go out."""
     where = () if everything else (_ACCEPTED, _CURRENT, _SOLVED, _QUALIFIES)
     return Listing(session, dataset_id, where).ids(RowOrder("number"))
 
 
-def left_out_groups(session: Session, dataset_id: int) -> dict[str, int]:
+def count_left_out_groups(session: Session, dataset_id: int) -> dict[str, int]:
     """Accepted groups that are not exported, counted by the first reason that holds."""
     reasons = {
         "stale": [not_(_CURRENT)],

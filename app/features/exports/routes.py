@@ -18,7 +18,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.audit.service import record_audit_event
 from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import KIND, ExportEntry, request_export
-from app.features.exports.service import possible_formats
+from app.features.exports.service import list_formats_with_problems
 from app.features.jobs.queries import DONE, Job
 from app.features.jobs.routes import Cursor, DatasetFilter, Limit
 from app.features.jobs.schemas import ACCEPTED, JobDocument, job_address
@@ -224,7 +224,7 @@ def list_formats(
 ) -> FormatList:
     """In which formats a dataset, or a version of it, can be exported, and why not in the others."""
     found = dataset_id(store, dataset)
-    answers = possible_formats(store, found, version)
+    answers = list_formats_with_problems(store, found, version)
     return FormatList(
         items=[
             FormatDocument(
@@ -314,7 +314,7 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None
     record_audit_event(services.store, actor, "export deleted", None, export=export)
 
 
-async def written(export: ExportId, services: AppServices) -> str:
+async def wait_for_export(export: ExportId, services: AppServices) -> str:
     """The id of an export, once that is no longer under way or patience is at its end."""
     end = time.monotonic() + PATIENCE
     number = int(export) if _may_be_job_id(export) else 0
@@ -332,7 +332,7 @@ async def written(export: ExportId, services: AppServices) -> str:
 @may(Action.READ, export=OwnedKind.EXPORT)
 @limit(TRANSFER)
 def get_content(
-    export: Annotated[str, Depends(written)], services: AppServices, request: Request
+    export: Annotated[str, Depends(wait_for_export)], services: AppServices, request: Request
 ) -> Response:
     """The zip itself; waits a while for one that is still being written.
 
@@ -342,7 +342,9 @@ def get_content(
     document = _export_document(services, export)
     entry = services.exports.find(export)
     if entry is not None and entry.stored is not None:
-        return stored_file(services.settings, entry.stored, _file_name(document), request)
+        return redirect_or_stream_stored_file(
+            services.settings, entry.stored, _file_name(document), request
+        )
     if document.state == "expired":
         days = services.settings.export_days
         raise NotFoundError(
@@ -401,7 +403,9 @@ def _not_ready_error(document: ExportDocument) -> ConflictError:
     return ConflictError(f"the export was not written{reason}", hint="Make the export again.")
 
 
-def stored_file(settings: Settings, sealed: str, name: str, request: Request) -> Response:
+def redirect_or_stream_stored_file(
+    settings: Settings, sealed: str, name: str, request: Request
+) -> Response:
     """The answer to a request for a file that lies in a store.
 
     Args:

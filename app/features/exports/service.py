@@ -25,10 +25,10 @@ from app.features.exports.source import (
     ReadPicture,
     VersionSource,
 )
-from app.features.groups.view_queries import frame_files
+from app.features.groups.view_queries import list_frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
-from app.features.imports.ingest import unassigned_persons
+from app.features.imports.ingest import read_unassigned_persons
 from app.features.tracks.export import TrackSource, frozen_records
 from app.features.tracks.service import track_source
 from app.features.versions.frozen_queries import read_frozen, read_json
@@ -209,7 +209,7 @@ def export_dataset(
             if format == "parquet" and source.tracks:
                 run.kept = frozen_records(_read_frozen_tracks(session, source))
             if format == "issia" and isinstance(source, LiveSource):
-                run.unassigned = unassigned_persons(session, dataset)
+                run.unassigned = read_unassigned_persons(session, dataset)
             with _open_view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
@@ -256,13 +256,13 @@ def require_possible(
     try:
         _require_format(store, dataset, options, version)
     except _UnrepresentableError as error:
-        answers = possible_formats(store, dataset, version)
+        answers = list_formats_with_problems(store, dataset, version)
         fitting = [answer.format for answer in answers if answer.reason is None]
         hint = f"These formats have room for it: {', '.join(fitting)}." if fitting else error.hint
         raise InputError(error.message, hint=hint) from error
 
 
-def possible_formats(
+def list_formats_with_problems(
     store: Store, dataset: str | int, version: str | None = None
 ) -> list[FormatAnswer]:
     """Every format, and why a dataset, or a version of it, cannot be written in it.
@@ -313,7 +313,7 @@ def _require_format(
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
-            files = [] if source.is_all else frame_files(session, whole.dataset_id)
+            files = [] if source.is_all else list_frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
     if source.is_all and run.tracks is None:
         _require_content(whole.dataset, format, counts)

@@ -12,9 +12,13 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.features.datasets.service import DatasetHead
-from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
+from app.features.exports.queries import (
+    count_left_out_groups,
+    find_newest_entry_time,
+    list_exported_groups,
+)
 from app.features.groups.state import GroupState, VerdictState, read_states
-from app.features.groups.view_queries import ViewFileFields, view_file_fields
+from app.features.groups.view_queries import ViewFileFields, list_view_file_fields
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups, thaw_outlines
@@ -111,15 +115,15 @@ class LiveSource:
         self._session, self._found, self._everything = session, dataset, everything
         self._groups = "all" if everything else "not rejected" if unless_rejected else "accepted"
         everything = everything or unless_rejected
-        self._ids = exported_groups(session, dataset.id, everything)
+        self._ids = list_exported_groups(session, dataset.id, everything)
         self.dataset, self.count = dataset.name, len(self._ids)
         self.dataset_id, self.policy = dataset.id, dataset.policy
-        self.left_out = {} if everything else left_out_groups(session, dataset.id)
+        self.left_out = {} if everything else count_left_out_groups(session, dataset.id)
 
     @property
     def date(self) -> str:
         """Time of the newest thing that was said about the dataset; freezing it says nothing."""
-        return str(newest_entry_time(self._session, self._found.id))
+        return str(find_newest_entry_time(self._session, self._found.id))
 
     def settings(self) -> dict[str, Any]:
         """Policy, solver, and which groups."""
@@ -139,7 +143,7 @@ class LiveSource:
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
         for start in range(0, self.count, BATCH):
-            views = view_file_fields(self._session, self._ids[start : start + BATCH])
+            views = list_view_file_fields(self._session, self._ids[start : start + BATCH])
             for _, run in groupby(views, key=lambda view: view.group_id):
                 yield _outline_of_views(list(run)), {}
 
@@ -190,17 +194,17 @@ class VersionSource:
         for item in read_frozen_groups(self._session, self._version, rows):
             frames = item.row.frames or {}
             facts = {key: frame["facts"] for key, frame in frames.items() if "facts" in frame}
-            yield frozen_record(item), facts
+            yield export_record_of_frozen_group(item), facts
 
 
-def frozen_record(item: FrozenGroup) -> ExportRecord:
+def export_record_of_frozen_group(item: FrozenGroup) -> ExportRecord:
     """A group of a version as writers get it."""
     verdict = item.row.verdict or {"state": "unreviewed", "reason": None}
     return ExportRecord(
         group=replace(item.group, split=item.row.split),
         solution=item.solution,
         verdict=verdict["state"],
-        reason=verdict_reason(
+        reason=describe_verdict_reason(
             verdict["state"],
             verdict["reason"],
             verdict.get("note"),
@@ -231,7 +235,9 @@ def _live_record(state: GroupState) -> ExportRecord:
         group=state.group,
         solution=state.solution,
         verdict=_verdict_text(verdict),
-        reason=verdict_reason(verdict.state, verdict.reason, verdict.note, verdict.override),
+        reason=describe_verdict_reason(
+            verdict.state, verdict.reason, verdict.note, verdict.override
+        ),
         override=verdict.override,
     )
 
@@ -242,7 +248,7 @@ def _verdict_text(verdict: VerdictState) -> str:
     return f"{verdict.state} (stale)" if stale else verdict.state
 
 
-def verdict_reason(
+def describe_verdict_reason(
     state: str, reason: str | None, note: str | None, override: str | None
 ) -> str | None:
     """Why it was rejected, or why it was accepted against a gate."""

@@ -19,8 +19,8 @@ from app.evaluation.cameras import leave_one_out, score_frame, score_frames
 from app.features.file_tools.matches import (
     MatchShare,
     choose_picture,
+    map_points_to_original_pictures,
     match_shares,
-    points_as_taken,
     read_matches,
 )
 from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
@@ -116,7 +116,7 @@ def calibrate_files(
     picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
         geometry, picture_summary = choose_picture(files, size, picture)
-        files = points_as_taken(files, geometry)
+        files = map_points_to_original_pictures(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
     policy = replace(CLICKED, goal=goal, check_labels=labels == "checked", lone_frames="any")

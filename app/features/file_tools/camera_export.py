@@ -45,7 +45,7 @@ def export_cameras(
     report = Report()
     sizes: dict[str, ImageSize] = {}
     found = read_cameras(source, report, sizes=sizes)
-    cameras = by_frame(found)
+    cameras = key_by_frame_number(found)
     if not cameras:
         raise report.refusal(f"{source} holds no camera_<frame>.json")
     if kind == "npz":
@@ -55,7 +55,7 @@ def export_cameras(
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
     else:
-        _write_samples(source, out, cameras, by_frame(sizes), size)
+        _write_samples(source, out, cameras, key_by_frame_number(sizes), size)
     return {
         "cameras": len(cameras),
         "first": min(cameras),
@@ -65,7 +65,7 @@ def export_cameras(
     }
 
 
-def by_frame(values: Mapping[str, T]) -> dict[int, T]:
+def key_by_frame_number(values: Mapping[str, T]) -> dict[int, T]:
     """What belongs to cameras by the number of their frame: ``camera_00012.json`` is that of frame 12."""
     found = {}
     for key, value in values.items():

@@ -173,10 +173,10 @@ def shots(
     ends, its kind (main, replay, closeup, other) and how it is entered. Frames of a soft transition
     belong to no shot.
     """
-    from app.features.file_tools.shots import shots_file
+    from app.features.file_tools.shots import find_shots_in_file
 
     with show_progress("Finding shots") as progress:
-        result = shots_file(recording, out, read_settings(), progress)
+        result = find_shots_in_file(recording, out, read_settings(), progress)
     if json_:
         print_values(result, json_)
         return

@@ -13,7 +13,7 @@ from typing import Any
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, GeometryError, InputError
-from app.features.file_tools.track import pitch_row
+from app.features.file_tools.track import pitch_to_row
 from app.formats.cameras import camera_file_name, camera_file_text
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
@@ -181,7 +181,9 @@ def read_picture(path: Path) -> PictureGeometry:
         raise DatasetFormatError(str(path), None, None, problem) from error
 
 
-def points_as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list[LineFile]:
+def map_points_to_original_pictures(
+    files: Sequence[LineFile], picture: PictureGeometry | None
+) -> list[LineFile]:
     """Line files with their points where the pictures as they were taken show them."""
     if picture is None:
         return list(files)
@@ -255,7 +257,7 @@ def share_tripods(
             continue
         shown, covariances = shared
         for each, covariance in zip(frames, covariances, strict=True):
-            by_frame[each.frame]["shown"] = pitch_row(shown, on_shown=False)
+            by_frame[each.frame]["shown"] = pitch_to_row(shown, on_shown=False)
             text = camera_file_text(each.camera, row_by_row(covariance), each.size)
             _write_camera_file(resolve_inside(out, camera_file_name(each.frame)), text)
 

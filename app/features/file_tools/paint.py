@@ -109,7 +109,7 @@ def read_pictures(
                         yield PictureFile(stem, None, f"{PurePosixPath(name).name} {error}")
 
 
-def picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]:
+def list_picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]:
     """Stems of every picture of some folders, zips and files; nothing is decoded."""
     stems: list[str] = []
     for source in sources:
@@ -178,7 +178,7 @@ def snap_files(
     return rows
 
 
-def agree_files(
+def measure_paint_agreement_of_files(
     cameras: Path,
     images: Sequence[Path],
     *,
@@ -221,7 +221,7 @@ class _FileByPicture:
         self._bare: dict[str, list[str]] = {}
         for key in values:
             self._bare.setdefault(PurePosixPath(key).name, []).append(key)
-        places = picture_stems(images, settings)
+        places = list_picture_stems(images, settings)
         self._stems = Counter(PurePosixPath(stem).name for stem in places)
 
     def pictures(self, report: Report) -> Iterator[tuple[PictureFile, str, str]]:

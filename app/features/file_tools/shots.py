@@ -16,7 +16,7 @@ import numpy as np
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import DatasetFormatError, ImageError, InputError, TooLargeError
-from app.features.file_tools.camera_export import by_frame
+from app.features.file_tools.camera_export import key_by_frame_number
 from app.formats.cameras import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
@@ -41,7 +41,7 @@ _MOST_RAYS = 20_000
 _HINT = re.compile(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*")
 
 
-def shots_file(
+def find_shots_in_file(
     recording: Path, out: Path, settings: Settings, progress: ReportProgress | None = None
 ) -> dict[str, Any]:
     """Write the shots of a recording to ``shots.json``.
@@ -178,7 +178,7 @@ def _read_view(folder: Path, report: Report) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
-    cameras = by_frame(read_cameras(folder, report))
+    cameras = key_by_frame_number(read_cameras(folder, report))
     if not cameras:
         raise report.refusal(f"{folder} holds no camera_<frame>.json")
     rows = read_ball(folder / BALL_FILE, str(folder / BALL_FILE), report)

@@ -84,13 +84,13 @@ def track_files(
         except WorkerEnded as error:
             raise InputError(f"{clip.name} {error}") from error
     frames = found.shown_frames if on_shown else found.frames
-    pitch = pitch_row(found.shown, on_shown=on_shown)
+    pitch = pitch_to_row(found.shown, on_shown=on_shown)
     if turn:
         frames = [turned_frame(frame) for frame in frames]
         if pitch is not None:
             x, y, z = pitch["tripod"]
             pitch["tripod"] = [-x, -y, z]
-    result = {"frames": [frame_row(frame) for frame in frames], "pitch": pitch}
+    result = {"frames": [frame_to_row(frame) for frame in frames], "pitch": pitch}
     write_cameras(out, frames, result)
     return result
 
@@ -158,7 +158,7 @@ def _read_file(path: Path) -> bytes:
     return content
 
 
-def frame_row(frame: FrameCamera) -> dict[str, Any]:
+def frame_to_row(frame: FrameCamera) -> dict[str, Any]:
     """The row of a frame in ``track.json``: pixels of the video, degrees, metres, seconds."""
     row: dict[str, Any] = {
         "frame": frame.number,
@@ -196,7 +196,7 @@ def _standard_deviations(covariance: Sequence[float], focal: float) -> dict[str,
     }
 
 
-def pitch_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any] | None:
+def pitch_to_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any] | None:
     """The pitch that a clip shows, for ``track.json``: metres; None where it shows none.
 
     ``cameras`` says whether the cameras are those of the ``plan`` or of the pitch that is ``shown``;
@@ -237,7 +237,7 @@ def write_cameras(out: Path, found: Sequence[FrameCamera], result: Mapping[str, 
     """Write ``camera_<frame>.json`` of each frame that has a camera, and ``track.json``.
 
     Args:
-        result: What ``track.json`` holds: ``frame_row`` of each frame, and ``pitch_row``.
+        result: What ``track.json`` holds: ``frame_to_row`` of each frame, and ``pitch_to_row``.
 
     Raises:
         InputError: ``out`` cannot hold them.

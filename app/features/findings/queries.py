@@ -28,7 +28,7 @@ from app.db.json_columns import as_written, parse
 from app.db.log import Entry, append
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import shown_actor
 from app.json_text import canonical
 from app.soccer.finding import (
@@ -94,7 +94,7 @@ def _finding_from_row(row: Any) -> Finding:
     )
 
 
-def group_findings(session: Session, group_id: int) -> list[Noticed]:
+def list_group_findings(session: Session, group_id: int) -> list[Noticed]:
     """What is noticed about a group, in the order in which it was."""
     model = ImportFindingModel
     statement = select(model.view, model.sentence).where(
@@ -103,7 +103,7 @@ def group_findings(session: Session, group_id: int) -> list[Noticed]:
     return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
 
 
-def groups_with_finding(session: Session, ids: Collection[int], sentence: str) -> set[int]:
+def filter_groups_with_finding(session: Session, ids: Collection[int], sentence: str) -> set[int]:
     """The groups among them that have a finding about the whole group."""
     model = ImportFindingModel
     statement = select(model.group_id).where(
@@ -133,7 +133,7 @@ def replace_group_findings(
     add_group_findings(session, kind, ((group_id, view, text) for view, text in noticed))
 
 
-def station_finding(session: Session, station_id: int) -> str | None:
+def find_station_finding(session: Session, station_id: int) -> str | None:
     """What is noticed about a static camera."""
     model = ImportFindingModel
     return session.scalar(select(model.sentence).where(model.station_id == station_id))
@@ -319,7 +319,9 @@ MERGED_COLUMNS = tuple(
 """What is carried of a row to another installation."""
 
 
-def dismissals_to_merge(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+def read_dismissals_to_export(
+    session: Session, ids: Iterable[int]
+) -> dict[int, list[dict[str, Any]]]:
     """What is carried of the dismissals of groups, by group, oldest first."""
     columns = [_TABLE.c[name] for name in MERGED_COLUMNS]
     statement = select(_TABLE.c.group_id, *columns).where(_TABLE.c.group_id.in_(list(ids)))
@@ -342,7 +344,7 @@ def insert_dismissal(
 
     ``brought`` is who brought it from another installation, and when; the log has it under them.
     """
-    identity = next_id(session, DismissalModel)
+    identity = find_next_row_id(session, DismissalModel)
     body = {name: value for name, value in vars(dismissal).items() if name not in ("actor", "at")}
     body |= {"dismissed": dismissed}
     row = {
@@ -360,7 +362,7 @@ def insert_dismissal(
     return identity
 
 
-def dismissed_kinds(
+def split_open_and_dismissed_kinds(
     findings: Sequence[Finding], dismissals: GroupDismissals
 ) -> tuple[list[str], list[str]]:
     """Kinds of findings that are open, and of those that are dismissed; a kind may be both."""
@@ -424,6 +426,6 @@ def read_import_findings(
     return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
 
 
-def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+def read_noticed_by_imports(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
     """The first part of ``read_import_findings``."""
     return read_import_findings(session, ids)[0]

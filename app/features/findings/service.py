@@ -12,7 +12,7 @@ from app.errors import InputError
 from app.features.datasets.service import dataset_id
 from app.features.findings.queries import insert_dismissal, read_import_findings
 from app.features.groups.state import GroupState, read_states, require_content, require_unchanged
-from app.features.groups.submit import read_solved, require_open
+from app.features.groups.submit import read_solved, require_group_open
 from app.features.queue.queries import (
     Condition,
     Listing,
@@ -85,7 +85,7 @@ def read_findings(
     return [_group_findings(state, kind, dismissed) for state in states]
 
 
-def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
+def iterate_findings_as_json(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
     """Every finding of a dataset as plain values, in batches, so that memory does not grow."""
     found, after = dataset_id(store, dataset), 0
     while groups := read_findings(store, found, after=after, limit=BATCH):
@@ -165,7 +165,7 @@ def set_dismissal(
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_content(session, group_id, record.content, if_match, what)
-            require_open(session, stored.dataset_id, group_id)
+            require_group_open(session, stored.dataset_id, group_id)
             # After the ETag: a person who saw another state is told so first.
             finding = _meant_finding(
                 () if before.solution is None else before.solution.findings, named

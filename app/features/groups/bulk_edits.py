@@ -29,7 +29,13 @@ from app.features.groups.edit import Edit, SetLines
 from app.features.groups.edit_codec import REQUEST_POINTS
 from app.features.groups.queries import StoredGroup, find_views, read_groups
 from app.features.groups.state import GroupState, read_etags, require_etag
-from app.features.groups.submit import Then, combine_edits, current_etag, require_open, submit_all
+from app.features.groups.submit import (
+    Then,
+    combine_edits,
+    read_group_etag,
+    require_group_open,
+    submit_edits,
+)
 from app.features.groups.view_paint import PaintFollower
 from app.features.solutions.service import Solve, solve_encoded
 
@@ -210,12 +216,12 @@ def _submit_group(store: Store, group: _GroupPlan, actor: str, **how: Any) -> Gr
         if group.etag is not None:
             break
         try:
-            present = current_etag(store, group.id)
-            return submit_all(store, group.id, group.edits, if_match=present, actor=actor, **how)
+            present = read_group_etag(store, group.id)
+            return submit_edits(store, group.id, group.edits, if_match=present, actor=actor, **how)
         except StaleRevisionError:
             continue
-    etag = group.etag or current_etag(store, group.id)
-    return submit_all(store, group.id, group.edits, if_match=etag, actor=actor, **how)
+    etag = group.etag or read_group_etag(store, group.id)
+    return submit_edits(store, group.id, group.edits, if_match=etag, actor=actor, **how)
 
 
 def _plan_items(
@@ -293,7 +299,7 @@ def _plan_group(
                     hint="Put the changes of one view into one item.",
                 )
             seen.add(view)
-            require_open(session, stored.dataset_id, stored.id)
+            require_group_open(session, stored.dataset_id, stored.id)
             place = f"/items/{index}"
             edits = item.edits_of(keys[view])
             after = combine_edits(stored, edits, actor).apply(group)

@@ -12,7 +12,7 @@ from app.features.datasets.queries import group_ids
 from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, need_view
 from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.revision_queries import next_revision, save_revision
+from app.features.groups.revision_queries import make_next_revision, save_revision
 from app.features.groups.undo_stacks import GROUP_KINDS
 from app.features.match_estimates.queries import (
     NOISE,
@@ -63,7 +63,7 @@ def edit_groups(
             group = edit.apply(stored.group)
             if group == stored.group and number != always_logged:
                 continue
-            save_revision(session, stored, next_revision(stored, group, at))
+            save_revision(session, stored, make_next_revision(stored, group, at))
             step = edit_and_inverse_to_json(edit, edit.inverse(stored.group))
             entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, number))
             changed.append(number)

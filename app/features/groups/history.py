@@ -143,12 +143,12 @@ def _changes_between(
     return EntryChanges(entry, changed, pitch, after.pitch, before is None)
 
 
-def undo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
+def undo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
     return submit_change(store, lambda _session: group_id, _plan_step("undo"), **how)
 
 
-def redo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
+def redo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
     return submit_change(store, lambda _session: group_id, _plan_step("redo"), **how)
 

@@ -19,7 +19,7 @@ from app.soccer.codec import group_inputs_hash, station_digest, view_digest
 from app.soccer.group import Group, Station, View
 
 
-def station_values(station: Station) -> dict[str, Any]:
+def station_to_columns(station: Station) -> dict[str, Any]:
     """Columns of a station that follow from its value."""
     given = codec.given_camera_to_json(station)
     return {
@@ -39,7 +39,7 @@ def station_values(station: Station) -> dict[str, Any]:
     }
 
 
-def view_values(view: View, position: int) -> dict[str, Any]:
+def view_to_columns(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
     media, extras = view.media, view.extras.values()
     why = codec.left_out_to_json(view.left_out)
@@ -58,18 +58,18 @@ def view_values(view: View, position: int) -> dict[str, Any]:
     }
 
 
-def paint_column(paint: Mapping[str, str]) -> str | None:
+def paint_to_column(paint: Mapping[str, str]) -> str | None:
     """The column of what was read of a group's pictures, by digest; None where nothing was."""
     return canonical(dict(paint)) if paint else None
 
 
-def positions_column(group: Group) -> str | None:
+def positions_to_column(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codec.positions_to_json(group.positions)
     return canonical(shared) if shared else None
 
 
-def group_values(
+def group_to_columns(
     group: Group,
     paint: Mapping[str, str] | None = None,
     views: Iterable[tuple[str, str]] | None = None,
@@ -89,13 +89,13 @@ def group_values(
         "label": group.label,
         "pitch_length": group.pitch.length,
         "pitch_width": group.pitch.width,
-        "positions": positions_column(group),
-        "paint": paint_column(read),
+        "positions": positions_to_column(group),
+        "paint": paint_to_column(read),
         "inputs_hash": group_inputs_hash(group, read, views),
     }
 
 
-def next_id(session: Session, model: Any) -> int:
+def find_next_row_id(session: Session, model: Any) -> int:
     """The id that a new row gets; sound because writes hold the lock from their start.
 
     Ids of deleted datasets are not given again: the log still speaks of what had them.
@@ -122,9 +122,9 @@ class NewRows:
         self.stations: list[dict[str, Any]] = []
         self.views: list[dict[str, Any]] = []
         self.groups: list[dict[str, Any]] = []
-        self._station = next_id(self.session, StationModel)
-        self._view = next_id(self.session, ViewModel)
-        self._group = next_id(self.session, GroupModel)
+        self._station = find_next_row_id(self.session, StationModel)
+        self._view = find_next_row_id(self.session, ViewModel)
+        self._group = find_next_row_id(self.session, GroupModel)
         newest = select(func.coalesce(func.max(GroupModel.number), 0)).where(
             GroupModel.dataset_id == self.dataset_id
         )
@@ -132,7 +132,7 @@ class NewRows:
 
     def add_station(self, station: Station) -> int:
         """Gather a station; returns its id."""
-        values = station_values(station)
+        values = station_to_columns(station)
         identity = {"id": self._station + len(self.stations), "dataset_id": self.dataset_id}
         self.stations.append(
             {**values, **identity, "revision": 1, "source_digest": values["digest"]}
@@ -154,7 +154,7 @@ class NewRows:
             digests = [(view["digest"], station["digest"]) for view, station in own]
         self.groups.append(
             {
-                **group_values(group, views=digests),
+                **group_to_columns(group, views=digests),
                 "id": identity,
                 "dataset_id": self.dataset_id,
                 "number": self._number + len(self.groups) + 1,
@@ -171,7 +171,7 @@ class NewRows:
         """Gather a view and, where it has its own, its station; returns both ids."""
         station = view.station
         station_id = shared[station.key] if station.shared else self.add_station(station)
-        values = view_values(view, position)
+        values = view_to_columns(view, position)
         identity = self._view + len(self.views)
         self.views.append(
             {

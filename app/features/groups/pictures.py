@@ -74,7 +74,7 @@ class PaintTask:
         old = self.old
         if old is None or old.reason == NO_FRAME or old.sought_for != self.sought_for:
             return None
-        if old.people != people_digest(self.view):
+        if old.people != digest_people_boxes(self.view):
             return None
         return old if old.evidence.version == EXTRACTOR_VERSION else None
 
@@ -91,7 +91,7 @@ class PaintTask:
         return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
 
 
-def people_digest(view: View) -> str:
+def digest_people_boxes(view: View) -> str:
     """Digest of the boxes that hide paint in a view; empty where there are none."""
     boxes = hiding_boxes(view.extras.places, view.size)
     if not boxes:
@@ -108,7 +108,7 @@ def mark_outdated_beside_other_people(
     for key, reading in readings.items():
         view = group.view(key)
         if view is not None and reading.reason != NO_FRAME:
-            fits = reading.people == people_digest(view)
+            fits = reading.people == digest_people_boxes(view)
             reading = reading if fits else replace(reading, sought_for="")
         given[key] = reading
     return given
@@ -122,7 +122,11 @@ def mark_outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintR
     readings = {}
     for key, reading in old.paint.items():
         was, now = old.view(key), new.view(key)
-        if was is not None and now is not None and people_digest(was) != people_digest(now):
+        if (
+            was is not None
+            and now is not None
+            and digest_people_boxes(was) != digest_people_boxes(now)
+        ):
             reading = replace(reading, sought_for="")
         readings[key] = reading
     return readings
@@ -169,7 +173,7 @@ def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintRead
         reason,
         seen.supported,
         seen.explained,
-        people_digest(task.view),
+        digest_people_boxes(task.view),
     )
 
 

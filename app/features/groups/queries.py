@@ -23,7 +23,7 @@ from app.features.datasets.tables import (
     UnassignedFrameModel,
     ViewModel,
 )
-from app.features.groups.view_queries import StoredStation, stored_station
+from app.features.groups.view_queries import StoredStation, station_from_row
 from app.features.match_estimates.queries import Factors, factors_from_text
 from app.features.paint.queries import paint_digests, read_readings
 from app.features.people.visibility_queries import visible_groups_condition
@@ -132,7 +132,7 @@ def read_groups(
             continue
         views.setdefault(row.id, []).append(view)
         if view.station_id not in stations:
-            stations[view.station_id] = stored_station(_StationRow._make(row[_STATION_START:]))
+            stations[view.station_id] = station_from_row(_StationRow._make(row[_STATION_START:]))
     named = {d for row in heads.values() for d in paint_digests(row.paint).values()}
     readings = read_readings(session, named) if named else {}
     return {
@@ -142,7 +142,7 @@ def read_groups(
     }
 
 
-def group_of_view(session: Session, view_id: int) -> int:
+def find_group_of_view(session: Session, view_id: int) -> int:
     """Id of the group of a view.
 
     Raises:
@@ -274,7 +274,7 @@ class StoredUnassignedFrame:
     extras: bytes
 
 
-def unassigned_rows(session: Session, dataset_id: int) -> Iterator[StoredUnassignedFrame]:
+def iterate_unassigned_frames(session: Session, dataset_id: int) -> Iterator[StoredUnassignedFrame]:
     """The unassigned frames of a dataset as they came, in batches."""
     model, after = UnassignedFrameModel, 0
     while True:
@@ -291,7 +291,9 @@ def unassigned_rows(session: Session, dataset_id: int) -> Iterator[StoredUnassig
         after = rows[-1].id
 
 
-def sorted_unassigned_rows(session: Session, dataset_id: int) -> Iterator[StoredUnassignedFrame]:
+def iterate_sorted_unassigned_frames(
+    session: Session, dataset_id: int
+) -> Iterator[StoredUnassignedFrame]:
     """The unassigned frames of a dataset by camera and frame."""
     model = UnassignedFrameModel
     statement = (
@@ -303,7 +305,7 @@ def sorted_unassigned_rows(session: Session, dataset_id: int) -> Iterator[Stored
         yield StoredUnassignedFrame(row.camera, row.frame, row.extras)
 
 
-def unassigned_extras(
+def read_unassigned_extras(
     session: Session, dataset_id: int, frames: Collection[str]
 ) -> dict[tuple[str, str], bytes]:
     """Extras of the unassigned frames of these names, by camera and frame."""
@@ -314,7 +316,7 @@ def unassigned_extras(
     return {(row.camera, row.frame): row.extras for row in session.execute(statement)}
 
 
-def upsert_unassigned(
+def upsert_unassigned_frames(
     session: Session, dataset_id: int, bodies: Mapping[tuple[str, str], bytes]
 ) -> None:
     """Insert unassigned frames, or replace what is known of them."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from app.db.log import Entry, append, station_entries
 from app.db.session import Session, now
-from app.features.findings.queries import replace_station_finding, station_finding
+from app.features.findings.queries import find_station_finding, replace_station_finding
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.queries import StoredGroup
-from app.features.groups.revision_queries import keeps_station, refresh_inputs_hashes
-from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
-from app.features.imports.queries import shared_stations
+from app.features.groups.revision_queries import has_same_station, refresh_inputs_hashes
+from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
+from app.features.imports.queries import list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.codec import (
     camera_of_log_entry,
@@ -123,7 +123,7 @@ def update_station_from_dataset(
 
 def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
     old = stored.group.view(view.key)
-    if old is None or not keeps_station(stored, view):
+    if old is None or not has_same_station(stored, view):
         return view, view, []
     kept: list[KeptEdit] = []
     result = base = view
@@ -174,7 +174,7 @@ class SharedStations:
         self._source, self._actor, self._lines_left = source, actor, lines_left
         self._stored: dict[str, StoredStation] = {}
         self._seen: dict[str, Station] = {}
-        for stored in shared_stations(session, dataset_id):
+        for stored in list_shared_stations(session, dataset_id):
             self._stored[stored.station.key] = stored
             self.ids[stored.station.key] = stored.id
 
@@ -224,7 +224,7 @@ class SharedStations:
     def _save_station(self, stored: StoredStation, followed: MergedStation) -> None:
         save_station(self._session, stored, followed.station, source=followed.base)
         self._log_station(stored.id, followed, self._save_finding(stored.id, followed))
-        groups = groups_of_station(self._session, stored.id)
+        groups = list_groups_of_station(self._session, stored.id)
         refresh_inputs_hashes(self._session, groups)
         refresh_queue(self._session, groups)
 
@@ -234,7 +234,7 @@ class SharedStations:
             sentence: str | None = followed.kept.sentence
             self.kept.append(followed.station.key)
         elif station_digest(followed.station) != station_digest(followed.base):
-            sentence = station_finding(self._session, station_id)
+            sentence = find_station_finding(self._session, station_id)
         else:
             sentence = None
         replace_station_finding(self._session, station_id, KIND, sentence)

@@ -13,7 +13,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.findings.queries import DISMISSAL
 from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
-from app.features.groups.insert_queries import group_values, station_values, view_values
+from app.features.groups.insert_queries import group_to_columns, station_to_columns, view_to_columns
 from app.features.groups.reimport import KIND
 from app.features.groups.state_snapshot_queries import (
     GroupRecord,
@@ -275,7 +275,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
     """Rows of the tables, as ``replace_all_rows`` takes them."""
     stations = [
         {
-            **station_values(item.station),
+            **station_to_columns(item.station),
             "id": key,
             "dataset_id": item.dataset_id,
             "revision": item.revision,
@@ -285,7 +285,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
     ]
     views = [
         {
-            **view_values(item.view, place),
+            **view_to_columns(item.view, place),
             "id": item.id,
             "group_id": key,
             "station_id": item.station_id,
@@ -315,7 +315,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
 def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
     record = snapshot.groups[group_id]
     return {
-        **group_values(snapshot.group(group_id), record.paint),
+        **group_to_columns(snapshot.group(group_id), record.paint),
         "id": group_id,
         "dataset_id": record.dataset_id,
         "number": record.number,

@@ -22,11 +22,11 @@ from app.features.datasets.tables import (
 from app.features.findings.queries import DismissalModel
 from app.features.groups.insert_queries import (
     NewRows,
-    group_values,
-    paint_column,
-    positions_column,
-    station_values,
-    view_values,
+    group_to_columns,
+    paint_to_column,
+    positions_to_column,
+    station_to_columns,
+    view_to_columns,
 )
 from app.features.groups.queries import StoredGroup, positions_from_text
 from app.features.groups.view_queries import save_station
@@ -85,7 +85,7 @@ _HEADS = (
 )
 
 
-def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
+def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
     """A stored group as it is once an edit has made it into ``group``, the same views otherwise.
 
     Shared stations are the stored ones; only what differs is digested again.
@@ -117,22 +117,25 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
 
 
 def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
-    """Write what ``next_revision`` changed; solutions and queue are the caller's to refresh."""
+    """Write what ``make_next_revision`` changed; solutions and queue are the caller's to refresh."""
     for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
         if _view_row_differs(view, old):
             _update_row(
-                session, ViewModel.__table__, after.view_ids[view.key], view_values(view, position)
+                session,
+                ViewModel.__table__,
+                after.view_ids[view.key],
+                view_to_columns(view, position),
             )
         own = after.stations[view.key]
         if own != stored.stations[view.key]:
-            values = {**station_values(own.station), "revision": own.revision}
+            values = {**station_to_columns(own.station), "revision": own.revision}
             _update_row(session, StationModel.__table__, own.id, values)
     names = ("revision", "changed", "inputs_hash")
     values = {name: getattr(after, name) for name in names}
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
-    values["positions"] = positions_column(after.group)
-    values["paint"] = paint_column(codec.paint_to_json(after.group.paint))
+    values["positions"] = positions_to_column(after.group)
+    values["paint"] = paint_to_column(codec.paint_to_json(after.group.paint))
     _update_row(session, GroupModel.__table__, after.id, values)
 
 
@@ -172,7 +175,7 @@ def save_group(
         at: Time of the change.
         source: The group as it would be had nobody edited it.
     """
-    kept = {view.key for view in group.views if keeps_station(stored, view)}
+    kept = {view.key for view in group.views if has_same_station(stored, view)}
     _delete_views(session, stored, set(stored.view_ids) - kept)
     for position, view in enumerate(group.views):
         if view.key in kept:
@@ -183,13 +186,13 @@ def save_group(
             if view.key not in kept:
                 rows.add_view(stored.id, view, position, shared or {})
         rows.insert()
-    values = {**group_values(group), "revision": stored.revision + 1, "changed": at}
+    values = {**group_to_columns(group), "revision": stored.revision + 1, "changed": at}
     if digest is not None:
         values["source_hash"] = digest
     session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
 
 
-def keeps_station(stored: StoredGroup, view: View) -> bool:
+def has_same_station(stored: StoredGroup, view: View) -> bool:
     """Whether a view is stored and still has its own station, or still shares the same one."""
     if view.key not in stored.stations:
         return False
@@ -203,7 +206,7 @@ def _save_view(
     old = stored.group.view(view.key)
     if source is None and view == old and stored.group.views.index(old) == position:
         return
-    values = view_values(view, position)
+    values = view_to_columns(view, position)
     if source is not None:
         values["source_digest"] = view_digest(source)
     identity = stored.view_ids[view.key]
@@ -272,7 +275,7 @@ def bump_group_revisions(session: Session, group_ids: Sequence[int], at: str) ->
     )
 
 
-def newest_change_id(session: Session) -> int:
+def find_newest_change_id(session: Session) -> int:
     """Number of the last change of any group; 0 where there is none."""
     return session.scalar(select(func.max(GroupChangeModel.id))) or 0
 
@@ -289,7 +292,7 @@ def count_changes(session: Session, dataset_id: int, after: int) -> int:
     return session.scalar(statement.where(*_changed_since(dataset_id, after))) or 0
 
 
-def changed_group_ids(session: Session, dataset_id: int, after: int) -> list[int]:
+def list_changed_group_ids(session: Session, dataset_id: int, after: int) -> list[int]:
     """Ids of the groups of a dataset that have changed after a change."""
     statement = select(GroupChangeModel.group_id).where(*_changed_since(dataset_id, after))
     return list(session.scalars(statement))
@@ -309,7 +312,7 @@ class SolvedGroupRow(NamedTuple):
     change_id: int
 
 
-def changed_groups(
+def list_changed_groups(
     session: Session, dataset_id: int, after: int, limit: int
 ) -> Sequence[SolvedGroupRow]:
     """Groups of a dataset that have changed after a change, in the order of their last ones."""
@@ -324,7 +327,7 @@ def changed_groups(
     return session.rows(SolvedGroupRow, statement)
 
 
-def groups_after(
+def list_groups_after(
     session: Session, dataset_id: int, after: int, limit: int
 ) -> Sequence[SolvedGroupRow]:
     """Groups of a dataset in order, from the one after a number on."""
@@ -362,7 +365,7 @@ class StoredChange:
     group_id: int | None
 
 
-def changes_after_entry(session: Session, after: int) -> Iterator[StoredChange]:
+def iterate_changes_after_entry(session: Session, after: int) -> Iterator[StoredChange]:
     """What the log tells after an entry, in order; a static camera's stand once for each group."""
     columns = (LogModel.id, LogModel.dataset_id, LogModel.kind, LogModel.actor)
     new = (
@@ -382,7 +385,7 @@ def changes_after_entry(session: Session, after: int) -> Iterator[StoredChange]:
         yield StoredChange(*row)
 
 
-def groups_solved_after(session: Session, after: int) -> list[tuple[int, int]]:
+def list_groups_solved_after(session: Session, after: int) -> list[tuple[int, int]]:
     """Dataset and id of each group that got a solution after another one."""
     statement = (
         select(GroupModel.dataset_id, GroupModel.id)

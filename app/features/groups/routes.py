@@ -19,8 +19,8 @@ from app.features.groups.schemas import (
     LineDocuments,
     PitchSize,
     group_response,
-    image_address,
-    lines_document,
+    lines_to_document,
+    url_of_image,
 )
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
@@ -71,7 +71,7 @@ class ViewThen(Document):
         return cls(
             included=view.included,
             calibration=view.station.calibration,
-            lines=lines_document(view.station.lines),
+            lines=lines_to_document(view.station.lines),
             balls=[Ball.of(ball) for ball in view.balls],
         )
 
@@ -98,7 +98,7 @@ class ChangedViewDocument(Document):
             letter=view_letter(changed.index),
             width=there.size.width,
             height=there.size.height,
-            image=image_address(changed.id) if shown and changed.id is not None else None,
+            image=url_of_image(changed.id) if shown and changed.id is not None else None,
             before=None if changed.before is None else ViewThen.of(changed.before),
             after=None if changed.after is None else ViewThen.of(changed.after),
         )
@@ -202,7 +202,7 @@ def list_group_ids(
 def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
     if "if-none-match" in request.headers:
-        etag = submit.current_etag(store, group)
+        etag = submit.read_group_etag(store, group)
         if etag_matches(request, etag):
             return Response(status_code=304, headers={"ETag": etag})
     return group_response(submit.load_solved(store, group))
@@ -275,7 +275,9 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Take the last edit back; 409 when there is none."""
     store = services.store
     with current_state(lambda: load_document(store, group)):
-        return history.undo(store, group, if_match=if_match, actor=actor, paint=services.paint)
+        return history.undo_group_edit(
+            store, group, if_match=if_match, actor=actor, paint=services.paint
+        )
 
 
 @router.post(
@@ -290,4 +292,6 @@ def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
     with current_state(lambda: load_document(store, group)):
-        return history.redo(store, group, if_match=if_match, actor=actor, paint=services.paint)
+        return history.redo_group_edit(
+            store, group, if_match=if_match, actor=actor, paint=services.paint
+        )

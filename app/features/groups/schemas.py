@@ -262,7 +262,7 @@ def _line_documents(lines: Lines) -> LineDocuments:
 _kept_documents: IdentityCache[Lines, LineDocuments] = IdentityCache(_line_documents, size=1024)
 
 
-def lines_document(lines: Lines) -> LineDocuments:
+def lines_to_document(lines: Lines) -> LineDocuments:
     """Lines as they travel."""
     return _kept_documents(lines)
 
@@ -383,7 +383,7 @@ class GroupDocument(Document):
             views=[
                 _view_document(state, view, index, label)
                 for index, (view, label) in enumerate(
-                    zip(group.views, view_labels(group), strict=True)
+                    zip(group.views, make_view_labels(group), strict=True)
                 )
             ],
             solution=None
@@ -398,7 +398,7 @@ def group_response(state: GroupState) -> Response:
     return document(GroupDocument.of(state), headers=headers)
 
 
-def view_labels(group: Group) -> list[str]:
+def make_view_labels(group: Group) -> list[str]:
     """What people call the views: the camera's number, or the main camera and its replays."""
     labels = []
     for index, view in enumerate(group.views):
@@ -412,7 +412,7 @@ def view_labels(group: Group) -> list[str]:
     return labels
 
 
-def image_address(view_id: int) -> str:
+def url_of_image(view_id: int) -> str:
     """Where the frame of a view is served."""
     return f"/api/v1/views/{view_id}/image"
 
@@ -429,11 +429,11 @@ def _view_document(state: GroupState, view: View, index: int, label: str) -> Vie
         included=view.included,
         left_out=None if why is None else why,
         station=_station_document(state, view),
-        lines=lines_document(view.station.lines),
+        lines=lines_to_document(view.station.lines),
         proposed=[*view.station.proposed],
         not_visible=[*view.station.not_visible],
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
-        image=None if view.media is None else image_address(view_id),
+        image=None if view.media is None else url_of_image(view_id),
         neighbours=_neighbours_address(state.key, view, view_id),
     )
 
@@ -559,14 +559,14 @@ class NeighbourList(ListDocument[Neighbour]):
         items = [
             Neighbour(
                 offset=offset,
-                label=frames_away(offset),
-                image=f"{image_address(view)}?offset={offset}",
+                label=describe_frame_offset(offset),
+                image=f"{url_of_image(view)}?offset={offset}",
             )
             for offset in offsets
         ]
         return NeighbourList(items=items, sentence=None if items else why_none)
 
 
-def frames_away(offset: int) -> str:
+def describe_frame_offset(offset: int) -> str:
     """``1 frame later``, ``3 frames before``."""
     return f"{plural(abs(offset), 'frame')} {'later' if offset > 0 else 'before'}"

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from app.features.groups.edit_codec import edit_to_json
-from app.features.groups.suggested_edits import guide_of_finding, offers_of_finding
+from app.features.groups.suggested_edits import find_guide_of_finding, list_edits_of_finding
 from app.formats.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
@@ -408,7 +408,10 @@ class FindingDocument(Document, shows=Finding):
     def _add_suggested_edits(cls, value: Any, info: ValidationInfo) -> Any:
         group: Any = info.context
         if isinstance(value, Finding):
-            found = {"offers": offers_of_finding(group, value), "guide": guide_of_finding(value)}
+            found = {
+                "offers": list_edits_of_finding(group, value),
+                "guide": find_guide_of_finding(value),
+            }
             return {**vars(value), **found, "unusable_ball": value.is_unusable_ball}
         return value
 

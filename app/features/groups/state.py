@@ -14,8 +14,8 @@ from app.features.findings.queries import (
     NOTHING_DISMISSED,
     GroupDismissals,
     findings_from_rows,
-    import_findings,
     read_import_findings,
+    read_noticed_by_imports,
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import find_etag_row, read_etag_rows
@@ -136,7 +136,7 @@ def require_etag(current: str, if_match: str, what: str) -> None:
 
 def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
-    noticed = import_findings(session, group_ids)
+    noticed = read_noticed_by_imports(session, group_ids)
     etags = {}
     for row in read_etag_rows(session, group_ids):
         content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)

@@ -16,7 +16,7 @@ from sqlalchemy import delete, insert, select, text
 from app.db.dialects.dialect import DeferReferences
 from app.db.json_columns import unpack
 from app.db.session import Session
-from app.features.datasets.queries import dataset_rows, policy_from_row
+from app.features.datasets.queries import list_dataset_rows, policy_from_row
 from app.features.datasets.tables import (
     GroupModel,
     ImportFindingModel,
@@ -26,7 +26,7 @@ from app.features.datasets.tables import (
 )
 from app.features.findings.queries import SEEN, DismissalModel
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.view_queries import StoredStation, stored_station
+from app.features.groups.view_queries import StoredStation, station_from_row
 from app.features.queue.tables import QueueModel
 from app.features.tables import Base
 from app.features.verdicts.tables import VerdictModel
@@ -40,25 +40,25 @@ _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]
 
 
-def all_stations(session: Session) -> Iterator[StoredStation]:
+def iterate_stations(session: Session) -> Iterator[StoredStation]:
     """Every station."""
     rows = session.execute(select(*StationModel.__table__.columns))
-    return map(stored_station, rows)
+    return map(station_from_row, rows)
 
 
-def all_groups(session: Session) -> Iterator[StoredGroup]:
+def iterate_groups(session: Session) -> Iterator[StoredGroup]:
     """Every group by id, in batches."""
     ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
     for start in range(0, len(ids), _BATCH):
         yield from read_groups(session, ids[start : start + _BATCH]).values()
 
 
-def all_verdicts(session: Session) -> Iterator[dict[str, Any]]:
+def iterate_verdicts(session: Session) -> Iterator[dict[str, Any]]:
     """Every verdict as values by column but its id, oldest first."""
     return _all_rows(session, VerdictModel)
 
 
-def all_dismissals(session: Session) -> Iterator[dict[str, Any]]:
+def iterate_dismissals(session: Session) -> Iterator[dict[str, Any]]:
     """Every dismissal of a finding in the same way."""
     return _all_rows(session, DismissalModel)
 
@@ -71,12 +71,12 @@ def _all_rows(
         yield dict(row._mapping)
 
 
-def all_unassigned(session: Session) -> Sequence[UnassignedFrameModel]:
+def list_all_unassigned_frames(session: Session) -> Sequence[UnassignedFrameModel]:
     """The row of every unassigned frame."""
     return session.rows(UnassignedFrameModel, select(*UnassignedFrameModel.__table__.columns))
 
 
-def all_import_findings(session: Session) -> Sequence[ImportFindingModel]:
+def list_all_import_findings(session: Session) -> Sequence[ImportFindingModel]:
     """The row of everything that imports noticed; what was computed or seen of pictures is not among it."""
     statement = select(*ImportFindingModel.__table__.columns)
     return session.rows(ImportFindingModel, statement.where(ImportFindingModel.kind.not_in(SEEN)))
@@ -218,22 +218,22 @@ def without_station(view: View) -> View:
 def read_state_snapshot(session: Session) -> StateSnapshot:
     """The state snapshot as the tables have it."""
     snapshot = StateSnapshot()
-    for row in dataset_rows(session):
+    for row in list_dataset_rows(session):
         snapshot.datasets[row.id] = (row.name, policy_from_row(row.policy))
-    for station in all_stations(session):
+    for station in iterate_stations(session):
         snapshot.stations[station.id] = StationRecord(
             station.dataset_id, station.station, station.revision, station.source_digest
         )
-    for group in all_groups(session):
+    for group in iterate_groups(session):
         snapshot.groups[group.id] = _group_record(group)
-    for values in all_verdicts(session):
+    for values in iterate_verdicts(session):
         snapshot.verdicts.setdefault(values.pop("group_id"), []).append(values)
-    for values in all_dismissals(session):
+    for values in iterate_dismissals(session):
         snapshot.dismissals.setdefault(values.pop("group_id"), []).append(values)
-    for unassigned in all_unassigned(session):
+    for unassigned in list_all_unassigned_frames(session):
         place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
         snapshot.unassigned[place] = extras_from_json(unpack(unassigned.extras))
-    for noticed in all_import_findings(session):
+    for noticed in list_all_import_findings(session):
         snapshot.noticed.add((noticed.group_id, noticed.station_id, noticed.view, noticed.sentence))
     return snapshot
 

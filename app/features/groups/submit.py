@@ -22,8 +22,8 @@ from app.features.groups.edit import (
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json, require_point_limits_of_edits
 from app.features.groups.group_edits import add_noise_of_actor, keep_view_noise
-from app.features.groups.queries import StoredGroup, group_of_view
-from app.features.groups.revision_queries import next_revision, save_revision
+from app.features.groups.queries import StoredGroup, find_group_of_view
+from app.features.groups.revision_queries import make_next_revision, save_revision
 from app.features.groups.state import (
     GroupState,
     GroupWithoutSolution,
@@ -36,7 +36,7 @@ from app.features.groups.state import (
 )
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations import submission_queries as submissions
-from app.features.independent_annotations.queries import annotation_of_copy
+from app.features.independent_annotations.queries import find_annotation_of_copy_row
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
@@ -83,10 +83,10 @@ def find_view(store: Store, view_id: int) -> FoundView:
     )
 
 
-def require_open(session: Session, dataset_id: int, group_id: int) -> None:
+def require_group_open(session: Session, dataset_id: int, group_id: int) -> None:
     """Raise ConflictError where a group is an independent annotation that was submitted."""
     if dataset_id > COPIES:
-        submissions.require_open(annotation_of_copy(session, group_id))
+        submissions.require_annotation_open(find_annotation_of_copy_row(session, group_id))
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def load(store: Store, group_id: int) -> GroupState:
         return read_state(session, group_id)
 
 
-def current_etag(store: Store, group_id: int) -> str:
+def read_group_etag(store: Store, group_id: int) -> str:
     """The ETag of a group as it is now; nothing else of it is decoded.
 
     Raises:
@@ -182,7 +182,7 @@ def submit(
     )
 
 
-def submit_all(
+def submit_edits(
     store: Store,
     group_id: int,
     edits: Sequence[Edit],
@@ -194,7 +194,7 @@ def submit_all(
     )
 
 
-def submit_view(
+def submit_view_edit(
     store: Store,
     view_id: int,
     edit_of: Callable[[str], Edit],
@@ -206,7 +206,7 @@ def submit_view(
         return [edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))]
 
     def find(session: Session) -> int:
-        return group_of_view(session, view_id)
+        return find_group_of_view(session, view_id)
 
     return submit_change(store, find, _plan_edits(edits), **how)
 
@@ -254,7 +254,7 @@ def load_solved(store: Store, group_id: int) -> GroupState:
 def load_solved_of_view(store: Store, view_id: int) -> GroupState:
     """``load_solved`` for the group of a view."""
     with store.read() as session:
-        group_id = group_of_view(session, view_id)
+        group_id = find_group_of_view(session, view_id)
     return load_solved(store, group_id)
 
 
@@ -264,7 +264,7 @@ def solve_and_keep(store: Store, group_id: int) -> GroupState:
     return record.state(solution)
 
 
-def solved_state(session: Session, group_id: int) -> GroupState:
+def solve_for_state(session: Session, group_id: int) -> GroupState:
     """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
     record = read_record(session, group_id)
     solution = read_solutions(session, [record.solution_key]).get(group_id)
@@ -345,7 +345,7 @@ def submit_change(
         state = outcome.after.state(outcome.solution)
         with store.write() as session:
             judge = require_unchanged(session, state.id, if_match, what)
-            require_open(session, state.dataset_id, state.id)
+            require_group_open(session, state.dataset_id, state.id)
             if judge == before.stored.policy.hash:
                 _save_change(session, outcome, actor)
                 then(session, state)
@@ -360,9 +360,9 @@ def _apply_change(
     result: tuple[Solution, EncodedSolution],
 ) -> _AppliedChange:
     at = now()
-    stored = next_revision(before.stored, change.group, at)
+    stored = make_next_revision(before.stored, change.group, at)
     if painted is not change.group:
-        stored = next_revision(stored, painted, at)
+        stored = make_next_revision(stored, painted, at)
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
     return _AppliedChange(change, painted, before, after, *result)
 

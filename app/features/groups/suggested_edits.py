@@ -58,7 +58,7 @@ class FixGuide:
     reads: bool = False
 
 
-def offers_of_fix(
+def list_edits_of_fix(
     group: Group, fix: Fix | None, point: ImagePoint | None = None
 ) -> tuple[EditOffer, ...]:
     """The edits that carry out a fix: none when only a person can, several to choose from.
@@ -80,7 +80,7 @@ def offers_of_fix(
     )
 
 
-def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGuide | None:
+def find_guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGuide | None:
     """Where a fix leads a person; None where an edit carries it out.
 
     Args:
@@ -94,25 +94,25 @@ def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGuide |
     return FixGuide(action.label, action.caption, fix.marking, point, reads)
 
 
-def offers_of_finding(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
+def list_edits_of_finding(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
         return _fitted_box_offers(group, finding)
     if isinstance(finding, PlacedFinding):
         return _beside_track_offers(group, finding)
-    return offers_of_fix(group, finding.fix)
+    return list_edits_of_fix(group, finding.fix)
 
 
-def guide_of_finding(finding: Finding) -> FixGuide | None:
+def find_guide_of_finding(finding: Finding) -> FixGuide | None:
     """Where a finding leads a person; None where it offers edits, or nothing."""
     if finding.kind == "visible_not_annotated":
-        return guide_of_fix(Fix("draw_marking", finding.view, finding.marking))
-    return guide_of_fix(finding.fix)
+        return find_guide_of_fix(Fix("draw_marking", finding.view, finding.marking))
+    return find_guide_of_fix(finding.fix)
 
 
 def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
     """The one edit that carries out a fix; None when only a person can, or has to choose."""
-    found = offers_of_fix(group, fix, point)
+    found = list_edits_of_fix(group, fix, point)
     return found[0].edit if len(found) == 1 else None
 
 
@@ -121,7 +121,7 @@ def rank_of_fix(fix: Fix) -> int:
     return _ACTIONS[fix.action].rank
 
 
-def condition_sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
+def describe_condition(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
     letter = view_letter([view.key for view in group.views].index(fix.view or ""))
     return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
@@ -141,10 +141,10 @@ def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[EditOffe
     key = finding.view
     view = None if key is None else group.view(key)
     place = None if finding.place is None else ImagePoint(*finding.place)
-    moved = offers_of_fix(group, Fix("move_ball", key), place) if place is not None else ()
+    moved = list_edits_of_fix(group, Fix("move_ball", key), place) if place is not None else ()
     others = () if view is None else _fixes_to_choose(view, Fix("pick_ball", key))
-    picked = [offer for fix in others if fix.index for offer in offers_of_fix(group, fix)]
-    return (*moved, *picked, *offers_of_fix(group, Fix("exclude_view", key)))
+    picked = [offer for fix in others if fix.index for offer in list_edits_of_fix(group, fix)]
+    return (*moved, *picked, *list_edits_of_fix(group, Fix("exclude_view", key)))
 
 
 def _fitted_box_offers(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
@@ -359,7 +359,7 @@ class MarkingInfluence:
     largest_px_without: float | None
 
 
-def marking_influences(
+def measure_marking_influences(
     station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> list[MarkingInfluence]:
     """The influence of each annotated marking, by refitting without it.

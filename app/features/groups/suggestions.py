@@ -12,11 +12,11 @@ from app.features.groups.edit import Edit, SetLines
 from app.features.groups.suggested_edits import (
     EditOffer,
     FixGuide,
-    condition_sentence,
+    describe_condition,
     edit_of_fix,
-    guide_of_fix,
+    find_guide_of_fix,
+    list_edits_of_fix,
     move_ball_edit,
-    offers_of_fix,
     rank_of_fix,
 )
 from app.geometry.arrays import FloatArray
@@ -141,8 +141,8 @@ def _try_candidate(
         sentence=candidate.sentence,
         fix=candidate.fix,
         point=candidate.point,
-        offers=offers_of_fix(group, candidate.fix, candidate.point),
-        guide=guide_of_fix(candidate.fix, candidate.point),
+        offers=list_edits_of_fix(group, candidate.fix, candidate.point),
+        guide=find_guide_of_fix(candidate.fix, candidate.point),
         value=gate.value,
         passes=then.passes,
     )
@@ -178,7 +178,7 @@ def _candidates_of_findings(group: Group, solution: Solution) -> Iterator[_Candi
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Candidate(condition_sentence(group, fix), fix)
+            yield _Candidate(describe_condition(group, fix), fix)
 
 
 def _candidates_of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Candidate]:
@@ -188,7 +188,7 @@ def _candidates_of_gate(group: Group, solution: Solution, failing: Gate) -> Iter
             continue
         if not view.included:
             fix = Fix("include_view", view.key)
-            yield _Candidate(condition_sentence(group, fix), fix)
+            yield _Candidate(describe_condition(group, fix), fix)
         elif solved.failed == "jac":
             yield from _candidates_of_undrawn_markings(group, view, solved)
             yield from _candidates_of_lines(group, view, solved)
@@ -218,7 +218,7 @@ def _candidates_of_undrawn_markings(
     for fit in undrawn:
         if fit.length_px < shortest:
             hide = Fix("hide_marking", view.key, fit.marking)
-            yield _Candidate(condition_sentence(group, hide, max(fit.length_px, 1.0)), hide)
+            yield _Candidate(describe_condition(group, hide, max(fit.length_px, 1.0)), hide)
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = view_letter(group.views.index(view))
@@ -259,7 +259,7 @@ def _candidates_of_lines(group: Group, view: View, solved: ViewSolution) -> Iter
             if action == "move_point" and fit.distances_px[index] > slip:
                 continue
             point = fit.nearest[index] if action == "move_point" else None
-            yield _Candidate(condition_sentence(group, fix, fit.distances_px[index]), fix, point)
+            yield _Candidate(describe_condition(group, fix, fit.distances_px[index]), fix, point)
 
 
 def _candidates_of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
@@ -278,7 +278,7 @@ def _candidates_of_balls(group: Group, solution: Solution) -> Iterator[_Candidat
                 continue
             fix = Fix("look_ball", moved, to=other)
             trial = move_ball_edit(moved, view.ball, point)
-            yield _Candidate(condition_sentence(group, fix, apart), fix, point, trial)
+            yield _Candidate(describe_condition(group, fix, apart), fix, point, trial)
 
 
 def _ball_beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:

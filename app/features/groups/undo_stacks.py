@@ -23,7 +23,7 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.groups.view_queries import StoredStation
-from app.features.imports.queries import shared_stations
+from app.features.imports.queries import list_shared_stations
 from app.soccer.codec import (
     camera_of_log_entry,
     digest,
@@ -176,7 +176,7 @@ class StationRevisionChain:
     states: tuple[str, ...]
 
 
-def base_digest(group: Group) -> str:
+def digest_imported_group(group: Group) -> str:
     """Digest of what a dataset says about a group, without media and shared stations."""
     views = [
         [
@@ -189,7 +189,7 @@ def base_digest(group: Group) -> str:
     return digest([group_without_views_to_json(group), views])
 
 
-def pitch_size(pitch: Pitch) -> str:
+def format_pitch_size(pitch: Pitch) -> str:
     """The size of a pitch as revision chains have it."""
     return f"{float(pitch.length)!r}x{float(pitch.width)!r}"
 
@@ -213,7 +213,7 @@ class _LogWalk:
         if entry.kind == "import":
             self.base = group_of_log_entry(entry.body["base"] or entry.body["group"], by_key)
         if self.base is not None:
-            self.bases[base_digest(self.base)] = None
+            self.bases[digest_imported_group(self.base)] = None
         self._note_states(self.snapshot.group(entry.group_id))
 
     def _add_camera(self, entry: LogEntry) -> None:
@@ -230,7 +230,7 @@ class _LogWalk:
                 self.base = self.base.with_view(replace(view, station=station))
 
     def _note_states(self, group: Group) -> None:
-        _append_if_new(self.pitches, pitch_size(group.pitch))
+        _append_if_new(self.pitches, format_pitch_size(group.pitch))
         for view in group.views:
             _append_if_new(self.views.setdefault(view.key, []), view_digest(view))
             if not view.station.shared:
@@ -247,7 +247,7 @@ class RevisionChains:
 
     def __init__(self, session: Session, dataset_id: int):
         self._session, self._dataset_id = session, dataset_id
-        self._shared = {item.id: item for item in shared_stations(session, dataset_id)}
+        self._shared = {item.id: item for item in list_shared_stations(session, dataset_id)}
 
     def of(self, groups: Iterable[StoredGroup]) -> dict[int, RevisionChain]:
         """Lineages by group id; what nobody touched since its import costs no look at it."""
@@ -284,18 +284,18 @@ def _chain_of_unedited_group(stored: StoredGroup) -> RevisionChain:
     group = stored.group
     return RevisionChain(
         base=group,
-        bases=(base_digest(group),),
+        bases=(digest_imported_group(group),),
         views={view.key: (view_digest(view),) for view in group.views},
         stations={
             view.key: (station_digest(view.station),)
             for view in group.views
             if not view.station.shared
         },
-        pitches=(pitch_size(group.pitch),),
+        pitches=(format_pitch_size(group.pitch),),
     )
 
 
-def station_revision_chain(session: Session, stored: StoredStation) -> StationRevisionChain:
+def read_station_revision_chain(session: Session, stored: StoredStation) -> StationRevisionChain:
     """The revision chain of a static camera."""
     snapshot, base, states = StateSnapshot(), stored.station, list[str]()
     for entry in station_entries(session, stored.id):

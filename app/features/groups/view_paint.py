@@ -15,7 +15,7 @@ from app.errors import NotFoundError, ReviewError
 from app.features.groups.edit import LineChanges, SetLines
 from app.features.groups.edit_codec import require_point_limits_of_edits
 from app.features.groups.pictures import PaintTask, read_view_paint
-from app.features.groups.queries import StoredGroup, group_of_view, read_groups
+from app.features.groups.queries import StoredGroup, find_group_of_view, read_groups
 from app.features.pitches.queries import groups_of_match
 from app.features.solutions.service import known_calibrations
 from app.geometry.camera import Camera
@@ -103,7 +103,7 @@ def make_proposal_request(store: Store, view_id: int, lines: LineChanges) -> Vie
     """
     with store.read() as session:
         question = _make_request(session, view_id, lines)
-        known = nearby_cameras_of_match(session, _find_group_and_view(session, view_id)[0])
+        known = list_nearby_cameras(session, _find_group_and_view(session, view_id)[0])
     return replace(question, known=known, drawn=question.view.station.lines)
 
 
@@ -126,7 +126,7 @@ def _make_request(session: Session, view_id: int, lines: LineChanges) -> ViewPai
 
 
 def _find_group_and_view(session: Session, view_id: int) -> tuple[StoredGroup, View]:
-    group_id = group_of_view(session, view_id)
+    group_id = find_group_of_view(session, view_id)
     stored = read_groups(session, [group_id])[group_id]
     key = next(key for key, number in stored.view_ids.items() if number == view_id)
     view = stored.group.view(key)
@@ -140,7 +140,7 @@ def _require_media(view: View) -> Media:
     return view.media
 
 
-def nearby_cameras_of_match(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
+def list_nearby_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
     """Cameras of the main views of the groups of the match that are nearest by their number.
 
     Those that their lines leave open say nothing of a stand, and lenses of another kind nothing

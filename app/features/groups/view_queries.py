@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, select, update
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.features.groups.insert_queries import station_values
+from app.features.groups.insert_queries import station_to_columns
 from app.features.people.visibility_queries import visible_groups_condition
 from app.features.queue.queries import Condition
 from app.features.queue.tables import QueueModel
@@ -72,7 +72,7 @@ class StoredView(_FrameRow):
             return [ball_from_json(value) for value in parse(self.said)]
 
 
-def dataset_views(
+def list_dataset_views(
     session: Session,
     dataset_id: int,
     conditions: Iterable[Condition] = (),
@@ -119,7 +119,7 @@ class ViewFileFields(_FrameRow):
     media_frame: int | None
 
 
-def view_file_fields(session: Session, group_ids: Sequence[int]) -> list[ViewFileFields]:
+def list_view_file_fields(session: Session, group_ids: Sequence[int]) -> list[ViewFileFields]:
     """The views of a few hundred groups in the order of their dataset."""
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
@@ -137,7 +137,7 @@ def view_file_fields(session: Session, group_ids: Sequence[int]) -> list[ViewFil
     return [ViewFileFields(*row) for row in rows]
 
 
-def frame_files(session: Session, dataset_id: int) -> list[str]:
+def list_frame_files(session: Session, dataset_id: int) -> list[str]:
     """The files that the frames of a dataset lie in, each once."""
     statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
     statement = statement.join(GroupModel, GroupModel.id == ViewModel.group_id)
@@ -145,7 +145,7 @@ def frame_files(session: Session, dataset_id: int) -> list[str]:
     return [path for path in found if path is not None]
 
 
-def group_views(session: Session, group_id: int) -> list[StoredView]:
+def list_group_views(session: Session, group_id: int) -> list[StoredView]:
     """The views of a group in their order."""
     return _read_views(session, ViewModel.group_id == group_id)
 
@@ -168,12 +168,12 @@ def views_of_camera(
     )
 
 
-def group_dataset(session: Session, group_id: int) -> int | None:
+def find_dataset_of_group(session: Session, group_id: int) -> int | None:
     """Id of the dataset of a group."""
     return session.scalar(select(GroupModel.dataset_id).where(GroupModel.id == group_id))
 
 
-def present_ids(
+def find_group_and_view_ids(
     session: Session, dataset_id: int, keys: Collection[str]
 ) -> dict[str, tuple[int, dict[str, int]]]:
     """Id of each group and of its views, by their keys."""
@@ -225,10 +225,10 @@ class StoredStation:
 def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
     """Stations by id."""
     statement = select(*StationModel.__table__.columns).where(StationModel.id.in_(list(ids)))
-    return {row.id: stored_station(row) for row in session.execute(statement)}
+    return {row.id: station_from_row(row) for row in session.execute(statement)}
 
 
-def stored_station(row: Any) -> StoredStation:
+def station_from_row(row: Any) -> StoredStation:
     """A station from all columns of its row."""
     station = Station(
         key=row.key,
@@ -255,19 +255,19 @@ def save_station(
 
     ``source`` is the station as it would be had nobody edited it, where the dataset changed.
     """
-    values = {**station_values(station), "revision": stored.revision + 1}
+    values = {**station_to_columns(station), "revision": stored.revision + 1}
     if source is not None:
         values["source_digest"] = station_digest(source)
     session.execute(update(StationModel).where(StationModel.id == stored.id).values(values))
 
 
-def groups_of_station(session: Session, station_id: int) -> list[int]:
+def list_groups_of_station(session: Session, station_id: int) -> list[int]:
     """Ids of the groups that a station's views belong to."""
     statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id).distinct()
     return list(session.scalars(statement.order_by(ViewModel.group_id)))
 
 
-def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:
+def list_station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:
     """Ids of a dataset's static cameras with each size of pitch that their groups have."""
     statement = (
         select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)

@@ -27,11 +27,11 @@ from app.features.groups.schemas import (
     LinesEdit,
     NeighbourList,
     ViewEdit,
-    frames_away,
+    describe_frame_offset,
     group_response,
 )
 from app.features.groups.state import GroupState
-from app.features.groups.submit import FoundView, find_view, submit_view
+from app.features.groups.submit import FoundView, find_view, submit_view_edit
 from app.features.groups.view_paint import NO_FRAME_HINT
 from app.features.solutions.service import Solve, solve_encoded
 from app.http.cursor import paged
@@ -149,7 +149,7 @@ def _submit_view_edit(
 ) -> GroupState:
     store, paint = services.store, services.paint
     with current_state(lambda: load_document_of_view(store, view)):
-        return submit_view(
+        return submit_view_edit(
             store, view, edit_of, if_match=if_match, actor=actor, paint=paint, solve=solve
         )
 
@@ -250,7 +250,7 @@ def _frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> 
     if not around:
         raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
     if offset not in around:
-        raise NotFoundError(f"view {view.key}: there is no frame {frames_away(offset)}")
+        raise NotFoundError(f"view {view.key}: there is no frame {describe_frame_offset(offset)}")
     return around[offset]
 
 

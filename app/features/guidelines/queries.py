@@ -27,13 +27,13 @@ class GuidelineText(NamedTuple):
     text: str
 
 
-def all_guidelines(session: Session) -> Sequence[GuidelineText]:
+def list_all_guidelines(session: Session) -> Sequence[GuidelineText]:
     """Every version of the guidelines of every dataset."""
     model = GuidelineModel
     return session.rows(GuidelineText, select(model.dataset_id, model.number, model.text))
 
 
-def guidelines_dataset(session: Session, dataset_id: int) -> int:
+def find_guidelines_dataset(session: Session, dataset_id: int) -> int:
     """Of which dataset the guidelines count in a dataset: of that which it holds copies of."""
     statement = select(CopyDatasetModel.of_id).where(CopyDatasetModel.dataset_id == dataset_id)
     return session.scalar(statement) or dataset_id
@@ -47,7 +47,7 @@ class GuidelineHead(NamedTuple):
     written_by: str
 
 
-def guideline_heads(session: Session, dataset_id: int) -> Sequence[GuidelineHead]:
+def list_guideline_heads(session: Session, dataset_id: int) -> Sequence[GuidelineHead]:
     """Every version of a dataset's guidelines without its text, the newest first."""
     model = GuidelineModel
     statement = select(model.number, model.written, model.written_by).where(
@@ -56,7 +56,7 @@ def guideline_heads(session: Session, dataset_id: int) -> Sequence[GuidelineHead
     return session.rows(GuidelineHead, statement.order_by(model.number.desc()))
 
 
-def guideline_text(session: Session, dataset_id: int, number: int) -> str | None:
+def read_guideline_text(session: Session, dataset_id: int, number: int) -> str | None:
     """The text of a version."""
     model = GuidelineModel
     mine = (model.dataset_id == dataset_id) & (model.number == number)

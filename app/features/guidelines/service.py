@@ -13,12 +13,12 @@ from app.features.datasets.service import need_dataset
 from app.features.guidelines.queries import (
     GUIDELINE,
     count_pictures,
+    find_guidelines_dataset,
     find_picture,
-    guideline_heads,
-    guideline_text,
-    guidelines_dataset,
     insert_guideline,
     insert_picture,
+    list_guideline_heads,
+    read_guideline_text,
 )
 from app.features.imports.upload_queries import upload_path
 from app.json_text import Moment
@@ -80,7 +80,7 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
     """
     with store.read() as session:
         return _read_version(
-            session, guidelines_dataset(session, need_dataset(session, dataset)), number
+            session, find_guidelines_dataset(session, need_dataset(session, dataset)), number
         )
 
 
@@ -104,8 +104,8 @@ def write_guidelines(
     if len(text) > MAX_LETTERS:
         raise InputError(f"guidelines have at most {MAX_LETTERS:,} characters", pointer="/text")
     with store.write() as session:
-        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
-        heads = guideline_heads(session, dataset_id)
+        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
+        heads = list_guideline_heads(session, dataset_id)
         newest = heads[0].number if heads else 0
         if newest != based_on:
             raise ConflictError(
@@ -116,7 +116,7 @@ def write_guidelines(
                 hint="Read the newest version, and send its number as based_on; 0 where there is none.",
                 pointer="/based_on",
             )
-        if text != (guideline_text(session, dataset_id, newest) or ""):
+        if text != (read_guideline_text(session, dataset_id, newest) or ""):
             insert_guideline(session, dataset_id, newest + 1, text, actor)
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
@@ -144,7 +144,7 @@ def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -
     found = frames.ask(Media(str(path)), None, False).future.result()
     picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
     with store.write() as session:
-        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
+        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
         if count_pictures(session, dataset_id) >= MAX_PICTURES:
             raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
         insert_picture(session, dataset_id, picture.digest, picture.type, picture.body)
@@ -159,7 +159,7 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
         NotFoundError: There is no such dataset or picture.
     """
     with store.read() as session:
-        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
+        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
         row = find_picture(session, dataset_id, digest)
     if row is None:
         raise NotFoundError("these guidelines have no such picture")
@@ -168,10 +168,10 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
 
 def _read_version(session: Session, dataset_id: int, number: int | None = None) -> Guidelines:
     """A version of the guidelines of the dataset whose they are; None: the newest."""
-    versions = tuple(GuidelineVersion(*row) for row in guideline_heads(session, dataset_id))
+    versions = tuple(GuidelineVersion(*row) for row in list_guideline_heads(session, dataset_id))
     if number is None:
         number = versions[0].number if versions else 0
-    text = "" if number == 0 else guideline_text(session, dataset_id, number)
+    text = "" if number == 0 else read_guideline_text(session, dataset_id, number)
     if text is None:
         raise NotFoundError(f"there is no version {number} of these guidelines")
     return Guidelines(dataset_id, number, text, versions)

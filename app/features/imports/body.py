@@ -11,12 +11,16 @@ from dataclasses import replace
 from app.db.json_columns import Json
 from app.db.log import Entry, append
 from app.db.session import Session, now
-from app.features.findings.queries import add_group_findings, group_findings, groups_with_finding
+from app.features.findings.queries import (
+    add_group_findings,
+    filter_groups_with_finding,
+    list_group_findings,
+)
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
 from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChains
-from app.features.imports.queries import known_groups
+from app.features.imports.queries import list_known_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.soccer.annotation import Lines
@@ -24,7 +28,7 @@ from app.soccer.codec import group_without_views_to_json, view_to_json
 from app.soccer.group import Group, View
 
 
-def row_ids_of_views(stored: StoredGroup) -> dict[str, tuple[int, int]]:
+def collect_view_and_station_ids(stored: StoredGroup) -> dict[str, tuple[int, int]]:
     """Ids of each view and its station, by the view's key."""
     return {key: (stored.view_ids[key], stored.stations[key].id) for key in stored.view_ids}
 
@@ -61,7 +65,7 @@ def _group_to_log(group: Group) -> Json:
 GONE = "this group is no longer in the imported files; it is kept until a person rejects it"
 
 
-def missing_of_read_matches(
+def filter_missing_of_read_matches(
     session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
 ) -> list[int]:
     """Those of the missing groups whose match came all the same: they are truly gone.
@@ -76,7 +80,7 @@ def missing_of_read_matches(
     """
     if not missing:
         return []
-    groups = known_groups(session, dataset_id)
+    groups = list_known_groups(session, dataset_id)
     matches = {group.match for group in groups if group.key in seen}
     return [group.id for group in groups if group.id in missing and group.match in matches]
 
@@ -85,14 +89,14 @@ def save_gone_findings(
     session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
-    fresh = sorted(set(ids) - groups_with_finding(session, ids, GONE))
+    fresh = sorted(set(ids) - filter_groups_with_finding(session, ids, GONE))
     stored = read_groups(session, fresh)
     chains = RevisionChains(session, dataset_id).of(stored.values())
     at, entries = now(), []
     for number, item in stored.items():
         base = chains[number].base
         save_group(session, item, item.group, at=at, source=base)
-        body = _gone_entry_body(item, base, source, group_findings(session, number))
+        body = _gone_entry_body(item, base, source, list_group_findings(session, number))
         entries.append(Entry("import", actor, at, body, dataset_id, number))
     if entries:
         append(session, entries)
@@ -107,7 +111,9 @@ def _gone_entry_body(
     source: str,
     noticed: Iterable[tuple[str | None, str]],
 ) -> dict[str, Json]:
-    body = import_body(stored.group, base, source, stored.source_hash, row_ids_of_views(stored))
+    body = import_body(
+        stored.group, base, source, stored.source_hash, collect_view_and_station_ids(stored)
+    )
     body["kept"] = [[view, sentence] for view, sentence in [*noticed, (None, GONE)]]
     return body
 

@@ -13,12 +13,12 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
 from app.features.groups.revision_queries import bump_group_revisions, refresh_inputs_hashes
 from app.features.groups.view_queries import (
-    dataset_views,
-    groups_of_station,
+    list_dataset_views,
+    list_groups_of_station,
     read_stations,
     save_station,
 )
-from app.features.imports.ingest import IngestReport, ingest_session
+from app.features.imports.ingest import IngestReport, open_import_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
@@ -49,7 +49,7 @@ class GivenCamera(NamedTuple):
     covariance: tuple[float, ...] | None
 
 
-def ingest_cameras(
+def import_given_cameras(
     store: Store,
     dataset: str,
     cameras: Mapping[str, Camera],
@@ -119,7 +119,7 @@ def ingest_cameras(
             camera = _scaled_camera(cameras[name], made_for, place.size)
             known.append((place, GivenCamera(camera, covariance)))
     for start in range(0, len(known), BATCH):
-        with ingest_session(store, keep=not dry_run) as session:
+        with open_import_session(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
             attach_cameras(session, found.id, batch, source, actor, report)
     return report
@@ -127,7 +127,7 @@ def ingest_cameras(
 
 def _stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
     places: dict[str, list[NamedStation]] = {}
-    for row in dataset_views(session, dataset_id):
+    for row in list_dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
         own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
         names = (
@@ -215,7 +215,7 @@ def attach_cameras(
         entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))
         if place.group is not None:
             bump_group_revisions(session, [place.group], at)
-        touched.update(groups_of_station(session, place.station))
+        touched.update(list_groups_of_station(session, place.station))
         report.changed += 1
     append(session, entries)
     refresh_inputs_hashes(session, sorted(touched))

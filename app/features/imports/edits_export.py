@@ -16,12 +16,20 @@ from app.db.json_columns import Json, unpack
 from app.db.log import LogEntry, group_entries, station_entries
 from app.db.session import Session
 from app.db.store import Store
-from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head
-from app.features.exports.queries import newest_entry_time
-from app.features.findings.queries import dismissals_to_merge
-from app.features.groups.queries import StoredGroup, read_groups, sorted_unassigned_rows
-from app.features.groups.undo_stacks import RevisionChain, RevisionChains, station_revision_chain
-from app.features.imports.queries import group_verdicts, known_groups, shared_stations
+from app.features.datasets.service import DatasetHead, join_licences, read_dataset_head
+from app.features.exports.queries import find_newest_entry_time
+from app.features.findings.queries import read_dismissals_to_export
+from app.features.groups.queries import StoredGroup, iterate_sorted_unassigned_frames, read_groups
+from app.features.groups.undo_stacks import (
+    RevisionChain,
+    RevisionChains,
+    read_station_revision_chain,
+)
+from app.features.imports.queries import (
+    list_known_groups,
+    list_shared_stations,
+    list_verdicts_of_groups,
+)
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import output_anywhere
@@ -103,8 +111,8 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
 
 
 def _exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
-    for stored in shared_stations(session, dataset_id):
-        chain = station_revision_chain(session, stored)
+    for stored in list_shared_stations(session, dataset_id):
+        chain = read_station_revision_chain(session, stored)
         station, base = station_to_json(stored.station), station_to_json(chain.base)
         yield {
             "key": stored.station.key,
@@ -119,11 +127,11 @@ def _exported_groups(
     session: Session, dataset: DatasetHead, progress: ReportProgress | None
 ) -> Iterator[Json]:
     chains = RevisionChains(session, dataset.id)
-    ids = [group.id for group in known_groups(session, dataset.id)]
+    ids = [group.id for group in list_known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):
         stored = read_groups(session, ids[start : start + _BATCH])
-        known, verdicts = chains.of(stored.values()), group_verdicts(session, stored)
-        checked = dismissals_to_merge(session, stored)
+        known, verdicts = chains.of(stored.values()), list_verdicts_of_groups(session, stored)
+        checked = read_dismissals_to_export(session, stored)
         for item in stored.values():
             exported = _exported_group(session, item, known[item.id], verdicts.get(item.id, []))
             # Earlier releases know no such key: it is there where it says something.
@@ -167,21 +175,21 @@ def _edit_entries_to_json(logged: Iterable[LogEntry]) -> list[Json]:
 
 
 def _unassigned_values(session: Session, dataset_id: int) -> Iterator[Json]:
-    for row in sorted_unassigned_rows(session, dataset_id):
+    for row in iterate_sorted_unassigned_frames(session, dataset_id):
         yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
 
 
 def _make_manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:
-    matches = {group.match for group in known_groups(session, dataset.id)}
+    matches = {group.match for group in list_known_groups(session, dataset.id)}
     return Manifest(
         dataset=dataset.name,
         format=FORMAT,
-        date=newest_entry_time(session, dataset.id) or dataset.created,
+        date=find_newest_entry_time(session, dataset.id) or dataset.created,
         counts=counts,
         settings={
             "policy": policy_to_json(dataset.policy),
             "policy_hash": dataset.policy.hash,
             "solver_version": SOLVER_VERSION,
         },
-        licence=licence_text(matches),
+        licence=join_licences(matches),
     )

@@ -17,8 +17,8 @@ from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, read_dataset_head
 from app.features.findings.queries import (
-    group_findings,
-    groups_with_finding,
+    filter_groups_with_finding,
+    list_group_findings,
     replace_group_findings,
 )
 from app.features.groups.edit import SetPaint, SetPositions
@@ -26,10 +26,10 @@ from app.features.groups.insert_queries import NewRows
 from app.features.groups.pictures import mark_outdated_where_people_moved
 from app.features.groups.queries import (
     StoredGroup,
+    iterate_unassigned_frames,
     read_groups,
-    unassigned_extras,
-    unassigned_rows,
-    upsert_unassigned,
+    read_unassigned_extras,
+    upsert_unassigned_frames,
 )
 from app.features.groups.reimport import KIND, KeptEdit, SharedStations, update_group_from_dataset
 from app.features.groups.revision_queries import save_group
@@ -37,13 +37,13 @@ from app.features.imports.body import (
     GONE,
     MAX_VIEWS,
     GroupLimits,
+    collect_view_and_station_ids,
+    filter_missing_of_read_matches,
     import_body,
-    missing_of_read_matches,
-    row_ids_of_views,
     save_gone_findings,
 )
-from app.features.imports.queries import known_groups, newest_imports
-from app.features.independent_annotations.queries import is_copy
+from app.features.imports.queries import find_newest_imports, list_known_groups
+from app.features.independent_annotations.queries import is_copy_dataset
 from app.features.paint.queries import insert_readings
 from app.features.pitches.queries import edited_pitches, is_pitch_edited
 from app.features.pitches.service import give_pitch
@@ -95,7 +95,7 @@ class ImportOrigin:
     lines_left: bool = False
 
 
-def ingest(
+def import_groups(
     store: Store,
     dataset: str,
     groups: Iterable[Group],
@@ -130,17 +130,17 @@ def ingest(
     limits = GroupLimits(source, Report() if limit_report is None else limit_report)
     sound, stations = _storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
-        with ingest_session(store, keep=not dry_run) as session:
+        with open_import_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
             origin = ImportOrigin(identity, source, actor, lines_left)
-            ingest_batch(session, origin, batch, report, stations)
+            import_group_batch(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
             progress(done)
     if done:
         with store.read() as session:
             missing = _find_missing_groups(session, origin, seen, report)
-            gone = missing_of_read_matches(session, origin.dataset_id, seen, missing)
+            gone = filter_missing_of_read_matches(session, origin.dataset_id, seen, missing)
         for start in range(0, 0 if dry_run else len(gone), BATCH):
             with store.write() as session:
                 ids = gone[start : start + BATCH]
@@ -155,7 +155,7 @@ class _DryRunRollback(Exception):  # noqa: N818
 
 
 @contextmanager
-def ingest_session(store: Store, *, keep: bool) -> Iterator[Session]:
+def open_import_session(store: Store, *, keep: bool) -> Iterator[Session]:
     """A write session; where nothing shall be kept, what it did is taken back at its end."""
     try:
         with store.write() as session:
@@ -182,10 +182,10 @@ def _find_missing_groups(
 ) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
     missing: set[int] = set()
-    known = known_groups(session, origin.dataset_id)
+    known = list_known_groups(session, origin.dataset_id)
     absent = [group.id for group in known if group.key not in seen]
     for start in range(0, len(absent), BATCH):
-        entries = newest_imports(session, absent[start : start + BATCH])
+        entries = find_newest_imports(session, absent[start : start + BATCH])
         missing |= {
             entry.group_id or 0 for entry in entries if entry.body["source"] == origin.source
         }
@@ -226,7 +226,7 @@ def _with_absolute_media_path(view: View) -> View:
     return replace(view, media=replace(view.media, path=str(path)))
 
 
-def ingest_batch(
+def import_group_batch(
     session: Session,
     origin: ImportOrigin,
     batch: Sequence[Group],
@@ -240,7 +240,7 @@ def ingest_batch(
     Raises:
         ConflictError: The dataset holds somebody's own annotations, which they alone change.
     """
-    if is_copy(session, origin.dataset_id):
+    if is_copy_dataset(session, origin.dataset_id):
         raise ConflictError(
             "this dataset holds the independent annotations of one person, so nothing can be"
             " imported into it",
@@ -255,8 +255,8 @@ def ingest_batch(
     report.findings += len(set(shared.kept) - stations)
     stations.update(shared.changed)
     keys = [group.key for group in batch]
-    known = {item.key: item for item in known_groups(session, origin.dataset_id, keys)}
-    gone = groups_with_finding(session, [item.id for item in known.values()], GONE)
+    known = {item.key: item for item in list_known_groups(session, origin.dataset_id, keys)}
+    gone = filter_groups_with_finding(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
     for group in batch:
         digest = source_hash(group)
@@ -334,7 +334,7 @@ def _update_group(
     after = read_groups(session, [group_id])[group_id]
     kept = save_findings(session, after, followed.kept)
     body = import_body(
-        followed.group, followed.base, origin.source, digest, row_ids_of_views(after)
+        followed.group, followed.base, origin.source, digest, collect_view_and_station_ids(after)
     )
     body["kept"] = [[item.view, item.sentence] for item in kept]
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
@@ -362,7 +362,7 @@ def save_findings(
     fresh = {item.view for item in kept}
     noticed = [
         KeptEdit(view, sentence)
-        for view, sentence in group_findings(session, stored.id)
+        for view, sentence in list_group_findings(session, stored.id)
         if view is not None
         and view not in fresh
         and view in stored.view_ids
@@ -389,7 +389,7 @@ class UnassignedFrame:
     extras: Extras
 
 
-def ingest_unassigned(
+def import_unassigned_frames(
     store: Store, dataset: str, frames: Iterable[UnassignedFrame], *, source: str, actor: str
 ) -> IngestReport:
     """Keep unassigned frames with a dataset; keeping them again changes nothing.
@@ -404,15 +404,15 @@ def ingest_unassigned(
     return report
 
 
-def unassigned_frames(session: Session, dataset_id: int) -> Iterator[UnassignedFrame]:
+def read_unassigned_frames(session: Session, dataset_id: int) -> Iterator[UnassignedFrame]:
     """The unassigned frames of a dataset, by camera and frame as texts."""
-    for row in unassigned_rows(session, dataset_id):
+    for row in iterate_unassigned_frames(session, dataset_id):
         yield UnassignedFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
 
 
-def unassigned_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+def read_unassigned_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
     """People of the unassigned frames of a dataset of ISSIA, for its original shape."""
-    for item in unassigned_frames(session, read_dataset_head(session, dataset).id):
+    for item in read_unassigned_frames(session, read_dataset_head(session, dataset).id):
         if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
             yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 
@@ -425,7 +425,7 @@ def _save_batch(
     actor: str,
     report: IngestReport,
 ) -> None:
-    known = unassigned_extras(session, dataset_id, {item.frame for item in batch})
+    known = read_unassigned_extras(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
         place, body = (item.camera, item.frame), pack(item.extras.values())
@@ -447,7 +447,7 @@ def _write_unassigned(
 ) -> None:
     if not fresh:
         return
-    upsert_unassigned(session, dataset_id, fresh)
+    upsert_unassigned_frames(session, dataset_id, fresh)
     frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
     append(session, [Entry("spare", actor, now(), body, dataset_id)])

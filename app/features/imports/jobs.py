@@ -15,7 +15,7 @@ from app.errors import ConflictError, InputError, TooLargeError
 from app.features.datasets.queries import find_dataset, has_more_groups
 from app.features.datasets.service import get_dataset_head, require_name
 from app.features.imports.sources import FORMATS, ImportSource, import_source
-from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.imports.upload_queries import get_upload, save_upload, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import FailedWithReportError, JobProgress, left_to_next_server
@@ -109,7 +109,7 @@ def request_import(
         InputError: Format, name or path cannot be used.
         NotFoundError: There is no such upload or folder.
     """
-    source = source_of(settings, request)
+    source = resolve_source(settings, request)
     with store.read() as session:
         row = find_dataset(session, request.dataset)
     if row is None:
@@ -134,12 +134,12 @@ def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
 def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgress) -> Json:
     """The work itself; its result is the report, also where it fails because it read nothing."""
     request, actor = ImportRequest(**progress.job.request), progress.job.actor
-    source = source_of(settings, request)
+    source = resolve_source(settings, request)
     sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
     progress(0, None, sentence)
     if not request.dry_run and "upload" in request.source:
         # Frames are read where they are, so the file must stay from the first group on.
-        keep_upload(settings, request.source["upload"])
+        save_upload(settings, request.source["upload"])
     with left_to_next_server(progress):
         outcome = import_in_worker(
             store,
@@ -281,7 +281,7 @@ def _import_result(
     }
 
 
-def source_of(settings: Settings, request: ImportRequest) -> ImportSource:
+def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
     """What a request means, under a name that tells nobody where it lies.
 
     Raises:

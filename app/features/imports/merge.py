@@ -14,32 +14,32 @@ from app.db.store import Store
 from app.errors import DatasetFormatError, InputError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset
-from app.features.findings.queries import replace_station_finding, station_finding
+from app.features.findings.queries import find_station_finding, replace_station_finding
 from app.features.groups.queries import read_groups
 from app.features.groups.reimport import KIND, SharedStations
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.undo_stacks import (
     RevisionChains,
     StationRevisionChain,
-    base_digest,
-    station_revision_chain,
+    digest_imported_group,
+    read_station_revision_chain,
 )
-from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
+from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
 from app.features.imports.ingest import (
     ImportOrigin,
     IngestReport,
     UnassignedFrame,
-    ingest_batch,
-    ingest_session,
-    ingest_unassigned,
+    import_group_batch,
+    import_unassigned_frames,
+    open_import_session,
 )
 from app.features.imports.merge_group import (
     CONFLICT,
     FOLLOW,
     UPSTREAM,
     UnitHistory,
-    decide_merge,
+    choose_merge_action,
     merge_dismissals,
     merge_group,
     merge_verdicts,
@@ -54,7 +54,7 @@ from app.features.imports.merge_parse import (
     read_lines,
     read_merge_header,
 )
-from app.features.imports.queries import known_groups, shared_stations
+from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report
@@ -85,7 +85,7 @@ def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStatio
     base = station_digest(item.base)
     if base == stored.source_digest:
         return False
-    return base not in station_revision_chain(session, stored).states
+    return base not in read_station_revision_chain(session, stored).states
 
 
 def _merge_station(
@@ -95,10 +95,10 @@ def _merge_station(
     item: MergeStation,
     report: IngestReport,
 ) -> bool:
-    chain = station_revision_chain(session, stored)
+    chain = read_station_revision_chain(session, stored)
     here = UnitHistory(stored.digest, stored.source_digest, chain.states)
     there = UnitHistory(station_digest(item.station), station_digest(item.base), item.states)
-    decision = decide_merge(here, there)
+    decision = choose_merge_action(here, there)
     if decision in (FOLLOW, UPSTREAM):
         _take_other_station(
             session, origin, stored, item, chain, _finding_sentence(decision, stored)
@@ -137,7 +137,7 @@ def _take_other_station(
     save_station(session, stored, station)
     replace_station_finding(session, stored.id, KIND, sentence)
     _log_station(session, origin, replace(stored, station=station), chain, sentence, list(item.log))
-    groups = groups_of_station(session, stored.id)
+    groups = list_groups_of_station(session, stored.id)
     refresh_inputs_hashes(session, groups)
     refresh_queue(session, groups)
 
@@ -151,13 +151,13 @@ def _save_conflict(
     report: IngestReport,
 ) -> bool:
     """Save a conflict, unless it is known; whether it was new."""
-    if station_finding(session, stored.id) == sentence:
+    if find_station_finding(session, stored.id) == sentence:
         return False
     # A revision of its own, as every entry of the log about a station makes one.
     save_station(session, stored, stored.station)
     replace_station_finding(session, stored.id, KIND, sentence)
     _log_station(session, origin, stored, chain, sentence, [])
-    refresh_queue(session, groups_of_station(session, stored.id))
+    refresh_queue(session, list_groups_of_station(session, stored.id))
     report.findings += 1
     return True
 
@@ -183,7 +183,7 @@ def _log_station(
 
 
 def _find_stored_station(session: Session, dataset_id: int, key: str) -> StoredStation | None:
-    return next(iter(shared_stations(session, dataset_id, key)), None)
+    return next(iter(list_shared_stations(session, dataset_id, key)), None)
 
 
 BATCH = 20
@@ -261,7 +261,7 @@ def _merge_tree(
     stations = {
         item.station.key: item for item in _parse_records(tree, STATIONS, report, parse_station)
     }
-    with ingest_session(run.store, keep=run.keep) as session:
+    with open_import_session(run.store, keep=run.keep) as session:
         origin = run.origin(session)
         _note_policy(session, run)
         merge_stations(session, origin, stations.values(), run.report)
@@ -269,7 +269,7 @@ def _merge_tree(
     groups = _parse_records(tree, GROUPS, report, lambda value: parse_group(value, known))
     done = 0
     while batch := list(islice(groups, BATCH)):
-        with ingest_session(run.store, keep=run.keep) as session:
+        with open_import_session(run.store, keep=run.keep) as session:
             _merge_batch(session, run, batch, stations)
         done += len(batch)
         if progress is not None:
@@ -278,7 +278,7 @@ def _merge_tree(
         frames = (
             UnassignedFrame(*item) for item in _parse_records(tree, SPARE, report, parse_unassigned)
         )
-        ingest_unassigned(run.store, run.dataset, frames, source=run.source, actor=run.actor)
+        import_unassigned_frames(run.store, run.dataset, frames, source=run.source, actor=run.actor)
 
 
 def _parse_records(
@@ -313,11 +313,11 @@ def _merge_batch(
         # A dry run took its stations back; the groups need them for a moment.
         merge_stations(session, origin, stations.values(), IngestReport())
     items = {item.group.key: item for item in batch}
-    known = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
+    known = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
     upstream = _groups_only_in_other(session, origin, items, known)
-    ingest_batch(session, origin, upstream, run.report, run.counted)
+    import_group_batch(session, origin, upstream, run.report, run.counted)
     counted = {group.key for group in upstream}
-    ids = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
+    ids = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
     stored = read_groups(session, list(ids.values()))
     chains = RevisionChains(session, origin.dataset_id).of(stored.values())
     touched = []
@@ -349,7 +349,7 @@ def _groups_only_in_other(
         base = _with_own_stations(item.base, shared)
         if key not in known:
             upstream.append(base)
-        elif base_digest(base) not in chains[known[key]].bases:
+        elif digest_imported_group(base) not in chains[known[key]].bases:
             upstream.append(_with_media(base, stored[known[key]].group))
     return upstream
 
@@ -378,8 +378,8 @@ def _with_media(group: Group, stored: Group) -> Group:
 def _read_static_cameras(session: Session, dataset_id: int) -> dict[str, Station]:
     """The static cameras as the dataset last brought them, by key."""
     return {
-        item.station.key: station_revision_chain(session, item).base
+        item.station.key: read_station_revision_chain(session, item).base
         if item.edited
         else item.station
-        for item in shared_stations(session, dataset_id)
+        for item in list_shared_stations(session, dataset_id)
     }

@@ -8,15 +8,19 @@ from typing import Any
 
 from app.db.log import Entry, append
 from app.db.session import Session, now
-from app.features.findings.queries import dismissals_to_merge, group_findings, insert_dismissal
+from app.features.findings.queries import (
+    insert_dismissal,
+    list_group_findings,
+    read_dismissals_to_export,
+)
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
-from app.features.groups.undo_stacks import RevisionChain, pitch_size
-from app.features.imports.body import import_body, row_ids_of_views
+from app.features.groups.undo_stacks import RevisionChain, format_pitch_size
+from app.features.imports.body import collect_view_and_station_ids, import_body
 from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
-from app.features.imports.queries import VERDICT, group_verdicts
+from app.features.imports.queries import VERDICT, list_verdicts_of_groups
 from app.features.pitches.service import give_pitch
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts, next_verdict_id
 from app.soccer.codec import station_digest, view_digest
@@ -47,7 +51,7 @@ class UnitHistory:
 FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
 
 
-def decide_merge(here: UnitHistory, there: UnitHistory) -> str:
+def choose_merge_action(here: UnitHistory, there: UnitHistory) -> str:
     """What becomes of a unit (a view or a camera) in this installation.
 
     Returns:
@@ -79,7 +83,7 @@ def merge_group(
 ) -> bool:
     """Bring a group up to what another installation made of it; whether anything changed."""
     merged, kept = _merge_views(stored, chain, exported)
-    pitch = decide_merge(*_pitch_histories(stored, chain, exported))
+    pitch = choose_merge_action(*_pitch_histories(stored, chain, exported))
     kept += _kept_edits(None, pitch, f"pitch of {merged.key}")
     fresh = _new_findings(session, stored.id, kept)
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
@@ -89,7 +93,9 @@ def merge_group(
     after = read_groups(session, [stored.id])[stored.id]
     noticed = save_findings(session, after, kept)
     base = chain.base
-    body = import_body(merged, base, origin.source, stored.source_hash, row_ids_of_views(after))
+    body = import_body(
+        merged, base, origin.source, stored.source_hash, collect_view_and_station_ids(after)
+    )
     body["kept"] = [[item.view, item.sentence] for item in noticed]
     body["carried"] = list(exported.log)
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
@@ -108,7 +114,7 @@ def _merge_views(
         other, base = exported.group.view(view.key), exported.base.view(view.key)
         if other is None or base is None or other.station.shared != view.station.shared:
             continue
-        ball = decide_merge(
+        ball = choose_merge_action(
             _view_history_here(stored, chain, view), _view_history_there(exported, other, base)
         )
         if ball in (FOLLOW, UPSTREAM):
@@ -121,7 +127,7 @@ def _merge_views(
                 _station_history_here(stored, chain, view),
                 _station_history_there(exported, other, base),
             )
-            lines = decide_merge(here, there)
+            lines = choose_merge_action(here, there)
             if lines in (FOLLOW, UPSTREAM):
                 view = replace(view, station=view.station.with_annotations_of(other.station))
             kept += _kept_edits(view.key, lines, f"lines or the camera of {view.key}")
@@ -147,8 +153,10 @@ def _kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
 def _pitch_histories(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
 ) -> tuple[UnitHistory, UnitHistory]:
-    here = UnitHistory(pitch_size(stored.group.pitch), pitch_size(chain.base.pitch), chain.pitches)
-    size, base = pitch_size(exported.group.pitch), pitch_size(exported.base.pitch)
+    here = UnitHistory(
+        format_pitch_size(stored.group.pitch), format_pitch_size(chain.base.pitch), chain.pitches
+    )
+    size, base = format_pitch_size(exported.group.pitch), format_pitch_size(exported.base.pitch)
     return here, UnitHistory(size, base, exported.pitches)
 
 
@@ -176,7 +184,7 @@ def _new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list
     """Those of the findings that are not there already."""
     if not kept:
         return []
-    known = set(group_findings(session, group_id))
+    known = set(list_group_findings(session, group_id))
     return [item for item in kept if (item.view, item.sentence) not in known]
 
 
@@ -190,7 +198,7 @@ def merge_verdicts(
     """
     if not exported:
         return False
-    known = group_verdicts(session, [group_id]).get(group_id, [])
+    known = list_verdicts_of_groups(session, [group_id]).get(group_id, [])
     seen = {_verdict_identity(item) for item in known}
     fresh = [item for item in exported if _verdict_identity(item) not in seen]
     if not fresh:
@@ -214,7 +222,7 @@ def merge_dismissals(
     """
     if not exported:
         return False
-    known = dismissals_to_merge(session, [group_id]).get(group_id, [])
+    known = read_dismissals_to_export(session, [group_id]).get(group_id, [])
     fresh = [item for item in exported if item not in known]
     if not fresh:
         return False

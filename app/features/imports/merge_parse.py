@@ -10,7 +10,7 @@ from typing import IO, Any
 from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.features.findings.queries import MERGED_COLUMNS
-from app.features.groups.undo_stacks import group_of_log_entry, pitch_size
+from app.features.groups.undo_stacks import format_pitch_size, group_of_log_entry
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT
@@ -325,7 +325,7 @@ def _pitch_sizes_of_record(value: Json, group: Group, base: Group) -> tuple[str,
     """The sizes that a group's pitch had; exports of before do not say more than two of them."""
     if "pitches" in value:
         return _require_digests(value["pitches"])
-    return tuple(dict.fromkeys(map(pitch_size, (base.pitch, group.pitch))))
+    return tuple(dict.fromkeys(map(format_pitch_size, (base.pitch, group.pitch))))
 
 
 def _require_digests(value: Json) -> tuple[str, ...]:

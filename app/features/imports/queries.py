@@ -11,7 +11,7 @@ from sqlalchemy import func, select
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel
-from app.features.groups.view_queries import StoredStation, stored_station
+from app.features.groups.view_queries import StoredStation, station_from_row
 from app.features.verdicts.tables import VerdictModel
 
 VERDICT = (
@@ -38,7 +38,7 @@ class KnownGroup:
     source_hash: str
 
 
-def known_groups(
+def list_known_groups(
     session: Session, dataset_id: int, keys: Iterable[str] | None = None
 ) -> list[KnownGroup]:
     """The groups of a dataset in their order, or those of some keys."""
@@ -52,7 +52,7 @@ def known_groups(
     return [KnownGroup(*row) for row in rows]
 
 
-def newest_imports(session: Session, group_ids: Sequence[int]) -> list[LogEntry]:
+def find_newest_imports(session: Session, group_ids: Sequence[int]) -> list[LogEntry]:
     """The last import of each group."""
     newest = (
         select(func.max(LogModel.id))
@@ -62,7 +62,7 @@ def newest_imports(session: Session, group_ids: Sequence[int]) -> list[LogEntry]
     return list(read_log(session, LogModel.id.in_(newest)))
 
 
-def shared_stations(
+def list_shared_stations(
     session: Session, dataset_id: int, key: str | None = None
 ) -> list[StoredStation]:
     """The static cameras of a dataset by key, or the one of a key."""
@@ -71,10 +71,12 @@ def shared_stations(
     )
     if key is not None:
         statement = statement.where(StationModel.key == key)
-    return [stored_station(row) for row in session.execute(statement.order_by(StationModel.key))]
+    return [station_from_row(row) for row in session.execute(statement.order_by(StationModel.key))]
 
 
-def group_verdicts(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+def list_verdicts_of_groups(
+    session: Session, ids: Iterable[int]
+) -> dict[int, list[dict[str, Any]]]:
     """What is carried of the verdicts of groups, by group, oldest first."""
     columns = [getattr(VerdictModel, name) for name in VERDICT]
     statement = (

@@ -16,7 +16,7 @@ from app.errors import InputError, OverloadedError
 from app.features.imports.jobs import request_import
 from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
 from app.features.imports.upload_queries import Upload, UploadWriter
-from app.features.imports.upload_quota import person_quota, used_bytes
+from app.features.imports.upload_quota import count_used_bytes, find_person_quota
 from app.features.imports.uploads import (
     FolderListing,
     PartWriter,
@@ -27,7 +27,7 @@ from app.features.imports.uploads import (
     find_upload,
     finish_upload,
     list_folder,
-    own_uploads,
+    list_own_uploads,
 )
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import by_job, job_answer
@@ -296,11 +296,11 @@ def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> Upload
     """
     settings = services.settings
     return UploadList(
-        items=own_uploads(settings, visibility),
+        items=list_own_uploads(settings, visibility),
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
-        used_bytes=used_bytes(settings, actor),
-        quota_bytes=person_quota(settings),
+        used_bytes=count_used_bytes(settings, actor),
+        quota_bytes=find_person_quota(settings),
     )
 
 

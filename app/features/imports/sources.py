@@ -11,8 +11,13 @@ from typing import Any, get_args
 from app.config import Settings
 from app.db.store import Store
 from app.errors import DatasetFormatError, InputError
-from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import IngestReport, UnassignedFrame, ingest, ingest_unassigned
+from app.features.imports.cameras import import_given_cameras
+from app.features.imports.ingest import (
+    IngestReport,
+    UnassignedFrame,
+    import_groups,
+    import_unassigned_frames,
+)
 from app.features.imports.picture_check import PictureCheck
 from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
@@ -307,7 +312,7 @@ def import_source(
         sizes: dict[str, ImageSize] = {}
         covariances: dict[str, Any] = {}
         cameras = read_cameras(source.path, report, limits, sizes, covariances)
-        result = ingest_cameras(
+        result = import_given_cameras(
             store,
             dataset,
             cameras,
@@ -342,7 +347,7 @@ def import_source(
             iter(groups)
         )
     counts, check = BallCounter(), PictureCheck(report, settings, progress)
-    result = ingest(
+    result = import_groups(
         store,
         dataset,
         counts.watch(check.watch(groups)),
@@ -362,7 +367,7 @@ def import_source(
     if folder is not None and source.calibration is None:
         _report_contradicted(folder, dataset, source, report)
     if folder is not None and not dry_run:
-        ingest_unassigned(
+        import_unassigned_frames(
             store, dataset, _read_unassigned(folder), source=source.label, actor=actor
         )
     if source.format not in BALLS_ELSEWHERE and (sentence := counts.without_ball()):

@@ -27,7 +27,11 @@ from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
-from app.features.imports.upload_quota import person_quota, require_quota, used_bytes
+from app.features.imports.upload_quota import (
+    count_used_bytes,
+    find_person_quota,
+    require_within_quota,
+)
 from app.json_text import json_text
 
 _ID = re.compile(r"[0-9a-f]{32}")
@@ -81,7 +85,7 @@ def lock_upload_records(settings: Settings) -> Iterator[None]:
     """
     with _WRITING:
         with _storage_errors():
-            make_folder(settings.uploads)
+            make_upload_folder(settings.uploads)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
             require_lock(folder, "has been writing uploads", WRITING_SECONDS)
@@ -90,7 +94,7 @@ def lock_upload_records(settings: Settings) -> Iterator[None]:
             os.close(folder)
 
 
-def make_folder(uploads: Path) -> None:
+def make_upload_folder(uploads: Path) -> None:
     """Make the folder of all uploads, if need be, so that it is there after a power cut."""
     if not uploads.is_dir():
         uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -139,13 +143,13 @@ def list_uploads(settings: Settings) -> list[Upload]:
     return sorted(_all_uploads(settings), key=lambda item: (item.created, item.id), reverse=True)
 
 
-def keep_upload(settings: Settings, upload_id: str) -> None:
+def save_upload(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
     with lock_upload_records(settings):
         upload = get_upload(settings, upload_id)
         if not upload.kept:
             with _storage_errors():
-                write_record(settings.uploads / upload_id, replace(upload, kept=True))
+                write_upload_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
 def delete_upload(
@@ -172,7 +176,7 @@ def delete_upload(
                 sync(settings.uploads)
             return
         with _storage_errors():
-            write_record(settings.uploads / upload_id, replace(upload, by=others))
+            write_upload_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
 def require_unused_by_datasets(upload: Upload) -> None:
@@ -232,7 +236,7 @@ def read_upload(folder: Path) -> Upload | None:
     try:
         values = json.loads((folder / _RECORD).read_bytes())
         upload = Upload(**{**values, "by": tuple(values.get("by", ()))})
-        named = upload.id == folder.name and upload.name == safe_name(upload.name)
+        named = upload.id == folder.name and upload.name == make_safe_file_name(upload.name)
         sound = named and datetime.fromisoformat(upload.created).tzinfo is not None
         if sound and upload.size is not None:
             # A copy of a home that was being written to may have the record of more than it has.
@@ -243,7 +247,7 @@ def read_upload(folder: Path) -> Upload | None:
     return upload if sound else None
 
 
-def safe_name(name: str) -> str:
+def make_safe_file_name(name: str) -> str:
     """A name that any disk takes, as near to the sent one as can be.
 
     Raises:
@@ -301,10 +305,10 @@ class UploadWriter:
     """
 
     def __init__(self, settings: Settings, name: str, *, by: str | None = None, declared: int = 0):
-        self._settings, self._name, self._by = settings, safe_name(name), by
+        self._settings, self._name, self._by = settings, make_safe_file_name(name), by
         self._folder = settings.uploads / f"{uuid.uuid4().hex}{PART}"
         self._digest = UploadDigest(self._name)
-        self._quota = person_quota(settings) if by else None
+        self._quota = find_person_quota(settings) if by else None
         self._reserved = 0
         self.bytes = 0
         if self._quota is None:
@@ -316,8 +320,8 @@ class UploadWriter:
         """Reserve so many bytes of the sender's quota, or some more where nobody says how many come."""
         by = self._by or ""
         with lock_upload_records(self._settings):
-            used = used_bytes(self._settings, by, but=self._folder)
-            require_quota(self._settings, size, quota, used)
+            used = count_used_bytes(self._settings, by, but=self._folder)
+            require_within_quota(self._settings, size, quota, used)
             more = 0 if size > self.bytes else _STEP
             self._reserved = min(size + more, quota - used)
             if not self._folder.exists():
@@ -325,12 +329,12 @@ class UploadWriter:
             # Without an id it is none that is listed; ``finish`` writes the one that counts.
             draft = Upload("", self._name, self._reserved, now(), by=(by,))
             with _storage_errors():
-                write_record(self._folder, draft)
+                write_upload_record(self._folder, draft)
 
     def _open_content(self) -> None:
         with _storage_errors():
             settings = self._settings
-            make_folder(settings.uploads)
+            make_upload_folder(settings.uploads)
             content = self._folder / CONTENT
             content.mkdir(mode=0o700, parents=True)
             self._folder.chmod(0o700)
@@ -343,7 +347,7 @@ class UploadWriter:
             TooLargeError: It is longer than the settings, or the quota of its sender, allow.
         """
         self.bytes += len(chunk)
-        require_size(self._settings, self.bytes)
+        require_upload_size(self._settings, self.bytes)
         if self._quota is not None and self.bytes > self._reserved:
             self._reserve(self.bytes, self._quota)
         self._digest.update(chunk)
@@ -375,7 +379,7 @@ class UploadWriter:
         upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
         with _storage_errors():
             sync(self._folder / CONTENT)
-            write_record(self._folder, upload)
+            write_upload_record(self._folder, upload)
             return self._publish(upload)
 
     def _publish(self, upload: Upload) -> Upload:
@@ -408,7 +412,7 @@ class UploadWriter:
         delete_path(self._folder)
 
 
-def require_size(settings: Settings, size: int) -> None:
+def require_upload_size(settings: Settings, size: int) -> None:
     """Raise TooLargeError where an upload of that size is not allowed."""
     if size > settings.max_upload_bytes:
         raise TooLargeError(
@@ -425,11 +429,11 @@ def _add_sender(settings: Settings, upload_id: str, by: str | None = None) -> Up
             return upload
         shared = replace(upload, by=(*upload.by, by))
         with _storage_errors():
-            write_record(settings.uploads / upload_id, shared)
+            write_upload_record(settings.uploads / upload_id, shared)
         return shared
 
 
-def write_record(folder: Path, upload: Upload) -> None:
+def write_upload_record(folder: Path, upload: Upload) -> None:
     """Put the record of an upload in its place, and on the disk."""
     replace_file(folder / _RECORD, json_text(asdict(upload), ascii_=True).encode())
 

@@ -18,12 +18,12 @@ IDLE_SECONDS = 600.0
 """A half-sent upload in which nothing was written for so long has lost its sender."""
 
 
-def person_quota(settings: Settings) -> int | None:
+def find_person_quota(settings: Settings) -> int | None:
     """How many bytes one person may have; None: nobody counts, as on a server without accounts."""
     return settings.upload_quota_bytes or None if settings.team else None
 
 
-def used_bytes(settings: Settings, actor: str, but: Path | None = None) -> int:
+def count_used_bytes(settings: Settings, actor: str, but: Path | None = None) -> int:
     """How many bytes the uploads of a person have together.
 
     Args:
@@ -38,7 +38,7 @@ def used_bytes(settings: Settings, actor: str, but: Path | None = None) -> int:
     )
 
 
-def require_quota(settings: Settings, size: int, quota: int, used: int) -> None:
+def require_within_quota(settings: Settings, size: int, quota: int, used: int) -> None:
     """Raise TooLargeError where so many more bytes of a person are not allowed."""
     if used + size <= quota:
         return

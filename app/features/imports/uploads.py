@@ -31,17 +31,17 @@ from app.features.imports.upload_queries import (
     is_full_disk,
     list_uploads,
     lock_upload_records,
-    make_folder,
+    make_safe_file_name,
+    make_upload_folder,
     read_upload,
-    require_size,
     require_unused_by_datasets,
-    safe_name,
-    write_record,
+    require_upload_size,
+    write_upload_record,
 )
 from app.features.imports.upload_queries import Upload as Upload
 from app.features.imports.upload_queries import UploadWriter as UploadWriter
-from app.features.imports.upload_quota import person_quota, require_quota
-from app.features.imports.upload_quota import used_bytes as used_bytes
+from app.features.imports.upload_quota import count_used_bytes as used_bytes
+from app.features.imports.upload_quota import find_person_quota, require_within_quota
 from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
 from app.formats.guess_format import guess_format, guess_format_of_names
@@ -79,7 +79,7 @@ class FolderListing:
     more: bool
 
 
-def allowed_folders(settings: Settings) -> dict[str, Path]:
+def name_import_folders(settings: Settings) -> dict[str, Path]:
     """The operator's folders by the names that requests use for them."""
     found: dict[str, Path] = {}
     for folder in settings.import_folders:
@@ -101,7 +101,7 @@ def resolve_folder(settings: Settings, path: str) -> Root:
     """
     if is_address(path):
         return _resolve_address(settings, path)
-    folders = allowed_folders(settings)
+    folders = name_import_folders(settings)
     if not folders:
         raise InputError(
             "the operator has allowed no folder for imports",
@@ -129,7 +129,7 @@ def _resolve_address(settings: Settings, address: str) -> StoredPath:
 def list_folder(settings: Settings, path: str = "") -> FolderListing:
     """The allowed folders and stores, or what is in one of them."""
     if not path:
-        roots = [FolderItem(name, name, True) for name in sorted(allowed_folders(settings))]
+        roots = [FolderItem(name, name, True) for name in sorted(name_import_folders(settings))]
         stores = (f"{SCHEME}{name}" for name in sorted(settings.stores))
         roots += [FolderItem(address, address, True) for address in stores]
         return FolderListing("", None, tuple(roots), False)
@@ -185,7 +185,7 @@ def begin_upload(settings: Settings, name: str, declared: int, actor: str) -> Up
         InputError: The name is none that a file can have.
         StorageError: The disk refuses.
     """
-    require_size(settings, declared)
+    require_upload_size(settings, declared)
     return UploadWriter(settings, name, by=actor, declared=declared)
 
 
@@ -207,7 +207,7 @@ def begin_part(settings: Settings, upload_id: str, offset: int, declared: int) -
         NotFoundError: There is no such upload.
         ConflictError: Bytes before it are missing.
     """
-    require_size(settings, declared)
+    require_upload_size(settings, declared)
     return PartWriter(settings, upload_id, offset, guess_format)
 
 
@@ -220,7 +220,7 @@ def find_upload(settings: Settings, upload_id: str) -> Upload:
     return get_upload(settings, upload_id)
 
 
-def own_uploads(settings: Settings, visibility: Visibility) -> list[Upload]:
+def list_own_uploads(settings: Settings, visibility: Visibility) -> list[Upload]:
     """The uploads that somebody sent, the newest first; of an admin everybody's."""
     return [
         item
@@ -283,8 +283,8 @@ def begin_upload_in_parts(
         TooLargeError: It is larger than the settings, or the quota of its sender, allow.
         StorageError: The disk has no room for it.
     """
-    require_size(settings, size)
-    name = safe_name(name)
+    require_upload_size(settings, size)
+    name = make_safe_file_name(name)
     if not size:
         raise InputError(f"{name} is empty")
     said = canonical([by, name, size, mark]).encode()
@@ -292,8 +292,8 @@ def begin_upload_in_parts(
     with lock_upload_records(settings):
         upload = read_upload(folder)
         begun = Upload(folder.name, name, 0, now(), by=(by,), size=size)
-        if upload is None and (quota := person_quota(settings)) is not None:
-            require_quota(settings, size, quota, used_bytes(settings, by, but=folder))
+        if upload is None and (quota := find_person_quota(settings)) is not None:
+            require_within_quota(settings, size, quota, used_bytes(settings, by, but=folder))
         with _storage_errors(upload or begun):
             if upload is None or upload.bytes < size:
                 _require_disk(settings, upload or begun)
@@ -303,17 +303,17 @@ def begin_upload_in_parts(
 
 
 def _make_upload_folder(folder: Path, upload: Upload) -> None:
-    make_folder(folder.parent)
+    make_upload_folder(folder.parent)
     (folder / CONTENT).mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     (folder / CONTENT / upload.name).write_bytes(b"")
     sync(folder / CONTENT)
-    write_record(folder, upload)
+    write_upload_record(folder, upload)
     sync(folder.parent)
 
 
 def _require_disk(settings: Settings, upload: Upload) -> None:
-    make_folder(settings.uploads)
+    make_upload_folder(settings.uploads)
     missing, free = upload.whole_size - upload.bytes, shutil.disk_usage(settings.uploads).free
     if missing > free:
         raise StorageError(
@@ -368,7 +368,7 @@ class PartWriter:
                     _append_chunk(path, upload.bytes, fresh)
                     if grown.bytes == upload.whole_size:
                         grown = replace(grown, format=self._guess(path))
-                    write_record(path.parent.parent, grown)
+                    write_upload_record(path.parent.parent, grown)
         self._next += len(chunk)
 
     def finish(self) -> Upload:

@@ -25,23 +25,23 @@ from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import GroupState, need_group
-from app.features.groups.submit import current_etag, solved_state, submit
+from app.features.groups.submit import read_group_etag, solve_for_state, submit
 from app.features.groups.view_paint import PaintFollower
-from app.features.groups.view_queries import groups_of_station, save_station
+from app.features.groups.view_queries import list_groups_of_station, save_station
 from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
     GOLD,
     IndependentAnnotation,
-    annotation_of_copy,
+    find_annotation_of_copy_row,
     update_annotation,
 )
 from app.features.independent_annotations.service import (
     DisclosedAnnotation,
-    disclose_in_session,
+    disclose_annotation_in_session,
     get_annotation,
     read_annotation,
 )
-from app.features.independent_annotations.submission_queries import KIND, RETURNED, return_copy
+from app.features.independent_annotations.submission_queries import KIND, RETURNED, reopen_copy
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
 from app.features.queue.refresh_queries import refresh_queue
@@ -81,12 +81,12 @@ def adopt_annotation(
     annotation = get_annotation(store, annotation_id)
     _require_ready(annotation)
     # First: what changes the original from here on is seen by the edit that builds on it.
-    etag = current_etag(store, annotation.group_id)
+    etag = read_group_etag(store, annotation.group_id)
     with store.read() as session:
         copy = need_group(session, annotation.copy_id)
         original = need_group(session, annotation.group_id)
     copy = replace(copy, group=rename_views_as_original(original.group, copy.group))
-    edit = CompositeEdit(tuple(edits_between(original.group, copy.group)))
+    edit = CompositeEdit(tuple(make_edits_between(original.group, copy.group)))
     after: list[GroupState] = []
 
     def settle(session: Session) -> None:
@@ -100,7 +100,7 @@ def adopt_annotation(
         if also is not None:
             also(session)
         refresh_queue(session, [original.id])
-        after.append(solved_state(session, original.id))
+        after.append(solve_for_state(session, original.id))
         session.respond(after[-1])
 
     if edit.edits:
@@ -120,7 +120,7 @@ def adopt_annotation(
     return after[-1]
 
 
-def edits_between(before: Group, after: Group) -> Iterator[Edit]:
+def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
     """The edits that make what one annotation of a group says of another one.
 
     Views are those of the first, by their keys; static cameras are left alone.
@@ -196,7 +196,7 @@ def _adopt_stations(
             save_station(session, held, station)
             held = replace(held, station=station, revision=held.revision + 1)
         if edits:
-            groups = groups_of_station(session, held.id)
+            groups = list_groups_of_station(session, held.id)
             refresh_inputs_hashes(session, groups)
             refresh_queue(session, groups)
 
@@ -248,7 +248,7 @@ def return_annotation(
         ConflictError: It is not submitted, or it was decided about.
         InputError: There is no sentence, or it is too long.
     """
-    checked = checked_reason(reason)
+    checked = strip_and_check_reason(reason)
     if not checked:
         raise InputError(
             "a reason is required to return an annotation",
@@ -257,12 +257,12 @@ def return_annotation(
         )
     with store.write() as session:
         annotation = read_annotation(session, annotation_id)
-        return_copy(session, annotation)
+        reopen_copy(session, annotation)
         copy = annotation.copy_id
         log_return(
             session, KIND, copy, annotation.person, checked, actor=actor, batch=annotation.batch_id
         )
-        back = disclose_in_session(session, read_annotation(session, annotation_id))
+        back = disclose_annotation_in_session(session, read_annotation(session, annotation_id))
         session.respond(back)
         return back
 
@@ -309,7 +309,7 @@ def _announce_return(
     session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
 ) -> None:
     """Tell webhooks of the dataset, for a copy of the one that it is of."""
-    row = annotation_of_copy(session, group.id)
+    row = find_annotation_of_copy_row(session, group.id)
     where, details = group.dataset_id, {"group": group.id, "person": person}
     if row is not None:
         where = need_group(session, row.group_id).dataset_id
@@ -318,7 +318,7 @@ def _announce_return(
     announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=details)
 
 
-def checked_reason(reason: str) -> str:
+def strip_and_check_reason(reason: str) -> str:
     """The sentence without blanks around it; raises InputError where it is too long."""
     text = " ".join(reason.split())
     if len(text) > MAX_REASON:

@@ -16,13 +16,13 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
 from app.features.imports.ingest import ImportOrigin, insert_new_groups
-from app.features.imports.queries import newest_imports, shared_stations
+from app.features.imports.queries import find_newest_imports, list_shared_stations
 from app.features.independent_annotations.queries import (
     BARE,
     IMPORTED,
     CopiesOf,
-    find_copies,
-    gold_start,
+    find_copy_dataset,
+    read_gold_start,
 )
 from app.features.paint.queries import PAINT, insert_readings, read_readings
 from app.soccer.codec import source_hash, view_from_json
@@ -58,7 +58,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     """
     dataset_id = _dataset_of_copies(session, order)
     # Static cameras that a copy is there of already are as their person left them.
-    own = {item.station.key: item.station for item in shared_stations(session, dataset_id)}
+    own = {item.station.key: item.station for item in list_shared_stations(session, dataset_id)}
     group = replace(start, views=tuple(_view_with_own_station(view, own) for view in start.views))
     if order.name is not None:
         group = _hide_names(group, order.name)
@@ -70,9 +70,9 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     return copy_id
 
 
-def gold_group_start(session: Session, stored: StoredGroup) -> Group:
+def make_gold_group_start(session: Session, stored: StoredGroup) -> Group:
     """A gold group as its own start says, before it is stripped as all copies of the batch are."""
-    if gold_start(session, stored.id) == IMPORTED:
+    if read_gold_start(session, stored.id) == IMPORTED:
         return _group_as_imported(session, stored)
     return stored.group
 
@@ -116,7 +116,7 @@ def _group_as_imported(session: Session, stored: StoredGroup) -> Group:
 
     Static cameras are as they are: the labels of one picture are not theirs alone.
     """
-    (entry,) = newest_imports(session, [stored.id])
+    (entry,) = find_newest_imports(session, [stored.id])
     body = entry.body["base"] or entry.body["group"]
     present = {view.key: view for view in stored.group.views}
     views = []
@@ -179,7 +179,7 @@ def _dataset_of_copies(session: Session, order: CopyRequest) -> int:
     """Id of the dataset of somebody's copies, which the first of them makes."""
     stored = order.original
     copies = CopiesOf(stored.dataset_id, order.batch_id or 0, order.person)
-    row = find_copies(session, copies)
+    row = find_copy_dataset(session, copies)
     if row is None:
         name = _free_name(session, f"{stored.dataset[:_NAME]} {copies.batch_id} {order.person}")
         return insert_dataset(session, name, stored.policy, order.person, copies)

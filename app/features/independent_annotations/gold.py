@@ -22,21 +22,21 @@ from app.evaluation.annotation_distance import (
 from app.features.datasets.service import need_dataset
 from app.features.groups.state import GroupState, need_group, read_states
 from app.features.groups.submit import load_solved
-from app.features.groups.view_queries import group_dataset
+from app.features.groups.view_queries import find_dataset_of_group
 from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
     GOLD,
     STARTS,
     GoldHead,
     IndependentAnnotation,
-    gold_head,
-    gold_heads,
-    gold_truth,
-    is_copy,
-    mark_gold,
+    delete_gold,
+    find_gold_head,
+    insert_gold,
+    is_copy_dataset,
+    list_gold_heads,
     read_annotations,
-    start_gold,
-    unmark_gold,
+    read_gold_truth,
+    update_gold_start,
 )
 from app.features.independent_annotations.submission_queries import list_submissions
 from app.features.solutions.service import known_calibrations
@@ -141,7 +141,7 @@ class GoldReport:
     people: tuple[PersonResults, ...]
 
 
-def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+def mark_gold_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     """Say that what a group holds now is true; annotators begin with what ``start`` leaves of it.
 
     Raises:
@@ -149,7 +149,7 @@ def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
         InputError: There is no such start.
         ConflictError: Nobody has judged the group as it is now, or it is a copy.
     """
-    check_start(start)
+    check_gold_start(start)
     state = load_solved(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
@@ -158,9 +158,9 @@ def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
             " balls.",
         )
     with store.write() as session:
-        if is_copy(session, state.dataset_id):
+        if is_copy_dataset(session, state.dataset_id):
             raise ConflictError("a person's own annotation cannot be a gold group")
-        mark_gold(session, group_id, state.dataset_id, start, _truth_values(state), actor)
+        insert_gold(session, group_id, state.dataset_id, start, _truth_values(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
@@ -178,19 +178,19 @@ def set_gold_start(store: Store, group_id: int, start: str, *, actor: str) -> Go
         InputError: There is no such start.
         NotFoundError: It is not a gold group.
     """
-    check_start(start)
+    check_gold_start(start)
     with store.write() as session:
         dataset_id, gold = _require_gold(session, group_id)
         changed = replace(gold, start=start)
         if changed != gold:
-            start_gold(session, group_id, start)
+            update_gold_start(session, group_id, start)
             body = {"group": group_id, "did": "changed", "start": start}
             append(session, [Entry(KIND, actor, now(), body, dataset_id)])
         session.respond(changed)
     return changed
 
 
-def unmark_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
+def unmark_gold_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
     """Let a gold group be an ordinary one again; what was measured by it is no longer shown.
 
     Raises:
@@ -198,14 +198,14 @@ def unmark_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
     """
     with store.write() as session:
         dataset_id, gone = _require_gold(session, group_id)
-        unmark_gold(session, group_id)
+        delete_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
         append(session, [Entry(KIND, actor, now(), body, dataset_id)])
         session.respond(gone)
     return gone
 
 
-def read_report(store: Store, dataset: str | int) -> GoldReport:
+def read_gold_report(store: Store, dataset: str | int) -> GoldReport:
     """The gold groups of a dataset, and how far each person was from them, by name.
 
     Raises:
@@ -215,7 +215,8 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
         dataset_id = need_dataset(session, dataset)
         found: dict[str, list[GoldResult]] = {}
         known = {
-            row.group_id: _gold_with_truth(session, row) for row in gold_heads(session, dataset_id)
+            row.group_id: _gold_with_truth(session, row)
+            for row in list_gold_heads(session, dataset_id)
         }
         annotations = [
             one for one in read_annotations(session, dataset_id, kind=GOLD) if one.group_id in known
@@ -234,7 +235,7 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
     return GoldReport(tuple(gold for gold, _ in known.values()), people)
 
 
-def wilson(right: int, of: int) -> tuple[float | None, float | None]:
+def wilson_interval(right: int, of: int) -> tuple[float | None, float | None]:
     """Wilson's 95 % interval of a share (E. B. Wilson 1927, J. Am. Stat. Assoc. 22).
 
     Example:
@@ -275,7 +276,7 @@ def median_interval(values: Sequence[float | None]) -> MedianInterval:
     return MedianInterval(count, median, known[rank - 1], known[count - rank])
 
 
-def check_start(start: str) -> None:
+def check_gold_start(start: str) -> None:
     """Raises InputError where annotators cannot begin with that."""
     if start not in STARTS:
         raise InputError(f"start must be one of {', '.join(STARTS)}", pointer="/start")
@@ -292,7 +293,7 @@ def _truth_values(state: GroupState) -> Json:
 
 def _gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
     """A gold group, and what is true of it."""
-    truth = gold_truth(session, row.group_id) or {}
+    truth = read_gold_truth(session, row.group_id) or {}
     gold = GoldGroup(
         row.group_id,
         row.label or row.key,
@@ -306,8 +307,8 @@ def _gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
 
 def _require_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     """A gold group and the id of its dataset."""
-    row = gold_head(session, group_id)
-    if row is None and group_dataset(session, group_id) is None:
+    row = find_gold_head(session, group_id)
+    if row is None and find_dataset_of_group(session, group_id) is None:
         raise NotFoundError.group(group_id)
     if row is None:
         raise NotFoundError(f"group {group_id} is not a gold group")
@@ -378,7 +379,7 @@ def true_views(truth: Json) -> dict[str, TrueView]:
 def _results_of_person(name: str, results: list[GoldResult]) -> PersonResults:
     results.sort(key=lambda one: one.submitted)
     judged = [one.right for one in results if one.right is not None]
-    low, high = wilson(sum(judged), len(judged))
+    low, high = wilson_interval(sum(judged), len(judged))
     return PersonResults(
         person=name,
         results=tuple(results),

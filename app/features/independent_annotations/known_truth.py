@@ -21,17 +21,17 @@ from app.features.agreement.queries import AGREED, DECIDED, read_group_states
 from app.features.datasets.service import dataset_id
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.submit import solve_and_keep
-from app.features.independent_annotations.gold import KIND, TruthSource, check_start
+from app.features.independent_annotations.gold import KIND, TruthSource, check_gold_start
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
     IndependentAnnotation,
-    annotations_of_batch,
-    fresh_gold,
-    is_copy,
-    mark_gold,
+    insert_gold,
+    is_copy_dataset,
+    list_annotations_of_batch,
+    list_gold_without_copy,
 )
-from app.features.independent_annotations.service import begin_in_session
+from app.features.independent_annotations.service import begin_annotation_in_session
 from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
@@ -82,7 +82,7 @@ class GoldChoiceResult:
     left_out: int
 
 
-def mark_known(
+def mark_groups_with_known_truth(
     store: Store, dataset: str | int, choice: GoldChoice, *, actor: str
 ) -> GoldChoiceResult:
     """Make gold groups of those whose truth is known, also while batches are under way.
@@ -94,12 +94,12 @@ def mark_known(
         InputError: There is no such start, version or query, or nothing is known of any group.
         ConflictError: The dataset holds copies.
     """
-    check_start(choice.start)
+    check_gold_start(choice.start)
     number = dataset_id(store, dataset)
     query = parse_query(choice.query, longest=MAX_LISTED_LENGTH)
     version = _version_of_choice(store, dataset, choice)
     with store.read() as session:
-        if is_copy(session, number):
+        if is_copy_dataset(session, number):
             raise ConflictError("a person's own annotation cannot be a gold group")
         ids = Listing(session, number, query.conditions).ids(query.order)
         found = _truths_of_sample(session, ids)
@@ -111,7 +111,7 @@ def mark_known(
     chosen = GoldChoiceResult(tuple(truths), len(ids) - len(truths))
     with store.write() as session:
         for group_id, truth in truths.items():
-            mark_gold(session, group_id, number, choice.start, truth, actor)
+            insert_gold(session, group_id, number, choice.start, truth, actor)
         body: Json = {"did": "marked", "start": choice.start, "source": str(choice.source)}
         body |= {"groups": [*truths], "version": choice.version}
         append(session, [Entry(KIND, actor, now(), body, number)])
@@ -241,7 +241,7 @@ class BatchTerms:
     gold_every: int | None = None
 
 
-def begin_next(
+def begin_next_annotation(
     store: Store, terms: BatchTerms, *, person: str, chance: Random | None = None
 ) -> IndependentAnnotation | None:
     """The independent annotation that a person shall work on now: the one that is open, else a new one.
@@ -270,7 +270,7 @@ def begin_next(
 def _next_annotation(
     session: Session, terms: BatchTerms, person: str, chance: Random
 ) -> IndependentAnnotation | None:
-    annotations = annotations_of_batch(session, terms.batch_id, terms.dataset_id)
+    annotations = list_annotations_of_batch(session, terms.batch_id, terms.dataset_id)
     mine = [annotation for annotation in annotations if annotation.person == person]
     waiting = next((annotation for annotation in mine if annotation.submitted is None), None)
     if waiting is not None:
@@ -282,12 +282,12 @@ def _next_annotation(
     if terms.gold_every and is_gold_turn(
         [annotation.kind for annotation in mine], terms.gold_every, len(free), chance
     ):
-        fresh = unseen_gold_outside_batches(session, terms.dataset_id, person, terms.groups)
+        fresh = list_unseen_gold_outside_batches(session, terms.dataset_id, person, terms.groups)
         kind, choice = (GOLD, fresh) if fresh else (kind, choice)
     if not choice:
         return None
     group_id = chance.choice(choice)
-    return begin_in_session(
+    return begin_annotation_in_session(
         session,
         group_id,
         person=person,
@@ -299,12 +299,12 @@ def _next_annotation(
     )
 
 
-def unseen_gold_outside_batches(
+def list_unseen_gold_outside_batches(
     session: Session, dataset_id: int, person: str, groups: Collection[int]
 ) -> list[int]:
     """Gold groups of a dataset that a person never had, and that wait in no batch of theirs."""
     inside = set(groups)
-    return [one for one in fresh_gold(session, dataset_id, person) if one not in inside]
+    return [one for one in list_gold_without_copy(session, dataset_id, person) if one not in inside]
 
 
 def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:

@@ -14,7 +14,7 @@ from app.db.json_columns import Json, pack, unpack
 from app.db.session import Session, now
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.independent_annotations.tables import (
     CopyDatasetModel,
     GoldModel,
@@ -126,7 +126,7 @@ def insert_annotation(
     place: int,
 ) -> int:
     """Insert an independent annotation that begins now; returns its id."""
-    identity = next_id(session, IndependentAnnotationModel)
+    identity = find_next_row_id(session, IndependentAnnotationModel)
     values = {"batch_id": batch_id, "group_id": group_id, "copy_id": copy_id, "person": person}
     ends = dict.fromkeys(("submitted", "verdict", "settled"))
     row = {"id": identity, **values, "kind": kind, "place": place, "begun": now(), **ends}
@@ -146,12 +146,12 @@ def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotati
     )
 
 
-def annotation_of_copy(session: Session, copy_id: int) -> IndependentAnnotation | None:
+def find_annotation_of_copy_row(session: Session, copy_id: int) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
     return next(iter(_annotations_from_rows(session, _OF_COPY, {"copy": copy_id})), None)
 
 
-def closed_copies(session: Session, dataset_id: int) -> set[int]:
+def list_closed_copies(session: Session, dataset_id: int) -> set[int]:
     """Ids of the copies in a dataset that were submitted or settled: nothing in them changes."""
     closed = or_(
         IndependentAnnotationModel.submitted.is_not(None),
@@ -163,7 +163,7 @@ def closed_copies(session: Session, dataset_id: int) -> set[int]:
     return set(session.scalars(statement.where(GroupModel.dataset_id == dataset_id, closed)))
 
 
-def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
+def list_annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
     """The independent annotations of a group in the order in which they began."""
     mine = IndependentAnnotationModel.group_id == group_id
     return _annotations_from_rows(
@@ -171,7 +171,7 @@ def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnn
     )
 
 
-def annotations_of_batch(
+def list_annotations_of_batch(
     session: Session, batch_id: int | None, dataset_id: int
 ) -> list[IndependentAnnotation]:
     """The independent annotations of a batch (None: of none) of a dataset, in the order in which they began."""
@@ -183,7 +183,7 @@ def annotations_of_batch(
     return _annotations_from_rows(session, statement.order_by(IndependentAnnotationModel.id))
 
 
-def count_left(
+def count_groups_left(
     session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
 ) -> tuple[int, int]:
     """How many independent annotations of a batch a person has begun, and of how many of its groups they may make one.
@@ -216,7 +216,7 @@ def _copies_of(dataset_id: int) -> Select[int]:
     )
 
 
-def groups_with_annotations(
+def select_groups_with_annotations(
     compare: Callable[[Any, float], Any] | None = None, number: float = 0
 ) -> Select[int]:
     """Ids of groups of which somebody submitted an annotation of their own, or so many people did."""
@@ -239,7 +239,7 @@ def count_submitted(session: Session, group_ids: Sequence[int]) -> dict[int, int
     return {row[0]: row[1] for row in rows}
 
 
-def open_annotations(
+def list_open_annotations(
     session: Session, batch_ids: Collection[int], person: str
 ) -> Sequence[OpenCopy]:
     """The copies in batches that somebody has begun and not submitted."""
@@ -292,7 +292,7 @@ class CopyName(NamedTuple):
     number: int
 
 
-def names_of_copies(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyName]:
+def read_copy_names(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyName]:
     """Names of copies and of their originals."""
     original = aliased(GroupModel)
     statement = (
@@ -345,30 +345,30 @@ def insert_copy_dataset(session: Session, dataset_id: int, copies: CopiesOf) -> 
     session.execute(insert(CopyDatasetModel), [{"dataset_id": dataset_id, **vars(copies)}])
 
 
-def list_copies(session: Session, dataset_id: int) -> Sequence[CopyDataset]:
+def list_copy_datasets(session: Session, dataset_id: int) -> Sequence[CopyDataset]:
     """The datasets of a dataset's copies."""
     return session.rows(CopyDataset, _COPIES.where(CopyDatasetModel.of_id == dataset_id))
 
 
-def find_copies(session: Session, copies: CopiesOf) -> CopyDataset | None:
+def find_copy_dataset(session: Session, copies: CopiesOf) -> CopyDataset | None:
     """The dataset of such copies."""
     column = CopyDatasetModel
     mine = (column.of_id == copies.of_id) & (column.batch_id == copies.batch_id)
     return session.row(CopyDataset, _COPIES.where(mine, column.person == copies.person))
 
 
-def copy_dataset_ids(session: Session) -> frozenset[int]:
+def list_copy_dataset_ids(session: Session) -> frozenset[int]:
     """Ids of the datasets that hold somebody's copies."""
     return frozenset(session.scalars(select(CopyDatasetModel.dataset_id)))
 
 
-def is_copy(session: Session, dataset_id: int) -> bool:
+def is_copy_dataset(session: Session, dataset_id: int) -> bool:
     """Whether a dataset holds somebody's copies."""
     mine = CopyDatasetModel.dataset_id == dataset_id
     return session.scalar(select(CopyDatasetModel.dataset_id).where(mine)) is not None
 
 
-def mark_gold(
+def insert_gold(
     session: Session, group_id: int, dataset_id: int, start: str, truth: Json, by: str
 ) -> None:
     """Keep what is true of a group, in the place of what was kept before."""
@@ -378,24 +378,24 @@ def mark_gold(
     session.execute(statement.on_conflict_do_update(index_elements=["group_id"], set_=values))
 
 
-def start_gold(session: Session, group_id: int, start: str) -> None:
+def update_gold_start(session: Session, group_id: int, start: str) -> None:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     of = GoldModel.group_id == group_id
     session.execute(update(GoldModel).where(of).values(start=start))
 
 
-def unmark_gold(session: Session, group_id: int) -> None:
+def delete_gold(session: Session, group_id: int) -> None:
     """A gold group is an ordinary one again."""
     session.execute(delete(GoldModel).where(GoldModel.group_id == group_id))
 
 
-def gold_start(session: Session, group_id: int) -> str:
+def read_gold_start(session: Session, group_id: int) -> str:
     """What annotators of a gold group begin with."""
     statement = select(GoldModel.start).where(GoldModel.group_id == group_id)
     return session.scalar(statement) or IMPORTED
 
 
-def common_start(session: Session, dataset_id: int) -> str | None:
+def find_common_gold_start(session: Session, dataset_id: int) -> str | None:
     """What everybody begins with in batches that mix the gold groups of a dataset in: that which
     leaves least of those that its gold groups have; None where there is not a gold group."""
     mine = GoldModel.dataset_id == dataset_id
@@ -403,24 +403,24 @@ def common_start(session: Session, dataset_id: int) -> str | None:
     return max(found, key=(IMPORTED, WITHOUT_BALLS, BARE).index, default=None)
 
 
-def gold_heads(session: Session, dataset_id: int) -> Sequence[GoldHead]:
+def list_gold_heads(session: Session, dataset_id: int) -> Sequence[GoldHead]:
     """The gold groups of a dataset without what is true of them, by id of the group."""
     statement = _HEADS.where(GoldModel.dataset_id == dataset_id).order_by(GoldModel.group_id)
     return session.rows(GoldHead, statement)
 
 
-def gold_head(session: Session, group_id: int) -> GoldHead | None:
+def find_gold_head(session: Session, group_id: int) -> GoldHead | None:
     """A gold group without what is true of it; None: it is none."""
     return session.row(GoldHead, _HEADS.where(GoldModel.group_id == group_id))
 
 
-def gold_truth(session: Session, group_id: int) -> Json | None:
+def read_gold_truth(session: Session, group_id: int) -> Json | None:
     """What is true of a gold group."""
     packed = session.scalar(select(GoldModel.truth).where(GoldModel.group_id == group_id))
     return None if packed is None else unpack(packed)
 
 
-def fresh_gold(session: Session, dataset_id: int, person: str) -> list[int]:
+def list_gold_without_copy(session: Session, dataset_id: int, person: str) -> list[int]:
     """Ids of the gold groups of a dataset of which a person has had no copy yet."""
     had = select(IndependentAnnotationModel.group_id).where(
         IndependentAnnotationModel.person == person

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.evaluation.annotation_distance import DistanceFromTruth
 from app.features.agreement.adjudicate import adopt_into_group
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.groups.routes import ETAG
 from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
@@ -27,7 +27,7 @@ from app.features.independent_annotations.known_truth import (
     MOST,
     GoldChoice,
     GoldChoiceResult,
-    mark_known,
+    mark_groups_with_known_truth,
 )
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import role_allows
@@ -245,7 +245,7 @@ def hand_in(
     """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
     store = services.store
     annotation = service.get_annotation_of_copy(store, group)
-    background.add_task(after_submission, store, group, services.paint)
+    background.add_task(compare_or_adopt_submission, store, group, services.paint)
     return service.submit_annotation(store, annotation.id, actor=actor)
 
 
@@ -297,7 +297,7 @@ gold_router = APIRouter(tags=["independent annotations"], route_class=Route)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     """The gold groups of a dataset, and what each person made of those that they were given."""
-    return gold.read_report(store, dataset)
+    return gold.read_gold_report(store, dataset)
 
 
 @gold_router.post(
@@ -314,7 +314,7 @@ def choose(
     """Make gold groups of those whose truth is known, also while batches are under way."""
     values = choice.model_dump(exclude={"q", "source"})
     wanted = GoldChoice(gold.TruthSource(choice.source), query=choice.q, **values)
-    return mark_known(store, dataset, wanted, actor=actor)
+    return mark_groups_with_known_truth(store, dataset, wanted, actor=actor)
 
 
 @gold_router.put(
@@ -327,7 +327,7 @@ def choose(
 @responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
-    return gold.mark_group(store, group, edit.start, actor=actor)
+    return gold.mark_gold_group(store, group, edit.start, actor=actor)
 
 
 @gold_router.patch(
@@ -353,4 +353,4 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 @responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
-    return gold.unmark_group(store, group, actor=actor)
+    return gold.unmark_gold_group(store, group, actor=actor)

@@ -16,8 +16,8 @@ from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.copying import (
     CopyRequest,
     copy_group,
-    gold_group_start,
     group_before_edits,
+    make_gold_group_start,
     without_extras,
 )
 from app.features.independent_annotations.queries import (
@@ -25,14 +25,14 @@ from app.features.independent_annotations.queries import (
     INDEPENDENT,
     CopyName,
     IndependentAnnotation,
-    annotation_of_copy,
-    annotations_of_group,
-    common_start,
     count_annotations,
     find_annotation,
+    find_annotation_of_copy_row,
+    find_common_gold_start,
     insert_annotation,
-    names_of_copies,
+    list_annotations_of_group,
     read_annotations,
+    read_copy_names,
 )
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
@@ -124,14 +124,14 @@ def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAn
         ConflictError: It is a copy itself.
     """
     with store.write() as session:
-        annotation = begin_in_session(session, group_id, person=person_of(person))
-        begun = disclose_in_session(session, annotation)
+        annotation = begin_annotation_in_session(session, group_id, person=person_of(person))
+        begun = disclose_annotation_in_session(session, annotation)
         session.respond(begun)
     solve_and_keep(store, annotation.copy_id)
     return begun
 
 
-def begin_in_session(
+def begin_annotation_in_session(
     session: Session,
     group_id: int,
     *,
@@ -156,11 +156,13 @@ def begin_in_session(
             begins with what all copies of such a batch begin with.
     """
     stored = need_group(session, group_id)
-    others = [one for one in annotations_of_group(session, group_id) if one.batch_id == batch_id]
+    others = [
+        one for one in list_annotations_of_group(session, group_id) if one.batch_id == batch_id
+    ]
     for one in others:
         if one.person == person:
             return one
-    if annotation_of_copy(session, group_id) is not None:
+    if find_annotation_of_copy_row(session, group_id) is not None:
         raise ConflictError(
             "this is an independent annotation already",
             hint="Start from the group that it was made from.",
@@ -169,12 +171,12 @@ def begin_in_session(
     ready = [one.copy_id for one in others if one.submitted is not None]
     start = stored.group
     if kind == GOLD:
-        start = gold_group_start(session, stored)
+        start = make_gold_group_start(session, stored)
     elif (blind or nameless) and since is not None:
         start = group_before_edits(session, stored, since)
     elif not blind and ready:
         start = need_group(session, ready[-1]).group
-    common = common_start(session, stored.dataset_id) if nameless else None
+    common = find_common_gold_start(session, stored.dataset_id) if nameless else None
     if common is not None:
         start = without_extras(start, common)
     order = CopyRequest(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
@@ -202,7 +204,7 @@ def submit_annotation(store: Store, annotation_id: int, *, actor: str) -> Disclo
     with store.write() as session:
         annotation = read_annotation(session, annotation_id)
         submit_copy(session, annotation, actor=actor, at=now())
-        handed = disclose_in_session(session, read_annotation(session, annotation_id))
+        handed = disclose_annotation_in_session(session, read_annotation(session, annotation_id))
         session.respond(handed)
         return handed
 
@@ -232,7 +234,7 @@ def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
 def find_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
     with store.read_one() as session:
-        return annotation_of_copy(session, copy_id)
+        return find_annotation_of_copy_row(session, copy_id)
 
 
 def list_annotations(
@@ -259,10 +261,12 @@ def list_annotations(
 def disclose_annotation(store: Store, annotation: IndependentAnnotation) -> DisclosedAnnotation:
     """An independent annotation as it is shown."""
     with store.read() as session:
-        return disclose_in_session(session, annotation)
+        return disclose_annotation_in_session(session, annotation)
 
 
-def disclose_in_session(session: Session, annotation: IndependentAnnotation) -> DisclosedAnnotation:
+def disclose_annotation_in_session(
+    session: Session, annotation: IndependentAnnotation
+) -> DisclosedAnnotation:
     """``disclose_annotation`` within a session."""
     return _disclosed_annotations(session, [annotation])[0]
 
@@ -270,7 +274,7 @@ def disclose_in_session(session: Session, annotation: IndependentAnnotation) -> 
 def _disclosed_annotations(
     session: Session, annotations: Sequence[IndependentAnnotation]
 ) -> list[DisclosedAnnotation]:
-    heads = {row.id: row for row in names_of_copies(session, [one.copy_id for one in annotations])}
+    heads = {row.id: row for row in read_copy_names(session, [one.copy_id for one in annotations])}
     reader = READER.get()
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in annotations if one.submitted is None and one.settled is None]

@@ -17,7 +17,7 @@ from app.features.agreement.queries import delete_open_agreement
 from app.features.groups.queries import read_groups
 from app.features.independent_annotations.queries import (
     IndependentAnnotation,
-    annotation_of_copy,
+    find_annotation_of_copy_row,
     update_annotation,
 )
 from app.soccer.actors import LOCAL_USER, person_of
@@ -31,7 +31,7 @@ RETURNED = "handed back"
 _ONLY_LEADS = "Only a lead can return it, and says why."
 
 
-def require_open(annotation: IndependentAnnotation | None) -> None:
+def require_annotation_open(annotation: IndependentAnnotation | None) -> None:
     """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group.
 
     Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
@@ -66,7 +66,7 @@ def submit_copy(
         ConflictError: It was submitted already.
     """
     _require_person(annotation, actor)
-    require_open(annotation)
+    require_annotation_open(annotation)
     (stored,) = read_groups(session, [annotation.copy_id]).values()
     # Of a copy that was returned the verdict stays, unless its person gives another one.
     verdict = verdict or annotation.verdict
@@ -82,25 +82,25 @@ def submit_copy(
     append(session, [Entry(KIND, actor, at, body, stored.dataset_id, stored.id)])
 
 
-def judge_copy(session: Session, copy_id: int, state: str, *, actor: str, at: str) -> None:
+def record_copy_verdict(session: Session, copy_id: int, state: str, *, actor: str, at: str) -> None:
     """A verdict on a copy submits it; on an ordinary group nothing comes of it.
 
     Raises:
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already: its verdict stays, too.
     """
-    annotation = annotation_of_copy(session, copy_id)
+    annotation = find_annotation_of_copy_row(session, copy_id)
     if annotation is None:
         return
     if state != "unreviewed":
         submit_copy(session, annotation, actor=actor, at=at, verdict=state)
     else:
         _require_person(annotation, actor)
-        require_open(annotation)
+        require_annotation_open(annotation)
         update_annotation(session, annotation.id, verdict=None)
 
 
-def return_copy(session: Session, annotation: IndependentAnnotation) -> None:
+def reopen_copy(session: Session, annotation: IndependentAnnotation) -> None:
     """Let the person of a submitted copy go on with it; the caller logs who returned it, and why.
 
     What was compared with it waits for no decision any more.

@@ -26,16 +26,20 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
-from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
+from app.features.datasets.queries import (
+    list_unused_calibrations,
+    list_unused_frame_files,
+    list_unused_uploads,
+)
 from app.features.datasets.service import list_datasets
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import (
     StateSnapshot,
-    all_groups,
-    all_stations,
+    iterate_groups,
+    iterate_stations,
     read_state_snapshot,
 )
-from app.features.guidelines.queries import GUIDELINE, all_guidelines
+from app.features.guidelines.queries import GUIDELINE, list_all_guidelines
 from app.features.integrity.records import (
     DELETED,
     examine_computed,
@@ -64,7 +68,7 @@ def examine_guidelines(session: Session, restore: str) -> Check:
     logged = _logged_guidelines(session)
     present = {
         (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
-        for row in all_guidelines(session)
+        for row in list_all_guidelines(session)
     }
     return compare_with_log("guidelines", logged, present, restore, _guideline_name)
 
@@ -169,11 +173,11 @@ def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -
 def _check_digests(session: Session) -> Check:
     """Whether cameras, views and groups have the digests by which solutions and edits know them."""
     count, apart = 0, list[str]()
-    for station in all_stations(session):
+    for station in iterate_stations(session):
         count += 1
         if station.digest != station_digest(station.station):
             apart.append(f"camera {station.id}")
-    for group in all_groups(session):
+    for group in iterate_groups(session):
         count += 1
         views = {view.key: view_digest(view) for view in group.group.views}
         hashed = group_inputs_hash(group.group, paint_to_json(group.group.paint))
@@ -424,20 +428,20 @@ def _check_leftovers(settings: Settings) -> Check:
 
 
 def _check_calibrations(session: Session) -> Check:
-    count = len(unused_calibrations(session))
+    count = len(list_unused_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
     return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
 def _check_uploads(session: Session, settings: Settings) -> Check:
-    found = unread_uploads(session, settings)
+    found = list_unused_uploads(session, settings)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return Check("uploads", True, sentence, mend)
 
 
 def _check_recordings(session: Session, settings: Settings) -> Check:
-    found = unused_frames(session, settings)
+    found = list_unused_frame_files(session, settings)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
     mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
     return Check("recordings", True, sentence, mend)

@@ -104,7 +104,7 @@ def transfer(
     (uploads, exports) stay where they are. Everybody on the machine can read what is typed here: an
     address with a password stands in a file, or the password in ~/.pgpass.
     """
-    from app.features.integrity.transfer import settings_of_both_databases
+    from app.features.integrity.transfer import make_settings_of_both_databases
     from app.features.integrity.transfer import transfer_database as run_transfer
 
     settings = read_settings()
@@ -116,7 +116,7 @@ def transfer(
         printed.add(table)
 
     done = run_transfer(
-        *settings_of_both_databases(source, target, settings), tell, replace_null=replace_null
+        *make_settings_of_both_databases(source, target, settings), tell, replace_null=replace_null
     )
     if json_:
         print_json(vars(done))

@@ -52,7 +52,7 @@ _PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
 """In the address of a database, as its driver reads it."""
 
 
-def settings_of_both_databases(
+def make_settings_of_both_databases(
     source: str, target: str, settings: Settings
 ) -> tuple[Settings, Settings]:
     """Settings of the database that is copied, and of the one that it is copied to.

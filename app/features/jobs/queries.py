@@ -14,7 +14,7 @@ from app.db.dialects.dialect import json_member
 from app.db.json_columns import Json, parse
 from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility, columns_shown
 from app.json_text import canonical, finite
 from app.soccer.choices import JobState
@@ -119,7 +119,7 @@ class NewJob:
 
 def insert_job(session: Session, job: NewJob) -> int:
     """Insert a job that waits; returns its id."""
-    identity = next_id(session, JobModel)
+    identity = find_next_row_id(session, JobModel)
     values = {
         "id": identity,
         "kind": job.kind,

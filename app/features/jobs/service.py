@@ -24,7 +24,7 @@ from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, OverloadedError, StorageError
-from app.features.audit.service import note_job
+from app.features.audit.service import log_job_request
 from app.features.jobs.queries import (
     CANCELLED,
     DONE,
@@ -163,7 +163,7 @@ class Jobs(JobRecords):
                 self._require_queue_room(session, actor)
             job = need_job(session, insert_job(session, new) if known is None else known)
             if known is None:
-                note_job(session, actor, job.id, kind, title, dataset_id)
+                log_job_request(session, actor, job.id, kind, title, dataset_id)
             then(session, job)
             if known is None:
                 enter(JobRun(work, JobProgress(job, self._closing)))

@@ -21,7 +21,7 @@ from app.db.recovery.preopen_check import log_file
 from app.db.session import text_of
 from app.db.store import Store
 from app.errors import ReviewError
-from app.features.datasets.queries import expire_cache
+from app.features.datasets.queries import delete_expired_cache_entries
 from app.features.datasets.service import delete_unused_calibrations
 from app.features.exports.jobs import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
@@ -72,7 +72,7 @@ def clean_up(store: Store, wanted: Callable[[], bool] = lambda: True) -> Cleanup
         "answers": lambda: _shorten_responses(store),
         "jobs": lambda: _forget_jobs(store),
         "uploads": lambda: expire_uploads(settings),
-        "cached": lambda: expire_cache(settings),
+        "cached": lambda: delete_expired_cache_entries(settings),
         "leftovers": lambda: delete_leftovers(settings),
         "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
         "expired_exports": lambda: ExportFolder(settings.exports).expire(settings.export_days),

@@ -16,8 +16,8 @@ from app.features.datasets.service import DatasetHead, need_dataset, read_datase
 from app.features.groups.edit import SetStationCamera
 from app.features.groups.queries import read_groups
 from app.features.groups.undo_stacks import read_station_stacks
-from app.features.groups.view_queries import station_pitches
-from app.features.imports.queries import known_groups, shared_stations
+from app.features.groups.view_queries import list_station_pitches
+from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.stations.service import StationState, load_station, submit_stations, undo_stations
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
@@ -117,8 +117,8 @@ def load_adjustable_cameras(
     """
     with store.read() as session:
         found = read_dataset_head(session, need_dataset(session, dataset))
-        stations = [item.id for item in shared_stations(session, found.id)]
-        pitches = {pitch for _, pitch in station_pitches(session, found.id)}
+        stations = [item.id for item in list_shared_stations(session, found.id)]
+        pitches = {pitch for _, pitch in list_station_pitches(session, found.id)}
     states = [load_station(store, station) for station in stations]
     if len(states) < 2:
         raise InputError(
@@ -178,7 +178,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
     datasets = {state.dataset_id for state in proposed.stations.values()}
 
     def check(session: Session) -> None:
-        found = {pitch for item in datasets for _, pitch in station_pitches(session, item)}
+        found = {pitch for item in datasets for _, pitch in list_station_pitches(session, item)}
         if found != {proposed.pitch}:
             raise ConflictError(
                 "the size of the pitch has changed since that proposal",
@@ -198,7 +198,7 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
         found = need_dataset(session, dataset)
         adjusted = [
             item.id
-            for item in shared_stations(session, found)
+            for item in list_shared_stations(session, found)
             if item.station.given_covariance is not None and _was_adjusted_last(session, item.id)
         ]
     if not adjusted:
@@ -283,7 +283,7 @@ def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:
 
 def _rig_frames(session: Session, dataset_id: int) -> list[RigFrame]:
     """Every instant of a dataset that at least two static cameras show the ball in."""
-    known = known_groups(session, dataset_id)
+    known = list_known_groups(session, dataset_id)
     numbered = all(item.key.isascii() and item.key.isdigit() for item in known)
     frames = []
     for start in range(0, len(known), CHUNK):

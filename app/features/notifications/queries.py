@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, literal, select, upd
 from app.db.session import Session
 from app.features.comments.queries import NotificationModel
 from app.features.datasets.tables import DatasetModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import Visibility, seen_anywhere
 from app.json_text import Moment
 
@@ -52,7 +52,7 @@ class Notification:
 
 def insert_notification(session: Session, person_id: int, values: dict[str, Any]) -> int:
     """Tell a person of something; returns its id."""
-    identity = next_id(session, NotificationModel)
+    identity = find_next_row_id(session, NotificationModel)
     session.execute(insert(NotificationModel), {"id": identity, "person_id": person_id, **values})
     return identity
 

@@ -121,10 +121,12 @@ def agree(
     json_: Json = False,
 ) -> None:
     """How well cameras agree with the paint of their pictures; needs no lines."""
-    from app.features.file_tools.paint import agree_files
+    from app.features.file_tools.paint import measure_paint_agreement_of_files
 
     with show_progress("Reading paint") as progress:
-        rows = agree_files(cameras, images, settings=read_settings(), progress=progress)
+        rows = measure_paint_agreement_of_files(
+            cameras, images, settings=read_settings(), progress=progress
+        )
     _print_rows(rows, json_)
 
 

@@ -18,7 +18,7 @@ from app.features.datasets.service import DatasetHead, need_dataset, require_mat
 from app.features.groups.pictures import UNREADABLE, PictureTask, ProposalTask, read_proposal
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.state import read_group_head
-from app.features.groups.view_paint import nearby_cameras_of_match
+from app.features.groups.view_paint import list_nearby_cameras
 from app.features.paint.proposal_queries import (
     MatchProposals,
     delete_proposals,
@@ -188,7 +188,7 @@ def _make_tasks(
         old = read_proposals(session, [view for views in views_by_group.values() for view in views])
         for stored in read_groups(session, list(views_by_group), extras=False).values():
             # The replays of a group look from elsewhere, but its main camera may be known, too.
-            known = nearby_cameras_of_match(session, stored)
+            known = list_nearby_cameras(session, stored)
             for key, number in stored.view_ids.items():
                 if number in views_by_group[stored.id]:
                     tasks.append(_make_task(stored, key, known, dataset, old.get(number)))

@@ -10,7 +10,12 @@ from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.schemas import LineDocuments, LineEdits, lines_document, points_by_marking
+from app.features.groups.schemas import (
+    LineDocuments,
+    LineEdits,
+    lines_to_document,
+    points_by_marking,
+)
 from app.features.groups.view_paint import (
     ViewPaintRequest,
     make_paint_request,
@@ -127,7 +132,7 @@ class ProposalDocument(Document):
     @classmethod
     def of(cls, found: ViewProposal) -> ProposalDocument:
         """The document of a proposal."""
-        return cls.model_validate({**vars(found), "lines": lines_document(found.lines)})
+        return cls.model_validate({**vars(found), "lines": lines_to_document(found.lines)})
 
 
 class DatasetProposalsDocument(ListDocument[MatchProposals]):
@@ -173,7 +178,7 @@ class GroupProposal(ProposalDocument):
         shown = cls.model_fields.keys() - {"view", "key", "open"}
         values: dict[str, Any] = {name: getattr(found, name) for name in shown}
         values |= {"view": found.view_id, "key": key, "open": is_open}
-        return cls.model_construct(**{**values, "lines": lines_document(found.lines)})
+        return cls.model_construct(**{**values, "lines": lines_to_document(found.lines)})
 
 
 class GroupProposals(ListDocument[GroupProposal]):

@@ -16,9 +16,9 @@ from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.queries import (
     find_dataset,
-    owner_of_job,
-    owning_dataset_id,
-    versions_like,
+    find_job_owner,
+    find_owning_dataset,
+    find_versions_by_text,
 )
 from app.features.imports.upload_queries import get_upload
 from app.features.people.roles import DatasetRoles, Role
@@ -131,7 +131,7 @@ def find_ownership(store: Store, named: NamedResource, visibility: Visibility) -
             return find(session, named.by, visibility)
         if not isinstance(named.by, int):
             return None
-        dataset = owning_dataset_id(session, named.kind.value, named.by)
+        dataset = find_owning_dataset(session, named.kind.value, named.by)
     return None if dataset is None else Ownership(dataset)
 
 
@@ -144,7 +144,7 @@ def _ownership_of_dataset(
 
 def _ownership_of_job(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
     number = _parse_id(named)
-    row = None if number is None else owner_of_job(session, number)
+    row = None if number is None else find_job_owner(session, number)
     return None if row is None else Ownership(row.dataset_id, frozenset({row.actor}))
 
 
@@ -152,7 +152,7 @@ def _ownership_of_version(
     session: Session, named: str | int, visibility: Visibility
 ) -> Ownership | None:
     """By id, name or hash, among the datasets that somebody sees."""
-    rows = versions_like(session, str(named))
+    rows = find_versions_by_text(session, str(named))
     every = find_versions(rows, str(named))
     seen = find_versions([row for row in rows if visibility.sees(row.dataset_id)], str(named))
     if len(seen) == 1:

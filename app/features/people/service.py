@@ -10,8 +10,8 @@ from typing import Any
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.datasets.queries import dataset_names, find_dataset
-from app.features.independent_annotations.queries import copy_dataset_ids
+from app.features.datasets.queries import find_dataset, read_dataset_names
+from app.features.independent_annotations.queries import list_copy_dataset_ids
 from app.features.people.links import Link, insert_new
 from app.features.people.login_queries import (
     count_access_tokens,
@@ -325,7 +325,7 @@ def read_single_roles(store: Store, roles: DatasetRoles) -> list[SingleRole]:
     if not roles.single:
         return []
     with store.read() as session:
-        names, copies = dataset_names(session), copy_dataset_ids(session)
+        names, copies = read_dataset_names(session), list_copy_dataset_ids(session)
     seen = {
         key: role
         for key, role in roles.single.items()

@@ -19,7 +19,7 @@ from app.errors import InputError
 from app.features.datasets.service import need_dataset, read_dataset_head, save_policy
 from app.features.groups.group_edits import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
-from app.features.independent_annotations.queries import is_copy
+from app.features.independent_annotations.queries import is_copy_dataset
 from app.features.match_estimates.queries import Factor, Factors, noise_factor, read_factors
 from app.features.policies.service import (
     CUSTOM,
@@ -178,7 +178,7 @@ def is_followed(store: Store, dataset: str | int) -> bool:
     """
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return found.policy.noise == ESTIMATED and not is_copy(session, found.id)
+        return found.policy.noise == ESTIMATED and not is_copy_dataset(session, found.id)
 
 
 def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import delete_dataset, insert_dataset
-from app.features.imports.queries import known_groups
+from app.features.imports.queries import list_known_groups
 from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
@@ -241,7 +241,7 @@ def require_own_recording(store: Store, person: str | None) -> None:
     name = recording_practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
-        groups = 0 if row is None else len(known_groups(session, row.id))
+        groups = 0 if row is None else len(list_known_groups(session, row.id))
     if row is None:
         return
     is_empty = not groups and not list_recordings(store, int(row.id))

@@ -16,7 +16,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.state import GroupState, read_states
-from app.features.imports.queries import known_groups
+from app.features.imports.queries import list_known_groups
 from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
@@ -267,7 +267,7 @@ def _group_ids(store: Store, name: str) -> list[int]:
         row = find_dataset(session, name)
         if row is None:
             return []
-        return [group.id for group in known_groups(session, row.id)]
+        return [group.id for group in list_known_groups(session, row.id)]
 
 
 def _is_ordinary(row: Any, person: str | None) -> bool:
@@ -287,7 +287,7 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
                 f'"{name}" is the name of an ordinary dataset',
                 hint="Your practice needs that name. Ask an admin to rename or delete the dataset.",
             )
-        keys = {group.key for group in known_groups(session, row.id)}
+        keys = {group.key for group in list_known_groups(session, row.id)}
     known = _read_truths(settings)
     if keys and not keys <= set(known or ()):
         raise ConflictError(

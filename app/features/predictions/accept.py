@@ -21,10 +21,10 @@ from app.features.groups.state import GroupState, content_tag_from_etag, require
 from app.features.groups.submit import load, submit
 from app.features.groups.view_queries import (
     StoredView,
-    dataset_views,
+    find_dataset_of_group,
     find_view,
-    group_dataset,
-    group_views,
+    list_dataset_views,
+    list_group_views,
 )
 from app.features.predictions.queries import (
     PredictedBox,
@@ -247,7 +247,7 @@ def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
 
 def _read_views(session: Session, dataset_id: int, request: AcceptRequest) -> list[StoredView]:
     conditions = () if request.query is None else parse_query(request.query).conditions
-    return dataset_views(session, dataset_id, conditions, ids=request.views)
+    return list_dataset_views(session, dataset_id, conditions, ids=request.views)
 
 
 def _judge_box(
@@ -360,7 +360,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        dataset = group_dataset(session, group_id)
+        dataset = find_dataset_of_group(session, group_id)
         if dataset is None:
             raise NotFoundError.group(group_id)
         boxes = _pair_with_sets(session, read_group_boxes(session, group_id))
@@ -383,7 +383,7 @@ def _pair_with_sets(
 def _list_accepted_balls(
     session: Session, group_id: int
 ) -> Iterator[tuple[StoredView, BallAnnotation]]:
-    for view in group_views(session, group_id):
+    for view in list_group_views(session, group_id):
         yield from ((view, ball) for ball in view.balls if ball.predicted_by)
 
 

@@ -24,7 +24,7 @@ from app.db.store import Store
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
 from app.features.datasets.service import read_dataset_head, require_name
-from app.features.groups.view_queries import StoredView, dataset_views
+from app.features.groups.view_queries import StoredView, list_dataset_views
 from app.features.predictions.queries import PredictionSet
 from app.features.predictions.service import LISTED, frame_names, require_free, save_predictions
 from app.features.queue.query import parse_query
@@ -380,7 +380,7 @@ def run_detector(
 
 def _read_views(session: Session, dataset_id: int, request: DetectRequest) -> list[StoredView]:
     conditions = parse_query(request.query).conditions
-    return dataset_views(session, dataset_id, conditions, without_ball=request.missing)
+    return list_dataset_views(session, dataset_id, conditions, without_ball=request.missing)
 
 
 def _read_frame(row: StoredView, settings: Settings) -> Any:

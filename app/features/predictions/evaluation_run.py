@@ -14,7 +14,7 @@ from app.evaluation.evaluate import EvaluationInputs, EvaluationOptions, evaluat
 from app.evaluation.frame import Detection, Frame
 from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.groups.view_queries import StoredView, dataset_views
+from app.features.groups.view_queries import StoredView, list_dataset_views
 from app.features.predictions.evaluation import read_evaluation, track_evaluation
 from app.features.predictions.frames import (
     LIVE_RULES,
@@ -52,7 +52,7 @@ def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
     found = read_boxes(session, careful.id)
     several = {view for view, boxes in found.items() if len(boxes) > 1}
     if several:
-        rows = dataset_views(session, careful.dataset_id)
+        rows = list_dataset_views(session, careful.dataset_id)
         names = [_frame_name(row) for row in rows if row.id in several]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(

@@ -12,7 +12,7 @@ from app.errors import ConflictError, InputError
 from app.evaluation.frame import Frame
 from app.features.datasets.service import DatasetHead
 from app.features.groups.state import read_states
-from app.features.groups.view_queries import present_ids
+from app.features.groups.view_queries import find_group_and_view_ids
 from app.features.versions.membership import read_candidates, require_solved
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
@@ -52,7 +52,9 @@ def version_truth(session: Session, version: Version, split: str | None) -> Eval
     gone = 0
     for start in range(0, len(rows), BATCH):
         frozen = read_frozen_groups(session, version, rows[start : start + BATCH])
-        ids = present_ids(session, version.dataset_id, [item.group.key for item in frozen])
+        ids = find_group_and_view_ids(
+            session, version.dataset_id, [item.group.key for item in frozen]
+        )
         for item in frozen:
             for frame in _frozen_frames(item, ids.get(item.group.key, (0, {})), len(frames)):
                 if split is None or frame.split == split:

@@ -13,7 +13,7 @@ from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import DatasetModel, ViewModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import columns_shown
 from app.features.predictions.tables import (
     EvaluationFrameModel,
@@ -129,7 +129,7 @@ def insert_prediction_set(
         cameras: By id of the view.
         tracks: By stretch.
     """
-    identity = next_id(session, PredictionSetModel)
+    identity = find_next_row_id(session, PredictionSetModel)
     row = {**values, "id": identity, "report": canonical(values["report"])}
     session.execute(insert(PredictionSetModel), [row])
     names = ("x", "y", "width", "height", "score")
@@ -275,7 +275,7 @@ def insert_evaluation(
         figures: By name.
         frames: Dataclasses whose fields are columns of ``EvaluationFrameModel``, in order.
     """
-    identity = next_id(session, EvaluationModel)
+    identity = find_next_row_id(session, EvaluationModel)
     texts = {name: canonical(values[name]) for name in ("pins", "counts", "tables")}
     row = {**values, **texts, "id": identity, "figures": pack(dict(figures))}
     session.execute(insert(EvaluationModel), [row])

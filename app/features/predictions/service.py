@@ -21,7 +21,7 @@ from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, list_unknown_frames
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_name
-from app.features.groups.view_queries import dataset_views
+from app.features.groups.view_queries import list_dataset_views
 from app.features.predictions.queries import PredictedBox as PredictedBox
 from app.features.predictions.queries import PredictionSet as PredictionSet
 from app.features.predictions.queries import (
@@ -152,7 +152,7 @@ def save_predictions(
                 return known
             values["name"] = name = _free_name(name, {item.name for item in own})
         require_free(session, found.id, name)
-        present = {row.id for row in dataset_views(session, found.id)}
+        present = {row.id for row in list_dataset_views(session, found.id)}
         identity = insert_prediction_set(
             session,
             {**values, "dataset_id": found.id},
@@ -169,7 +169,7 @@ def save_predictions(
 def frame_names(store: Store, dataset: str | int) -> FrameNames:
     """The frames of a dataset by every name that a file may give them."""
     with store.read() as session:
-        rows = dataset_views(session, read_dataset_head(session, dataset).id)
+        rows = list_dataset_views(session, read_dataset_head(session, dataset).id)
     return FrameNames.of(
         NamedFrame(
             id=row.id,

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from app.db.log import newest_entry
 from app.db.session import Session
 from app.db.store import Store
-from app.features.datasets.queries import dataset_names
+from app.features.datasets.queries import read_dataset_names
 from app.features.groups.revision_queries import (
     StoredChange,
-    changes_after_entry,
-    groups_solved_after,
+    iterate_changes_after_entry,
+    list_groups_solved_after,
 )
 from app.features.groups.state import read_etags
 from app.features.solutions.queries import newest_solution
@@ -85,7 +85,7 @@ def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
     with store.read() as session:
         behind = newest_solution(session) - solution
         if behind > FAR:
-            names = dataset_names(session)
+            names = read_dataset_names(session)
             return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
         return read_solved(session, solution) if behind > 0 else []
 
@@ -106,9 +106,9 @@ def read_changes(session: Session, after: int) -> list[LoggedChange]:
     """What has changed since an entry of the log, each group once, in the order of the log."""
     newest = newest_entry(session)
     if newest - after > FAR:
-        names = dataset_names(session)
+        names = read_dataset_names(session)
         return [LoggedChange(newest, key, name, EVERYTHING, None) for key, name in names.items()]
-    return _add_names_and_etags(session, changes_after_entry(session, after))
+    return _add_names_and_etags(session, iterate_changes_after_entry(session, after))
 
 
 def read_solved(
@@ -118,7 +118,7 @@ def read_solved(
     skipped = set(known)
     found = [
         StoredChange(None, dataset_id, SOLVED, None, group_id)
-        for dataset_id, group_id in groups_solved_after(session, after)
+        for dataset_id, group_id in list_groups_solved_after(session, after)
         if group_id not in skipped
     ]
     return _add_names_and_etags(session, found)
@@ -131,7 +131,7 @@ def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> lis
     items = _newest_change_of_each_group(
         replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
     )
-    names = dataset_names(session)
+    names = read_dataset_names(session)
     # Of a dataset that is gone there is one thing to tell.
     ends = {item.dataset_id: item for item in items if item.dataset_id not in names}
     items = [item for item in items if ends.get(item.dataset_id, item) is item]

@@ -25,10 +25,10 @@ from sqlalchemy.sql.visitors import iterate
 
 from app.db.dialects.dialect import numbers_in
 from app.db.session import Session
-from app.features.agreement.queries import list_groups_in_states
-from app.features.batches.queries import groups_in_batches
-from app.features.comments.queries import groups_that_mention, groups_with_threads
-from app.features.independent_annotations.queries import groups_with_annotations
+from app.features.agreement.queries import select_groups_in_state
+from app.features.batches.queries import select_groups_in_batches
+from app.features.comments.queries import select_groups_with_mentions, select_groups_with_threads
+from app.features.independent_annotations.queries import select_groups_with_annotations
 from app.features.paint.proposal_queries import groups_with_open
 from app.features.people.visibility_queries import seen_anywhere, visible_groups_condition
 from app.features.policies.queries import judged_since
@@ -108,30 +108,30 @@ def has_open_proposal(outcome: str | None = None) -> Condition:
 
 def is_in_batch(ids: Iterable[int]) -> Condition:
     """The group is in one of these batches of work."""
-    return QueueModel.group_id.in_(groups_in_batches(list(ids)))
+    return QueueModel.group_id.in_(select_groups_in_batches(list(ids)))
 
 
 def has_thread(state: str | None = None) -> Condition:
     """People have said something to each other about it; in an ``open`` or ``resolved`` thread."""
-    return QueueModel.group_id.in_(groups_with_threads(state))
+    return QueueModel.group_id.in_(select_groups_with_threads(state))
 
 
 def mentions_person(name: str | None = None) -> Condition:
     """An open thread mentions somebody, or the person of a name."""
-    return QueueModel.group_id.in_(groups_that_mention(name))
+    return QueueModel.group_id.in_(select_groups_with_mentions(name))
 
 
 def has_annotations(op: str, number: float) -> Condition:
     """So many people have handed in an annotation of their own; most groups have none."""
     if not _COMPARED[op](0, number):
-        return QueueModel.group_id.in_(groups_with_annotations(_COMPARED[op], number))
+        return QueueModel.group_id.in_(select_groups_with_annotations(_COMPARED[op], number))
     # The few that are not meant are looked up, instead of the many that are.
-    return QueueModel.group_id.not_in(groups_with_annotations(_NOT[op], number))
+    return QueueModel.group_id.not_in(select_groups_with_annotations(_NOT[op], number))
 
 
 def has_outcome(state: str) -> Condition:
     """Its annotations were compared, in some batch, and came to that."""
-    return QueueModel.group_id.in_(list_groups_in_states(state))
+    return QueueModel.group_id.in_(select_groups_in_state(state))
 
 
 def any_of(conditions: Iterable[Condition]) -> Condition:

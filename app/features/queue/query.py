@@ -21,7 +21,7 @@ from difflib import get_close_matches
 from hashlib import sha256
 
 from app.errors import InputError
-from app.features.batches.queries import place_column
+from app.features.batches.queries import batch_place_column
 from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.features.queue.queries import Condition, RowOrder
@@ -69,7 +69,7 @@ class Query:
     def order(self) -> RowOrder:
         """The order in which it lists groups."""
         if self.batch is not None:
-            return RowOrder(place_column(self.batch))
+            return RowOrder(batch_place_column(self.batch))
         # "newest" says the direction itself.
         return RowOrder(SORTS[self.sort], self.descending != (self.sort == "newest"))
 

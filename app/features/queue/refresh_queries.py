@@ -27,9 +27,9 @@ from app.features.datasets.tables import (
 )
 from app.features.findings.queries import (
     GroupDismissals,
-    dismissed_kinds,
     findings_from_rows,
     read_import_findings,
+    split_open_and_dismissed_kinds,
 )
 from app.features.groups.queries import StoredGroup
 from app.features.people.visibility_queries import shown_actor
@@ -185,7 +185,7 @@ def _findings_by_dismissal(
     for group, dismissed in dismissals.items():
         solved = solutions.get(group)
         found = [*(() if solved is None else solved.findings), *noticed[group]]
-        opened, closed = dismissed_kinds(found, dismissed)
+        opened, closed = split_open_and_dismissed_kinds(found, dismissed)
         checked[group] = {
             "findings": _comma_separated(opened),
             "dismissed": _comma_separated(closed),

@@ -13,7 +13,7 @@ from app.features.datasets.service import dataset_id
 from app.features.findings.service import GroupFindings
 from app.features.groups import submit
 from app.features.groups.history import STATION_EDITS
-from app.features.groups.schemas import image_address
+from app.features.groups.schemas import url_of_image
 from app.features.groups.solution_schemas import (
     XY,
     DismissedDocument,
@@ -25,7 +25,7 @@ from app.features.groups.solution_schemas import (
     OfferDocument,
 )
 from app.features.groups.submit import find_view
-from app.features.groups.suggested_edits import MarkingInfluence, marking_influences
+from app.features.groups.suggested_edits import MarkingInfluence, measure_marking_influences
 from app.features.groups.suggestions import Suggestion, find_suggestions
 from app.features.people.visibility_queries import is_blind
 from app.features.queue.fields import FIELDS, ORDERS, FieldKind
@@ -74,7 +74,7 @@ def thumbnail_address(view_id: int | None) -> str | None:
     """Where the small picture of a group's main view is served."""
     if view_id is None:
         return None
-    return f"{image_address(view_id)}?width={THUMBNAIL_WIDTH}"
+    return f"{url_of_image(view_id)}?width={THUMBNAIL_WIDTH}"
 
 
 class GroupRow(Document):
@@ -473,5 +473,5 @@ def get_influence(view: Id, store: AppStore) -> Influences:
     found = find_view(store, view)
     state = submit.load(store, found.group_id)
     seen = next(item for item in state.group.views if state.view_ids[item.key] == view)
-    items = marking_influences(seen.station, state.group.pitch, state.policy.calibration)
+    items = measure_marking_influences(seen.station, state.group.pitch, state.policy.calibration)
     return Influences(items=items)

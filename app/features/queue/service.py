@@ -15,7 +15,7 @@ import numpy as np
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.agreement.queries import read_group_states
-from app.features.comments.queries import count_open
+from app.features.comments.queries import count_open_threads
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
 from app.features.queue.queries import Key, Listing, find_place, read_rows
@@ -204,7 +204,7 @@ def list_groups(
             rows = listing.rows_after(order, keys, limit + 1)
             more = len(rows) > limit
         ids = [row.group_id for row in rows[:limit]]
-        comments, annotations = count_open(session, ids), count_submitted(session, ids)
+        comments, annotations = count_open_threads(session, ids), count_submitted(session, ids)
         states = read_group_states(session, list(annotations)) if annotations else {}
     rows = rows[:limit]
     following = encode(parsed, order.keys_of(rows[-1])) if more else None

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.file_tools.track import frame_row
+from app.features.file_tools.track import frame_to_row
 from app.features.groups.schemas import PitchSize
 from app.features.recordings.cameras import CameraSummary
 from app.http.documents import Document, ListDocument
@@ -134,7 +134,7 @@ class FrameCamerasDocument(Document):
     @staticmethod
     def of(frames: list[FrameCamera], pitch: Pitch) -> FrameCamerasDocument:
         """The document of cameras."""
-        rows = [frame_row(frame) for frame in frames]
+        rows = [frame_to_row(frame) for frame in frames]
         first = next((frame.camera for frame in frames if frame.camera is not None), None)
         size = frames[0].size
         columns = {

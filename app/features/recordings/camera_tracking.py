@@ -17,7 +17,7 @@ from app.durable import replace_file
 from app.errors import ConflictError, InputError, StorageError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import get_dataset_head
-from app.features.file_tools.track import count_outcomes, pitch_row
+from app.features.file_tools.track import count_outcomes, pitch_to_row
 from app.features.pitches.queries import edited_pitches
 from app.features.recordings.cameras import (
     CameraSummary,
@@ -245,7 +245,7 @@ def track_stretch(
     total = last - first + 1
     found = track_clip(clip, usable, pitch, policy, tell)
     unusable = tuple(sorted(set(lines) - set(usable)))
-    return Tracked(found.frames, unusable, pitch=pitch_row(found.shown, on_shown=False))
+    return Tracked(found.frames, unusable, pitch=pitch_to_row(found.shown, on_shown=False))
 
 
 def save_cameras(

@@ -20,7 +20,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.file_tools.camera_export import export_cameras
-from app.features.file_tools.track import frame_row, write_cameras
+from app.features.file_tools.track import frame_to_row, write_cameras
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.cameras import GivenCamera, NamedStation, attach_cameras
 from app.features.imports.ingest import IngestReport
@@ -264,7 +264,7 @@ def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, byt
         write_cameras(
             folder,
             frames,
-            {"frames": [frame_row(frame) for frame in frames], "pitch": found.summary.pitch},
+            {"frames": [frame_to_row(frame) for frame in frames], "pitch": found.summary.pitch},
         )
         if form == "npz":
             export_cameras(folder, out, form)

@@ -18,9 +18,9 @@ from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
-from app.features.file_tools.track import frame_row
+from app.features.file_tools.track import frame_to_row
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.imports.ingest import BATCH, ImportOrigin, IngestReport, ingest_batch
+from app.features.imports.ingest import BATCH, ImportOrigin, IngestReport, import_group_batch
 from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import linked_frames
@@ -162,7 +162,7 @@ def take_instants(
     groups = _groups(store, live, replays.of, there)
     while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
-            ingest_batch(session, origin, batch, report, set())
+            import_group_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]
@@ -308,7 +308,7 @@ def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dic
 
 def _given_by_track(frame: FrameCamera) -> dict[str, Any]:
     """What the tracker says of the camera that it gives a frame."""
-    row = frame_row(frame)
+    row = frame_to_row(frame)
     names = ("outcome", "keyframe", "supported", "explained", "error_px", "sigma")
     return {"source": SOURCE, **{name: row[name] for name in names}}
 

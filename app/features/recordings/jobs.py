@@ -13,7 +13,7 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import TooLargeError
-from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.imports.upload_queries import get_upload, save_upload, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, left_to_next_server
@@ -63,7 +63,7 @@ def request_recording(
     path = _path_of(settings, source)
     if "upload" in source:
         # It is read where it is, so it stays.
-        keep_upload(settings, source["upload"])
+        save_upload(settings, source["upload"])
     recording = add_recording(store, dataset, path, actor=actor)
     return request_index(jobs, store, recording, actor=actor)
 

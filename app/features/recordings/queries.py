@@ -11,7 +11,7 @@ from sqlalchemy.orm import aliased
 
 from app.db.session import Session, now
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import columns_shown, shown_actor
 from app.features.predictions.tables import PredictionModel
 from app.features.recordings.tables import (
@@ -112,7 +112,7 @@ def matches_of_video(session: Session, dataset_id: int, sha256: str) -> list[str
 
 def insert_recording(session: Session, dataset_id: int, name: str, path: str, *, actor: str) -> int:
     """Insert a recording that is not indexed yet; returns its id."""
-    identity = next_id(session, RecordingModel)
+    identity = find_next_row_id(session, RecordingModel)
     values = {"id": identity, "dataset_id": dataset_id, "name": name, "path": path}
     empty = {"stamp": None, "sha256": None, "facts": None, "shots": "[]", "revision": 0}
     empty |= {"clocks": None}
@@ -177,7 +177,7 @@ def delete_overlapping(session: Session, recording_id: int, first: int, last: in
 
 def insert_cameras(session: Session, **values: Any) -> None:
     """Insert the cameras of a stretch."""
-    row = {"id": next_id(session, ShotCamerasModel), "created": now(), **values}
+    row = {"id": find_next_row_id(session, ShotCamerasModel), "created": now(), **values}
     session.execute(insert(ShotCamerasModel), [row])
 
 
@@ -202,7 +202,7 @@ def find_run(session: Session, run_id: int) -> Any | None:
 
 def insert_run(session: Session, actor: str, **values: Any) -> int:
     """Insert a run; returns its id."""
-    identity = next_id(session, BallRunModel)
+    identity = find_next_row_id(session, BallRunModel)
     new = {"groups": "{}", "confirmed": "[]", "accepted_by": None, "revision": 0}
     row = {"id": identity, **values, **new, "actor": actor, "created": now()}
     session.execute(insert(BallRunModel), [row])
@@ -270,7 +270,7 @@ def find_link(session: Session, link_id: int) -> Any | None:
 
 def insert_link(session: Session, actor: str, **values: Any) -> int:
     """Insert a link; returns its id."""
-    identity = next_id(session, ShotLinkModel)
+    identity = find_next_row_id(session, ShotLinkModel)
     row = {"id": identity, **values, "revision": 0, "actor": actor, "created": now()}
     session.execute(insert(ShotLinkModel), [row])
     return identity

@@ -8,7 +8,7 @@ from sqlalchemy import ForeignKey, UniqueConstraint, delete, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session, now
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import shown_actor
 
 
@@ -45,7 +45,7 @@ def find_saved_view(session: Session, view_id: int) -> SavedViewModel | None:
 
 def insert_saved_view(session: Session, dataset_id: int, *, actor: str, **values: str) -> int:
     """Insert a saved view with the values of its columns; returns its id."""
-    identity = next_id(session, SavedViewModel)
+    identity = find_next_row_id(session, SavedViewModel)
     row = {"id": identity, "dataset_id": dataset_id, "actor": actor, "created": now(), **values}
     session.execute(insert(SavedViewModel), [row])
     return identity

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.datasets.service import checked_title
+from app.features.datasets.service import strip_and_check_title
 from app.features.people.visibility_queries import sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.features.queue.queries import Listing
@@ -64,7 +64,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
         InputError: There is no name, or the query cannot be understood.
         ConflictError: The name is taken; nobody's view is replaced unseen.
     """
-    name = checked_title(name, "a saved view")
+    name = strip_and_check_title(name, "a saved view")
     parse_query(q)
     with store.write() as session:
         rows = dataset_saved_views(session, dataset_id)

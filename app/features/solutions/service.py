@@ -20,7 +20,7 @@ from app.features.datasets.service import (
     read_dataset_head,
 )
 from app.features.groups.queries import read_groups
-from app.features.groups.view_queries import read_stations, station_pitches
+from app.features.groups.view_queries import list_station_pitches, read_stations
 from app.features.policies.queries import policy_history
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import (
@@ -393,6 +393,6 @@ def _static_cameras_with_pitches(
     session: Session, dataset_id: int
 ) -> Iterable[tuple[Station, Pitch]]:
     """Static cameras with each size of pitch that their groups have."""
-    places = station_pitches(session, dataset_id)
+    places = list_station_pitches(session, dataset_id)
     stations = read_stations(session, {station for station, _ in places})
     return [(stations[station].station, pitch) for station, pitch in places]

@@ -107,10 +107,10 @@ def findings(dataset: Dataset, json_: Json = False) -> None:
         with connect_to_server(server) as client:
             values = list(remote.finding_values(client, dataset))
     else:
-        from app.features.findings.service import finding_values
+        from app.features.findings.service import iterate_findings_as_json
 
         with opened_store() as store:
-            values = list(finding_values(store, dataset))
+            values = list(iterate_findings_as_json(store, dataset))
     if json_:
         print_json(values)
         return

@@ -12,7 +12,7 @@ from typing import TypeVar
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
-from app.features.datasets.queries import dataset_name, group_ids
+from app.features.datasets.queries import group_ids, read_dataset_name
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
@@ -144,7 +144,7 @@ def request_solve(
     ``edited``: by an edit, with which no noise is estimated anew.
     """
     with store.read() as session:
-        name = dataset_name(session, dataset_id)
+        name = read_dataset_name(session, dataset_id)
     return jobs.submit(
         KIND,
         title or f"Solve {name}",

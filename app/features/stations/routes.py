@@ -20,7 +20,7 @@ from app.features.groups.schemas import (
     LinesEdit,
     StationEdit,
     group_response,
-    lines_document,
+    lines_to_document,
 )
 from app.features.groups.state import GroupState
 from app.features.groups.submit import solve_and_keep
@@ -93,7 +93,7 @@ class StationDetail(BaseModel):
                 "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
                 "has_given": station.given is not None,
                 "has_given_covariance": station.given_covariance is not None,
-                "lines": lines_document(station.lines),
+                "lines": lines_to_document(station.lines),
                 "groups": len(state.groups),
             }
         )

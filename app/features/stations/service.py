@@ -11,7 +11,7 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.datasets.queries import dataset_name
+from app.features.datasets.queries import read_dataset_name
 from app.features.groups.edit import SetStationLines, StationEdit, with_station
 from app.features.groups.edit_codec import (
     edit_and_inverse_to_json,
@@ -30,7 +30,7 @@ from app.features.groups.state import (
 from app.features.groups.undo_stacks import read_station_stacks, undo_entry_body
 from app.features.groups.view_queries import (
     StoredStation,
-    groups_of_station,
+    list_groups_of_station,
     read_stations,
     save_station,
 )
@@ -249,11 +249,11 @@ def _read_state(session: Session, station_id: int) -> StationState:
     return StationState(
         id=stored.id,
         dataset_id=stored.dataset_id,
-        dataset=dataset_name(session, stored.dataset_id),
+        dataset=read_dataset_name(session, stored.dataset_id),
         revision=stored.revision,
         etag=station_etag(stored),
         station=stored.station,
-        groups=tuple(groups_of_station(session, station_id)),
+        groups=tuple(list_groups_of_station(session, station_id)),
         can_undo=stacks.can_undo,
         can_redo=stacks.can_redo,
         stored=stored,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.db.store import Store
-from app.features.batches.queries import list_batch_people, tracks_given
+from app.features.batches.queries import list_batch_people, list_batches_of_tracks
 from app.features.datasets.service import dataset_id
 from app.features.tracks.service import Track, list_tracks
 
@@ -62,7 +62,7 @@ def choose_tracks(store: Store, dataset: str | int, choice: TrackChoice) -> list
     """The tracks of a dataset that somebody asks for, in their order."""
     tracks = list_tracks(store, dataset)
     with store.read() as session:
-        given = tracks_given(session, dataset_id(store, dataset))
+        given = list_batches_of_tracks(session, dataset_id(store, dataset))
         ids = {batch for places in given.values() for batch, _ in places}
         people: dict[int, list[str]] = {batch: [] for batch in ids}
         for row in list_batch_people(session, sorted(ids)):

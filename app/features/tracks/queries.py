@@ -11,7 +11,7 @@ from sqlalchemy import Select, delete, insert, select, update
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.queue.tables import QueueModel
 from app.features.recordings.tables import BallRunModel, RecordingModel
 from app.features.tracks.tables import TrackModel
@@ -136,7 +136,7 @@ def read_bodies(session: Session, track_ids: Collection[int]) -> dict[int, Track
 
 def insert_track(session: Session, values: Mapping[str, Any]) -> int:
     """Insert a track; returns its id."""
-    identity = next_id(session, TrackModel)
+    identity = find_next_row_id(session, TrackModel)
     session.execute(insert(TrackModel), [{"id": identity, **values}])
     return identity
 

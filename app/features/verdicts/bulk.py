@@ -17,7 +17,7 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.independent_annotations.queries import closed_copies
+from app.features.independent_annotations.queries import list_closed_copies
 from app.features.people.visibility_queries import COPIES, sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.features.queue.queries import Listing, read_columns
@@ -259,7 +259,7 @@ def select_groups(
     """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
     reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
     change, refused = [], dict.fromkeys(reasons, 0)
-    closed = closed_copies(session, dataset_id) if dataset_id > COPIES else ()
+    closed = list_closed_copies(session, dataset_id) if dataset_id > COPIES else ()
     unsolved = _unsolved_groups(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
         if _has_verdict(row, verdict):

@@ -14,10 +14,10 @@ from sqlalchemy import Table, bindparam, case, func, insert, select, update
 from app.db.json_columns import parse
 from app.db.log import Entry, append
 from app.db.session import Session
-from app.features.batches.completion_queries import settle_judged
+from app.features.batches.completion_queries import complete_judged_groups
 from app.features.datasets.tables import GroupModel
-from app.features.groups.insert_queries import next_id
-from app.features.independent_annotations.submission_queries import judge_copy
+from app.features.groups.insert_queries import find_next_row_id
+from app.features.independent_annotations.submission_queries import record_copy_verdict
 from app.features.people.visibility_queries import COPIES, shown_actor, visible_groups_condition
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.json_text import json_text
@@ -138,7 +138,7 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[Ju
 
 def next_verdict_id(session: Session) -> int:
     """The id that the next verdict gets."""
-    return next_id(session, VerdictModel)
+    return find_next_row_id(session, VerdictModel)
 
 
 def insert_verdicts(
@@ -160,10 +160,10 @@ def insert_verdicts(
     append(session, entries)
     if dataset_id <= COPIES:
         states = {verdict.group_id: verdict.state for verdict in given}
-        settle_judged(session, states, actor=actor, at=at)
+        complete_judged_groups(session, states, actor=actor, at=at)
         return
     for row in rows:
-        judge_copy(session, row["group_id"], row["state"], actor=actor, at=at)
+        record_copy_verdict(session, row["group_id"], row["state"], actor=actor, at=at)
 
 
 def newest_verdict(session: Session) -> int:
@@ -244,7 +244,7 @@ def find_batch(session: Session, batch_id: int) -> StoredBulkVerdict | None:
 
 def insert_batch(session: Session, **values: Any) -> int:
     """Insert a batch, from fields of ``StoredBulkVerdict`` but its id; returns its id."""
-    identity = next_id(session, VerdictBatchModel)
+    identity = find_next_row_id(session, VerdictBatchModel)
     session.execute(insert(VerdictBatchModel), [{**_batch_columns(values), "id": identity}])
     return identity
 

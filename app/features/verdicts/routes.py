@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, BackgroundTasks, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool
 
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import FindingName, set_dismissal
 from app.features.groups.routes import CHANGED, CONFLICTS, load_document
@@ -178,7 +178,7 @@ def put_verdict(
         state = set_verdict(store, group, *values, if_match=if_match, actor=actor)
     # A verdict on an independent annotation of a group, and on nothing else, submits that.
     if state.is_copy:
-        background.add_task(after_submission, store, group, services.paint)
+        background.add_task(compare_or_adopt_submission, store, group, services.paint)
     return state
 
 

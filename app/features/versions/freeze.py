@@ -16,7 +16,12 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
+from app.features.datasets.service import (
+    DatasetHead,
+    join_licences,
+    read_dataset_head,
+    require_name,
+)
 from app.features.findings.queries import GroupDismissals, findings_from_rows, read_import_findings
 from app.features.groups.queries import read_groups
 from app.features.solutions.queries import (
@@ -228,7 +233,7 @@ class _FreezeRun:
         return {
             "dataset_id": dataset.id,
             "note": checked_note(request.note) or "",
-            "licence": request.licence.strip() or licence_text(self._matches(rows)),
+            "licence": request.licence.strip() or join_licences(self._matches(rows)),
             "created": now(),
             "actor": actor,
             "hash": version_hash(dataset.policy, SOLVER_VERSION, rows, self._tracks),

@@ -19,7 +19,7 @@ from app.db.json_columns import Json, parse, unpack
 from app.db.session import Base, Session, now
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import columns_shown
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
@@ -235,7 +235,7 @@ def insert_version(
     session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
 ) -> int:
     """Insert a version with its groups; returns its id."""
-    identity = next_id(session, VersionModel)
+    identity = find_next_row_id(session, VersionModel)
     previous = session.scalar(
         select(func.max(VersionModel.id)).where(VersionModel.dataset_id == values["dataset_id"])
     )

@@ -15,7 +15,7 @@ from app.db.json_columns import Json, parse
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session, now
 from app.features.batches.queries import count_work, find_batch, list_batch_people
-from app.features.datasets.queries import dataset_name
+from app.features.datasets.queries import read_dataset_name
 from app.features.jobs.queries import JobModel
 from app.features.webhooks.tables import DeliveryModel, WebhookModel
 from app.json_text import canonical
@@ -306,7 +306,7 @@ def announce(
     hooks = list_listeners(session, dataset_id, kind)
     if not hooks:
         return 0
-    data: dict[str, Json] = {"dataset": dataset_name(session, dataset_id), "actor": actor}
+    data: dict[str, Json] = {"dataset": read_dataset_name(session, dataset_id), "actor": actor}
     if batch_id is not None:
         data["batch"] = batch_values(session, batch_id)
     body = canonical({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})

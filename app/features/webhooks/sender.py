@@ -19,8 +19,8 @@ from app.db.json_columns import parse
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
-from app.features.batches.progress import notify_of_stalls
-from app.features.datasets.queries import dataset_names
+from app.features.batches.progress import notify_of_stalled_batches
+from app.features.datasets.queries import read_dataset_names
 from app.features.webhooks.messages import Message, read_messages, sign_message, webhook_secret
 from app.features.webhooks.queries import (
     DELIVERED,
@@ -203,7 +203,7 @@ class WebhookSender:
         """Write down what webhooks have not been told yet; returns how many messages that makes."""
         with self._store.read() as session:
             rows = list_active_webhooks(session)
-            names = dataset_names(session) if rows else {}
+            names = read_dataset_names(session) if rows else {}
             found = [(row, read_messages(session, row, names[row.dataset_id])) for row in rows]
         if not any(messages for _, messages in found):
             return 0
@@ -222,7 +222,7 @@ class WebhookSender:
         if last is not None and (at - last).total_seconds() < STALLS_SECONDS:
             return 0
         self._stalls_at = at
-        return notify_of_stalls(self._store, at)
+        return notify_of_stalled_batches(self._store, at)
 
     def send(self) -> int:
         """Send what is due, as much as goes at a time; returns how many tries came to an end.

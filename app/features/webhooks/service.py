@@ -12,7 +12,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
-from app.features.datasets.queries import dataset_name
+from app.features.datasets.queries import read_dataset_name
 from app.features.datasets.service import dataset_id
 from app.features.webhooks.messages import (
     CHOSEN,
@@ -210,7 +210,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
             return _delivery_from_row(find_delivery(session, webhook_id, waiting.id))
-        message = ping_message(webhook_id, dataset_name(session, number), now(), actor)
+        message = ping_message(webhook_id, read_dataset_name(session, number), now(), actor)
         insert_delivery(session, webhook_id, message.id, message.kind, message.body)
         return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
 

@@ -17,11 +17,11 @@ from app.db.log import entry_hash, newest_entry
 from app.db.session import Session
 from app.features.groups.queries import read_groups
 from app.features.groups.revision_queries import (
-    changed_groups,
     count_changes,
     count_groups,
-    groups_after,
-    newest_change_id,
+    find_newest_change_id,
+    list_changed_groups,
+    list_groups_after,
 )
 from app.features.solutions.queries import StoredFacts, read_calibrations, solution_facts
 from app.features.what_if.cache import (
@@ -43,7 +43,7 @@ def read_tables(session: Session, rows: Sequence[Any]) -> tuple[YieldTable, Yiel
 
     Args:
         session: A read session.
-        rows: As ``groups_after`` returns them in the same session.
+        rows: As ``list_groups_after`` returns them in the same session.
     """
     solved, others = [], []
     tables = []
@@ -117,7 +117,7 @@ class DatasetBlocks:
     @staticmethod
     def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> DatasetBlocks:
         """No group yet, as the database stands."""
-        return DatasetBlocks(folder, dataset_id, calibration, newest_change_id(session))
+        return DatasetBlocks(folder, dataset_id, calibration, find_newest_change_id(session))
 
     @staticmethod
     def load(
@@ -125,7 +125,7 @@ class DatasetBlocks:
     ) -> DatasetBlocks | None:
         """What the cache holds; None where it holds nothing that this database could have said."""
         kept = cached_table(folder, calibration)
-        if kept is None or kept.mark > newest_change_id(session):
+        if kept is None or kept.mark > find_newest_change_id(session):
             return None
         number, digest = kept.entry
         if number and entry_hash(session, number) != digest:
@@ -161,7 +161,7 @@ class DatasetBlocks:
         )
 
     def _read_new_groups(self, session: Session) -> bool:
-        rows = groups_after(session, self.dataset_id, self.through or 0, BLOCK)
+        rows = list_groups_after(session, self.dataset_id, self.through or 0, BLOCK)
         solved, bare = read_tables(session, rows)
         if solved.groups:
             large = self.through or len(rows) >= WORTH_KEEPING
@@ -175,10 +175,10 @@ class DatasetBlocks:
 
     def _read_changed_groups(self, session: Session) -> bool:
         """Read again what has changed; what was only solved under other thresholds has not."""
-        rows = changed_groups(session, self.dataset_id, self.mark, BLOCK)
+        rows = list_changed_groups(session, self.dataset_id, self.mark, BLOCK)
         if not rows:
             # The changes of other datasets need not be passed over again.
-            self.mark = newest_change_id(session)
+            self.mark = find_newest_change_id(session)
             return False
         self.mark = rows[-1].change_id
         self.noted += len(rows)

@@ -15,7 +15,7 @@ from app.db.check import Check
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
-from app.features.datasets.queries import dataset_names, find_dataset, policy_from_row
+from app.features.datasets.queries import find_dataset, policy_from_row, read_dataset_names
 from app.features.groups.revision_queries import count_changes, count_groups
 from app.features.what_if.block_results import (
     BlockResults,
@@ -189,7 +189,7 @@ class YieldStore:
     def refresh_large_datasets(self) -> None:
         """Bring those tables in step that would let somebody wait."""
         with self._store.read() as session:
-            names = dataset_names(session)
+            names = read_dataset_names(session)
             large = [number for number in names if count_groups(session, number) > AT_ONCE]
         for dataset_id in large:
             self._update_table_or_log(dataset_id)

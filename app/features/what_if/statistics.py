@@ -19,8 +19,12 @@ from app.db.log import entry_hash, newest_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.datasets.queries import dataset_names
-from app.features.groups.revision_queries import changed_group_ids, count_groups, newest_change_id
+from app.features.datasets.queries import read_dataset_names
+from app.features.groups.revision_queries import (
+    count_groups,
+    find_newest_change_id,
+    list_changed_group_ids,
+)
 from app.features.queue.queries import columns_from, read_columns
 from app.features.queue.statistics import COLUMNS, Counted, Statistics, count_rows, make_statistics
 from app.features.verdicts.queries import judged_since, newest_verdict
@@ -91,7 +95,7 @@ class StatisticsCache:
     def refresh_large_datasets(self) -> None:
         """Read those datasets that would let somebody wait."""
         with self._store.read() as session:
-            names = dataset_names(session)
+            names = read_dataset_names(session)
             large = [number for number in names if count_groups(session, number) > AT_ONCE]
         for dataset_id in large:
             try:
@@ -147,7 +151,7 @@ def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]
 def _current_marks(session: Session) -> dict[str, Any]:
     number = newest_entry(session)
     return {
-        "change": newest_change_id(session),
+        "change": find_newest_change_id(session),
         "verdict": newest_verdict(session),
         "entry": (number, entry_hash(session, number) or ""),
     }
@@ -155,7 +159,7 @@ def _current_marks(session: Session) -> dict[str, Any]:
 
 def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
     """What has changed, read again; groups that are gone show in the number of those left."""
-    changed = set(changed_group_ids(session, dataset_id, kept.change))
+    changed = set(list_changed_group_ids(session, dataset_id, kept.change))
     ids = sorted(changed | set(judged_since(session, dataset_id, kept.verdict)))
     moment = _current_marks(session)
     if not ids:
@@ -228,7 +232,7 @@ def _read_columns(session: Session, file: Path) -> _DatasetColumns | None:
         found = map_arrays(file, whole=True)
         about, arrays = found.about, dict(found.arrays)
         number, digest = about["entry"]
-        if about["format"] != FORMAT or about["change"] > newest_change_id(session):
+        if about["format"] != FORMAT or about["change"] > find_newest_change_id(session):
             return None
         if number and entry_hash(session, number) != digest:
             return None

@@ -18,8 +18,8 @@ from app.db.home import (
 )
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.datasets.queries import expire_cache
-from app.features.imports.upload_queries import UploadWriter, get_upload, keep_upload
+from app.features.datasets.queries import delete_expired_cache_entries
+from app.features.imports.upload_queries import UploadWriter, get_upload, save_upload
 from tests.unit.db.homes import say
 
 MOUNTS = """\
@@ -194,7 +194,7 @@ class TestLeftovers:
             broken.setattr(Path, "replace", killed)
             broken.setattr(Path, "unlink", killed)
             with pytest.raises(KeyboardInterrupt):
-                keep_upload(settings, upload.id)
+                save_upload(settings, upload.id)
         before = [path for path in settings.home.rglob("*") if is_half_written(path, settings.home)]
         assert len(before) == 4, "a record, and a folder with a folder with a file"
         for path in before:
@@ -217,4 +217,4 @@ class TestExpireCache:
             "app.features.datasets.queries.os.walk",
             lambda top: found if top == settings.cache else [],
         )
-        assert expire_cache(settings) == 1
+        assert delete_expired_cache_entries(settings) == 1

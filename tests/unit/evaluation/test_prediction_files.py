@@ -275,7 +275,9 @@ class TestCoco:
         self, tmp_path, names
     ) -> None:
         path = write(tmp_path / "r.json", [result(category_id=32), result(category_id=3)])
-        with pytest.raises(InputError, match="contains no class 0; its classes are 3, 32") as refused:
+        with pytest.raises(
+            InputError, match="contains no class 0; its classes are 3, 32"
+        ) as refused:
             read_predictions(path, "coco", names, category=0)
         assert refused.value.pointer == "/category"
 

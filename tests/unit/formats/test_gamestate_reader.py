@@ -387,7 +387,9 @@ class TestWhatEvaluatorsAskFor:
     def test_two_matches_that_would_be_one_sequence_are_refused(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:
-        with pytest.raises(InputError, match="a/b and a_b would be written to the same folder, a_b"):
+        with pytest.raises(
+            InputError, match="a/b and a_b would be written to the same folder, a_b"
+        ):
             write_gamestate(tmp_path, [solved(soccer_group(match=name)) for name in ("a/b", "a_b")])
 
     def test_frames_lie_where_a_sequence_looks_for_them(

@@ -75,7 +75,9 @@ class TestReadSoccernetV3:
         seven, _ = _read(root, report)
         assert seven.views[1].media == Media(str(path), "7_1.png")
         assert seven.views[2].media is None
-        assert [problem.problem for problem in report.problems] == ["1 image has no frame file: 7_0.png"]
+        assert [problem.problem for problem in report.problems] == [
+            "1 image has no frame file: 7_0.png"
+        ]
 
     def test_labels_without_frames_are_fine(
         self, labels: dict[str, Any], write_labels: Write, report: Report

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.imports.upload_queries import upload_path
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.paint.proposal_queries import Proposal, save_proposals
@@ -221,7 +221,7 @@ def verification(api: Any) -> Request:
 
 def no_dataset(api: Any) -> Request:
     scenes = make_scenes(groups=1, seed=3, faults=False)
-    ingest(store_of(api), "demo", [scenes[0].group], source="files", actor="local")
+    import_groups(store_of(api), "demo", [scenes[0].group], source="files", actor="local")
     return "DELETE", "/datasets/demo", {"confirm": "demo"}, {}
 
 
@@ -251,7 +251,7 @@ def gold_choice(api: Any) -> Request:
     (store.settings.home / TRUTH).write_text(json_text(truth))
     frames = str((store.settings.home / scene.truth.key).parent / "Frames-v3.zip")
     views = tuple(replace(view, media=Media(frames, view.key)) for view in scene.group.views)
-    ingest(store, "demo", [replace(scene.group, views=views)], source="files", actor="local")
+    import_groups(store, "demo", [replace(scene.group, views=views)], source="files", actor="local")
     return "POST", "/datasets/demo/gold", {"source": "sample"}, {}
 
 
@@ -357,7 +357,7 @@ def no_paint(api: Any) -> Request:
     store = store_of(api)
     group = load(store, 1).group
     views = tuple(replace(view, media=Media(f"/gone/{view.key}")) for view in group.views)
-    ingest(store, "broadcast", [replace(group, views=views)], source="test", actor="local")
+    import_groups(store, "broadcast", [replace(group, views=views)], source="test", actor="local")
     ended(api, paint(api))
     idle(api)
     return "DELETE", f"{BROADCAST}/paint", None, {}
@@ -417,7 +417,7 @@ def no_proposals(api: Any) -> Request:
 
 
 def rig(api: Any) -> Request:
-    ingest(store_of(api), "rig", rig_groups(45), source="test", actor="local")
+    import_groups(store_of(api), "rig", rig_groups(45), source="test", actor="local")
     return "POST", "/datasets/rig/rig", {}, {}
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.submit import load
-from app.features.groups.suggested_edits import _ACTIONS, offers_of_fix
-from app.features.imports.ingest import ingest
+from app.features.groups.suggested_edits import _ACTIONS, list_edits_of_fix
+from app.features.imports.ingest import import_groups
 from app.soccer.finding import FINDING_KINDS, Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -71,11 +71,11 @@ class TestRequests:
         view = group.views[0]
         moved = replace(view.balls[0], box=replace(view.balls[0].box, x=5.0))
         two = replace(view, balls=(*view.balls, moved), included=action != "include_view")
-        ingest(store, "fixed", [group.with_view(two)], source="test", actor="local")
+        import_groups(store, "fixed", [group.with_view(two)], source="test", actor="local")
         (row,) = api.get("/api/v1/groups", params={"dataset": "fixed"}).json()["items"]
         document = api.get(f"/api/v1/groups/{row['id']}").json()
         state = load(store, row["id"])
-        (offer,) = offers_of_fix(state.group, fix_of(action, state.group), ImagePoint(9.0, 8.0))
+        (offer,) = list_edits_of_fix(state.group, fix_of(action, state.group), ImagePoint(9.0, 8.0))
         edit = edit_to_json(offer.edit)
         assert edit["edit"] == ACTIONS[action][1]
         ids = {one["key"]: one["id"] for one in document["views"]}

@@ -23,7 +23,7 @@ from starlette.testclient import TestClient
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.http import metrics
 from app.http.deps import Services
 from app.http.request_limits import REQUEST_CLASSES, WRITE
@@ -65,7 +65,7 @@ def test_says_how_many_groups_there_are_and_how_many_wait_to_be_solved(read) -> 
 
 
 def test_a_group_that_waits_to_be_solved_is_counted(app: FastAPI, read, group) -> None:
-    ingest(app.state.services.store, "waiting", [group], source="test", actor="ann")
+    import_groups(app.state.services.store, "waiting", [group], source="test", actor="ann")
     assert read("touchline_unsolved_groups") == 1
     assert read("touchline_oldest_unsolved_seconds") >= 0
 

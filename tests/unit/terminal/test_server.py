@@ -22,8 +22,8 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError, UnsafePathError
 from app.features.batches.service import get_batch
-from app.features.imports.ingest import ingest
-from app.features.independent_annotations.queries import mark_gold, unmark_gold
+from app.features.imports.ingest import import_groups
+from app.features.independent_annotations.queries import delete_gold, insert_gold
 from app.features.people.access_tokens import new_token_text
 from app.features.people.logins import Login
 from app.features.people.roles import DatasetRoles, Role, Scope
@@ -166,14 +166,16 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
         remote("batch", "change", rest, "--gold-every", "5").exception
     )
     with place.store.write() as session:
-        mark_gold(session, 1, 1, "imported", {}, "anna")
+        insert_gold(session, 1, 1, "imported", {}, "anna")
     for run, every in ((remote, "5"), (local, "7")):
         run("batch", "change", rest, "--gold-every", every)
         assert get_batch(place.store, int(rest)).gold_every == int(every)
-        assert "none of these groups has known true values" in str(run("batch", "gold", "small").exception)
+        assert "none of these groups has known true values" in str(
+            run("batch", "gold", "small").exception
+        )
         assert "say sample or version" in run("batch", "gold", "small", "--from", "hearsay").output
     with place.store.write() as session:
-        unmark_gold(session, 1)
+        delete_gold(session, 1)
     remote("batch", "change", rest, "--no-gold")
     assert get_batch(place.store, int(rest)).gold_every is None
     assert remote("batch", "change", rest).exit_code == 2
@@ -206,7 +208,7 @@ def twins(place: Place, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two equal datasets, ``here`` and ``twin``; the folder has a policy file and predictions."""
     groups = [scene.group for scene in make_scenes(groups=6, seed=4)]
     for name in ("here", "twin"):
-        ingest(place.store, name, groups, source="files", actor="local")
+        import_groups(place.store, name, groups, source="files", actor="local")
         solve_dataset(place.store, name)
     files = tmp_path_factory.mktemp("twins")
     text = policy_to_yaml(PAPER).replace("name: paper", "name: ours")

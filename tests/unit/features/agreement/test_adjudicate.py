@@ -9,18 +9,23 @@ from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.evaluation.rater_agreement import AgreementLimits
 from app.features.agreement import service as weigh
 from app.features.agreement.adjudicate import (
+    adjudicate_case,
     adopt_into_group,
-    decide_case,
-    get_case,
-    list_waiting,
+    list_open_cases,
+    read_case,
     return_for_correction,
 )
-from app.features.agreement.service import BY_ITSELF, after_submission, read_limits, set_limits
+from app.features.agreement.service import (
+    BY_ITSELF,
+    compare_or_adopt_submission,
+    read_limits,
+    set_limits,
+)
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import (
@@ -63,15 +68,15 @@ def kinds(store: Store, group_id: int) -> list[tuple[str, str]]:
 class TestAfterHandIn:
     def test_two_who_agree_settle_the_group_by_themselves(self, store, state) -> None:
         first = judged(store, state.id, "ann", 1.0)
-        assert after_submission(store, first.copy_id) is None
+        assert compare_or_adopt_submission(store, first.copy_id) is None
         second = judged(store, state.id, "ben", 2.0)
-        assert after_submission(store, second.copy_id) == "agreed"
+        assert compare_or_adopt_submission(store, second.copy_id) == "agreed"
         after = load(store, state.id)
         assert ball_x(after) == ball_x(state) + 1
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
         assert ("agreement", BY_ITSELF) in kinds(store, state.id)
         assert all(get_annotation(store, one.id).settled for one in (first, second))
-        assert list_waiting(store, state.dataset) == []
+        assert list_open_cases(store, state.dataset) == []
         assert [str(check) for check in examine_database(store) if not check.ok] == []
 
     @pytest.mark.parametrize(("moved", "comes_to"), [(2.0, "agreed"), (40.0, "open")])
@@ -88,15 +93,20 @@ class TestAfterHandIn:
         with monkeypatch.context() as broken:
             broken.setattr(
                 weigh,
-                "settle_unchosen_annotations" if comes_to == "agreed" else "_announce_disagreement",
+                "complete_unchosen_annotations"
+                if comes_to == "agreed"
+                else "_announce_disagreement",
                 fail,
             )
             with pytest.raises(OSError, match="power"):
-                after_submission(store, second.copy_id)
+                compare_or_adopt_submission(store, second.copy_id)
         assert load(store, state.id).etag == state.etag
-        assert list_waiting(store, state.dataset) == []
-        assert (weigh.compare_left(store), weigh.compare_left(store)) == (1, 0)
-        assert [one.group for one in list_waiting(store, state.dataset)] == (
+        assert list_open_cases(store, state.dataset) == []
+        assert (weigh.compare_uncompared_groups(store), weigh.compare_uncompared_groups(store)) == (
+            1,
+            0,
+        )
+        assert [one.group for one in list_open_cases(store, state.dataset)] == (
             [state.id] if comes_to == "open" else []
         )
         moved_by = ball_x(load(store, state.id)) - ball_x(state)
@@ -113,15 +123,15 @@ class TestAfterHandIn:
 
         with monkeypatch.context() as broken:
             broken.setattr(weigh, "adopt_annotation", faster)
-            assert after_submission(store, second.copy_id) == "open"
-        assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
+            assert compare_or_adopt_submission(store, second.copy_id) == "open"
+        assert [one.group for one in list_open_cases(store, state.dataset)] == [state.id]
 
     def test_two_who_do_not_wait_for_a_decision(self, store, state) -> None:
         judged(store, state.id, "ann")
         second = judged(store, state.id, "ben", 40.0)
-        assert after_submission(store, second.copy_id) == "open"
+        assert compare_or_adopt_submission(store, second.copy_id) == "open"
         assert load(store, state.id).etag == state.etag
-        (waiting,) = list_waiting(store, state.dataset)
+        (waiting,) = list_open_cases(store, state.dataset)
         assert (waiting.group, waiting.people) == (state.id, ("ann", "ben"))
         assert waiting.worst > 10
 
@@ -132,30 +142,30 @@ class TestAfterHandIn:
             assert read_limits(session, state.dataset_id) == wide
         judged(store, state.id, "ann")
         second = judged(store, state.id, "ben", 40.0)
-        assert after_submission(store, second.copy_id) == "agreed"
+        assert compare_or_adopt_submission(store, second.copy_id) == "agreed"
 
     def test_handing_in_the_copy_of_an_ordinary_group_compares_nothing(self, store, state) -> None:
-        assert after_submission(store, state.id) is None
+        assert compare_or_adopt_submission(store, state.id) is None
 
 
 class TestDecide:
     @pytest.fixture
     def takes(self, store, state) -> tuple[IndependentAnnotation, IndependentAnnotation]:
         found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
-        assert after_submission(store, found[1].copy_id) == "open"
+        assert compare_or_adopt_submission(store, found[1].copy_id) == "open"
         return found
 
     def test_takes_one_with_the_verdict_of_who_decided(self, store, state, takes) -> None:
-        case = get_case(store, state.id, actor="lea")
+        case = read_case(store, state.id, actor="lea")
         assert [take.person for take in case.annotations] == ["ann", "ben"]
         assert not case.own and case.refused is None
-        after = decide_case(store, state.id, takes[1].id, actor="lea")
+        after = adjudicate_case(store, state.id, takes[1].id, actor="lea")
         assert ball_x(after) == ball_x(state) + 40
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "lea")
         said = kinds(store, state.id)
         assert ("edit", "ben") in said and ("agreement", "lea") in said
         with pytest.raises(NotFoundError, match="waits for a decision"):
-            decide_case(store, state.id, takes[0].id, actor="lea")
+            adjudicate_case(store, state.id, takes[0].id, actor="lea")
         assert [str(check) for check in examine_database(store) if not check.ok] == []
 
     def test_is_done_whole_or_not_at_all(self, store, state, takes, monkeypatch) -> None:
@@ -167,41 +177,41 @@ class TestDecide:
         with monkeypatch.context() as broken:
             broken.setattr(weigh, "copy_verdict_to_original", fail)
             with pytest.raises(OSError, match="power"):
-                decide_case(store, state.id, takes[1].id, actor="lea")
+                adjudicate_case(store, state.id, takes[1].id, actor="lea")
         assert load(store, state.id).etag == state.etag
         assert kinds(store, state.id) == before
         assert not any(get_annotation(store, one.id).settled for one in takes)
-        assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
-        after = decide_case(store, state.id, takes[1].id, actor="lea")
+        assert [one.group for one in list_open_cases(store, state.dataset)] == [state.id]
+        after = adjudicate_case(store, state.id, takes[1].id, actor="lea")
         assert (ball_x(after), after.verdict.actor) == (ball_x(state) + 40, "lea")
 
     def test_begins_a_third_one_without_a_verdict_of_who_decided(self, store, state, takes) -> None:
-        after = decide_case(store, state.id, takes[1].id, as_start=True, actor="lea")
+        after = adjudicate_case(store, state.id, takes[1].id, as_start=True, actor="lea")
         assert ball_x(after) == ball_x(state) + 40
         assert after.verdict.actor == "ben"
-        assert list_waiting(store, state.dataset) == []
+        assert list_open_cases(store, state.dataset) == []
 
     def test_nobody_decides_about_their_own_while_somebody_else_is_there(
         self, store, state, takes
     ) -> None:
         # Where nobody else is there they may, and it is said.
-        case = get_case(store, state.id, actor="ann")
+        case = read_case(store, state.id, actor="ann")
         assert case.own and case.refused is None
         invite(store, "rob", Role.REVIEWER, actor="lea")
-        assert "rob can decide" in (get_case(store, state.id, actor="ann (token x)").refused or "")
+        assert "rob can decide" in (read_case(store, state.id, actor="ann (token x)").refused or "")
         with pytest.raises(ForbiddenError, match="rob can decide"):
-            decide_case(store, state.id, takes[0].id, actor="ann")
+            adjudicate_case(store, state.id, takes[0].id, actor="ann")
 
     def test_takes_nothing_that_does_not_wait_here(self, store, state, takes) -> None:
         with pytest.raises(NotFoundError, match="annotation 99"):
-            decide_case(store, state.id, 99, actor="lea")
+            adjudicate_case(store, state.id, 99, actor="lea")
 
 
 class TestHandBack:
     @pytest.fixture
     def takes(self, store, state) -> tuple[IndependentAnnotation, IndependentAnnotation]:
         found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
-        assert after_submission(store, found[1].copy_id) == "open"
+        assert compare_or_adopt_submission(store, found[1].copy_id) == "open"
         return found
 
     def test_tells_its_person_why_and_the_group_waits_for_them_alone(
@@ -213,15 +223,15 @@ class TestHandBack:
             ).submitted
             is None
         )
-        assert list_waiting(store, state.dataset) == []
+        assert list_open_cases(store, state.dataset) == []
         shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
         assert [one.returned and one.returned.reason for one in shown] == [None, "the spot"]
         again = load(store, takes[1].copy_id)
         set_verdict(
             store, takes[1].copy_id, "deferred", None, "x", if_match=again.etag, actor="ben"
         )
-        assert after_submission(store, takes[1].copy_id) == "open"
-        (waiting,) = list_waiting(store, state.dataset)
+        assert compare_or_adopt_submission(store, takes[1].copy_id) == "open"
+        (waiting,) = list_open_cases(store, state.dataset)
         assert waiting.people == ("ann", "ben")
         shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
         assert [one.returned for one in shown] == [None, None]
@@ -229,7 +239,7 @@ class TestHandBack:
     def test_the_queue_finds_it_and_says_what_it_came_to(
         self, store, state, takes, make_group
     ) -> None:
-        ingest(store, "demo", [make_group(8)], source="test", actor="ann")
+        import_groups(store, "demo", [make_group(8)], source="test", actor="ann")
 
         def found(query: str) -> int:
             return list_groups(store, state.dataset_id, query).total
@@ -244,7 +254,7 @@ class TestHandBack:
             "submissions:none": every - 1, "submissions>=0": every,
         }  # fmt: skip
         assert {query: found(query) for query in asked} == asked
-        decide_case(store, state.id, takes[1].id, actor="lea")
+        adjudicate_case(store, state.id, takes[1].id, actor="lea")
         assert [found(f"annotations:{one}") for one in ("waiting", "decided")] == [0, 1]
         assert (
             list_groups(store, state.dataset_id, "submissions:2").items[0].annotations == "decided"
@@ -252,7 +262,7 @@ class TestHandBack:
 
     def test_what_a_lead_returned_leaves_nothing_that_waits(self, store, state, takes) -> None:
         return_annotation(store, takes[0].id, "the ball", actor="lea")
-        assert list_waiting(store, state.dataset) == []
+        assert list_open_cases(store, state.dataset) == []
 
     def test_nobody_hands_back_where_others_have_to_decide(self, store, state, takes) -> None:
         invite(store, "rob", Role.REVIEWER, actor="lea")
@@ -264,6 +274,6 @@ class TestHandBack:
     def test_a_lead_who_takes_one_over_has_decided(self, store, state, takes) -> None:
         after = adopt_into_group(store, takes[1], actor="lea")
         assert ball_x(after) == ball_x(state) + 40
-        assert list_waiting(store, state.dataset) == []
+        assert list_open_cases(store, state.dataset) == []
         assert ("agreement", "lea") in kinds(store, state.id)
         assert get_annotation(store, takes[0].id).settled

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
-from app.features.agreement.adjudicate import decide_case, get_case, list_waiting
-from app.features.agreement.service import after_submission
+from app.features.agreement.adjudicate import adjudicate_case, list_open_cases, read_case
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches.leases import BatchMember, Leases
-from app.features.batches.progress import my_work
+from app.features.batches.progress import list_own_batches
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
@@ -48,7 +48,7 @@ def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: flo
 
 def left(store: Store, person: str) -> int:
     """How many groups somebody is told that they may still get."""
-    (mine,) = my_work(store, lambda _dataset: BatchMember(person))
+    (mine,) = list_own_batches(store, lambda _dataset: BatchMember(person))
     return mine.left
 
 
@@ -57,26 +57,26 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     assert left(store, "ada") == 2
     for moved in (1.0, 1.0):
         copy = annotate(store, leases, batch, "ada", moved)
-        assert after_submission(store, copy) is None
+        assert compare_or_adopt_submission(store, copy) is None
     assert leases.next(batch.id, BatchMember("ada")).group is None
     assert (left(store, "ada"), left(store, "bo")) == (0, 2)
     assert get_batch(store, batch.id).settled == 0
 
-    assert after_submission(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
+    assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
     assert get_batch(store, batch.id).settled == 1
-    assert after_submission(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
+    assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
     assert leases.next(batch.id, BatchMember("bo")).group is None
     assert leases.next(batch.id, BatchMember("cy")).group is None
 
-    waiting = list_waiting(store, batch.dataset_id)
+    waiting = list_open_cases(store, batch.dataset_id)
     assert len(waiting) == 1
     group = waiting[0].group
     assert load(store, group).verdict.state == "unreviewed"
-    case = get_case(store, group, actor="cy")
-    after = decide_case(store, group, case.annotations[1].id, actor="cy")
+    case = read_case(store, group, actor="cy")
+    after = adjudicate_case(store, group, case.annotations[1].id, actor="cy")
     assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")
     assert get_batch(store, batch.id).settled == 2
-    assert list_waiting(store, batch.dataset_id) == []
+    assert list_open_cases(store, batch.dataset_id) == []
 
 
 def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:

@@ -13,19 +13,19 @@ from app.features.audit.service import (
     KINDS,
     Family,
     assign_local_work,
-    every_entry,
     find_owner_of_local_work,
+    iterate_audit_entries,
     read_audit,
     record_audit_event,
 )
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
 from app.features.comments.service import begin_thread
 from app.features.groups.edit import IncludeView, SetLines, set_ball
-from app.features.groups.history import read_history, redo, undo
+from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.replay import _STEPS, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit, submit_all
-from app.features.imports.ingest import ingest
+from app.features.groups.submit import load, submit, submit_edits
+from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
 from app.features.jobs.service import Jobs
 from app.features.people.links import use_link
@@ -105,7 +105,7 @@ class TestAudit:
     def test_pages_follow_each_other_and_hold_each_entry_once(
         self, store: Store, said: int
     ) -> None:
-        every = [one.id for one in every_entry(store, ALL, EVERYTHING)]
+        every = [one.id for one in iterate_audit_entries(store, ALL, EVERYTHING)]
         for search in ("", "e"):
             ids, before = [], None
             while True:
@@ -122,9 +122,9 @@ class TestAudit:
         def refuse(*_asked: object) -> None:
             raise InputError("a text contains a character that the database cannot store")
 
-        monkeypatch.setattr("app.features.audit.service.audit_rows", refuse)
+        monkeypatch.setattr("app.features.audit.service.list_audit_rows", refuse)
         with pytest.raises(InputError):
-            every_entry(store, ALL, EVERYTHING)
+            iterate_audit_entries(store, ALL, EVERYTHING)
 
     def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
         assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
@@ -135,8 +135,8 @@ class TestAudit:
         state = load(store, said)
         one, two = (view.key for view in state.group.views[:2])
         edits = [SetLines(one, {"Middle line": None}), set_ball(two, None)]
-        state = submit_all(store, said, edits, if_match=state.etag, actor="anna")
-        undo(store, said, if_match=state.etag, actor="anna")
+        state = submit_edits(store, said, edits, if_match=state.etag, actor="anna")
+        undo_group_edit(store, said, if_match=state.etag, actor="anna")
         told = f"lines of view {one}: Middle line; balls of view {two}"
         assert lines(store)[1] == f"anna: {told}"
         # What takes them back begins with the last.
@@ -155,8 +155,8 @@ class TestAudit:
         )
         for edit in edits:
             state = submit(store, said, edit, if_match=state.etag, actor="anna")
-        state = undo(store, said, if_match=state.etag, actor="anna")
-        redo(store, said, if_match=state.etag, actor="anna")
+        state = undo_group_edit(store, said, if_match=state.etag, actor="anna")
+        redo_group_edit(store, said, if_match=state.etag, actor="anna")
         assert lines(store)[:6] == [
             f"anna: redid: use of view {key}",
             f"anna: undid: leaving out of view {key}",
@@ -211,7 +211,7 @@ def made_by(store: Store) -> list[str]:
 
 def test_the_work_of_before_is_shown_as_theirs_and_the_log_keeps_its_name(store: Store) -> None:
     scene = make_scenes(groups=1, seed=3, faults=False)[0].group
-    ingest(store, "d", [scene], source="files", actor="local")
+    import_groups(store, "d", [scene], source="files", actor="local")
     solve_dataset(store, "d")
     freeze_dataset(store, "d", FreezeRequest(name="v1", groups="passing"), actor="local")
     judge(store, "deferred", "local")

@@ -9,12 +9,12 @@ import pytest
 
 from app.db.session import Session
 from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
-from app.features.agreement.service import after_submission, compare_left
+from app.features.agreement.service import compare_or_adopt_submission, compare_uncompared_groups
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
 from app.features.batches import leases as leases_module
 from app.features.batches.leases import LASTS, BatchMember, Lease, Leases
-from app.features.batches.progress import my_work, team_work
+from app.features.batches.progress import list_own_batches, list_team_batches
 from app.features.batches.service import (
     NewBatch,
     Part,
@@ -28,8 +28,8 @@ from app.features.batches.service import (
 )
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load
-from app.features.independent_annotations.gold import mark_group, unmark_group
-from app.features.independent_annotations.queries import INDEPENDENT, annotation_of_copy
+from app.features.independent_annotations.gold import mark_gold_group, unmark_gold_group
+from app.features.independent_annotations.queries import INDEPENDENT, find_annotation_of_copy_row
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role
@@ -77,7 +77,7 @@ def leases(store, clock) -> Leases:
 
 def make_gold(store, group: int) -> None:
     judge(store, group, "cy")
-    mark_group(store, group, "imported", actor="cy")
+    mark_gold_group(store, group, "imported", actor="cy")
 
 
 def judge(store, group: int, actor: str, state: str = "rejected") -> None:
@@ -148,7 +148,7 @@ class TestGoldGroups:
         assert [(one.id, one.gold_every) for one in list_batches(store, dataset)] == [(plain, None)]
         make_gold(store, groups[5])
         change_batch(store, plain, gold_every=2, actor="lead")
-        unmark_group(store, groups[5], actor="cy")
+        unmark_gold_group(store, groups[5], actor="cy")
         assert change_batch(store, plain, gold_every=2, name="c", actor="lead").name == "c"
 
     @pytest.mark.parametrize(
@@ -292,10 +292,10 @@ class TestLeases:
         assert leases.next(batch, BO).group == groups[3]
         back = leases.return_group(batch, groups[3], BO, "the far goal  line", actor="bo")
         assert (back.batch.submitted, back.here) == (0, ())
-        (mine,) = my_work(store, lambda _: ADA)
+        (mine,) = list_own_batches(store, lambda _: ADA)
         said = [(one.group, one.by, one.reason) for one in mine.returned]
         assert said == [(groups[3], "bo", "the far goal line")]
-        assert my_work(store, lambda _: dan)[0].returned == []
+        assert list_own_batches(store, lambda _: dan)[0].returned == []
         with store.read() as session:
             person = person_by_name(session, "ada")
             rings = select_notifications(session, person.id, EVERYTHING, "", 9)
@@ -307,7 +307,9 @@ class TestLeases:
         lease = leases.next(batch, ADA)
         assert lease.group == groups[3] and lease.returned is not None
         lease = leases.submit(batch, groups[3], ADA, actor="ada")
-        assert lease.batch.submitted == 1 and my_work(store, lambda _: ADA)[0].returned == []
+        assert (
+            lease.batch.submitted == 1 and list_own_batches(store, lambda _: ADA)[0].returned == []
+        )
         with store.read() as session:
             assert groups[3] in replay_log(session).groups
 
@@ -331,10 +333,10 @@ class TestLeases:
         had = 0
         while (copy := leases.next(batch, ADA).group) is not None:
             # What is left falls by one with each, whatever it is a copy of.
-            assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
+            assert [one.left for one in list_own_batches(store, lambda _: ADA)] == [3 - had]
             leases.submit(batch, copy, ADA, actor="ada")
             had += 1
-            (mine,) = my_work(store, lambda _: ADA)
+            (mine,) = list_own_batches(store, lambda _: ADA)
             seen = mine.batch
             assert (mine.left, seen.groups, seen.settled, seen.waiting) == (
                 3 - had,
@@ -347,7 +349,7 @@ class TestLeases:
         found = leases.next(batch, BO)
         assert (found.group, found.part, found.submitted_by) == (groups[0], Part.REVIEWER, "ada")
         leases.return_group(batch, groups[0], BO, "too wide", actor="bo")
-        (mine,) = my_work(store, lambda _: ADA)
+        (mine,) = list_own_batches(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.returned]) == (1, [groups[0]])
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.next(batch, ADA)
@@ -368,10 +370,10 @@ class TestLeases:
         while not ordinary:
             copy = leases.next(batch, ADA).group
             with store.read() as session:
-                ordinary = annotation_of_copy(session, copy).kind == INDEPENDENT
+                ordinary = find_annotation_of_copy_row(session, copy).kind == INDEPENDENT
             leases.submit(batch, copy, ADA, actor="ada")
         assert get_batch(store, batch).submitted == 0
-        compare_left(store)
+        compare_uncompared_groups(store)
         assert get_batch(store, batch).submitted == 1
 
     def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, groups, leases):
@@ -451,7 +453,9 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         leases.submit(batch, groups[0], ADA, actor="ada")
         left = {
-            one.name: [(item.parts, item.left) for item in my_work(store, lambda _, one=one: one)]
+            one.name: [
+                (item.parts, item.left) for item in list_own_batches(store, lambda _, one=one: one)
+            ]
             for one in (ADA, BO, CY)
         }
         assert left == {"ada": [([Part.ANNOTATOR], 2)], "bo": [([Part.REVIEWER], 1)], "cy": []}
@@ -464,15 +468,15 @@ class TestProgress:
         for minutes, group in ((1, groups[0]), (4, groups[1]), (90, groups[2]), (96, groups[3])):
             at = clock.at + timedelta(minutes=minutes)
             Leases(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
-        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        (team,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=2))
         (pace,) = team.people
         assert (pace.name, pace.submitted, pace.minutes) == ("ada", 4, pytest.approx(9))
         assert pace.groups_an_hour == pytest.approx(60 * 4 / 9)
         assert team.stalled is None
-        (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=27))
+        (later,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=27))
         assert later.stalled is not None
         change_batch(store, batch, actor="lead", state="closed")
-        (closed,) = team_work(store, dataset, at=clock.at + timedelta(hours=27))
+        (closed,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=27))
         assert closed.stalled is None
 
     def test_own_annotations_count_on_the_copies_and_not_again_where_they_are_taken_over(
@@ -486,7 +490,7 @@ class TestProgress:
             at = (clock.at + timedelta(minutes=minutes)).isoformat(timespec="microseconds")
             monkeypatch.setattr("app.features.verdicts.service.now", lambda at=at: at)
             judge(store, copies[minutes], who.name)
-        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        (team,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=2))
         paces = {one.name: (one.submitted, one.judged, one.groups) for one in team.people}
         assert paces == {"ada": (2, 2, 2), "bo": (1, 1, 1)}
         assert team.people[0].minutes_a_group == pytest.approx(2)
@@ -495,8 +499,8 @@ class TestProgress:
             "app.features.independent_annotations.adopt.now",
             lambda: (clock.at + timedelta(minutes=9)).isoformat(),
         )
-        assert after_submission(store, copies[20]) == "agreed"
-        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        assert compare_or_adopt_submission(store, copies[20]) == "agreed"
+        (team,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=2))
         assert (team.people[0].groups, team.people[0].minutes) == (2, pytest.approx(4))
-        (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=25))
+        (later,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=25))
         assert later.stalled is not None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 
 THREADS = "/api/v1/groups/1/threads"
 HOSTILE = "<img src=x onerror=alert(1)> @anna"
 
 
 def test_a_thread_is_begun_replied_to_changed_and_resolved(api, app, group) -> None:
-    ingest(app.state.services.store, "demo", [group], source="test", actor="local")
+    import_groups(app.state.services.store, "demo", [group], source="test", actor="local")
     view = api.get("/api/v1/groups/1").json()["views"][0]["key"]
     began = {"text": HOSTILE, "view": view, "at": {"x": 1.5, "y": 2.0}}
     made = api.post(THREADS, json=began, headers={"Idempotency-Key": "one"})
@@ -39,7 +39,7 @@ def test_a_thread_is_begun_replied_to_changed_and_resolved(api, app, group) -> N
 
 
 def test_the_audit_is_a_table_without_formulas_and_lines_of_json(api, app, group) -> None:
-    ingest(app.state.services.store, "demo", [group], source="test", actor="=cmd")
+    import_groups(app.state.services.store, "demo", [group], source="test", actor="=cmd")
     api.post(THREADS, json={"text": "one,\n=two"})
     table = api.get("/api/v1/audit/export.csv?dataset=demo")
     assert table.headers["content-type"].startswith("text/csv")

@@ -153,7 +153,7 @@ class TestLog:
 
 class TestMentions:
     def test_names_stand_after_an_at_sign_and_in_no_address(self) -> None:
-        assert comments.names_in("@anna, @Bob. (@carl) mail x@dora.org @@eve") == [
+        assert comments.extract_mentions("@anna, @Bob. (@carl) mail x@dora.org @@eve") == [
             "anna",
             "bob",
             "carl",

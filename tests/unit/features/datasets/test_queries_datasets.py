@@ -4,13 +4,13 @@ import pytest
 
 from app.db.store import Store
 from app.features.datasets.queries import (
-    dataset_name,
-    dataset_names,
-    dataset_rows,
     find_dataset,
     group_ids,
     insert_dataset_row,
+    list_dataset_rows,
     policy_from_row,
+    read_dataset_name,
+    read_dataset_names,
     update_policy,
 )
 from app.soccer.policy import PAPER, STRICT
@@ -35,9 +35,9 @@ class TestDatasets:
         with filled.write() as session:
             added = insert_dataset_row(session, "alder", PAPER, "t")
             update_policy(session, added, STRICT)
-            rows = dataset_rows(session)
+            rows = list_dataset_rows(session)
             assert [row.id for row in rows] == [added, 1]
             assert (policy_from_row(rows[0].policy), rows[0].policy_hash) == (STRICT, STRICT.hash)
-            assert dataset_names(session) == {1: "demo", added: "alder"}
-            assert dataset_name(session, added) == "alder"
+            assert read_dataset_names(session) == {1: "demo", added: "alder"}
+            assert read_dataset_name(session, added) == "alder"
             assert (group_ids(session, 1), group_ids(session, added)) == ([1], [])

@@ -5,10 +5,10 @@ from sqlalchemy import insert, text
 
 from app.db.store import Store
 from app.features.datasets.queries import (
-    delete_if_unused,
     delete_solutions,
+    delete_unused_calibrations_among,
     list_solution_ids,
-    unused_calibrations,
+    list_unused_calibrations,
 )
 from app.features.solutions.queries import CalibrationModel, SolutionModel, stored_calibration_keys
 
@@ -31,22 +31,25 @@ def solved(filled: Store) -> Store:
 class TestSpareCalibrations:
     def test_a_calibration_stays_while_a_solution_names_it(self, solved: Store) -> None:
         with solved.write() as session:
-            assert unused_calibrations(session) == []
+            assert list_unused_calibrations(session) == []
             found = [sorted(list_solution_ids(session, group)) for group in (1, 2)]
             assert found == [[1, 2], []]
             delete_solutions(session, [1])
-            assert unused_calibrations(session) == ["a"]
-            assert delete_if_unused(session, KEYS[:2]) == 1
+            assert list_unused_calibrations(session) == ["a"]
+            assert delete_unused_calibrations_among(session, KEYS[:2]) == 1
             assert stored_calibration_keys(session, KEYS) == {"b", "c"}
 
     def test_only_those_that_were_found_go(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
-            assert delete_if_unused(session, KEYS[:2]) == 2
+            assert delete_unused_calibrations_among(session, KEYS[:2]) == 2
             assert stored_calibration_keys(session, KEYS) == {"c"}
 
     def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
             session.execute(text("UPDATE queue SET solved = false"))
-            assert (unused_calibrations(session), delete_if_unused(session, KEYS)) == ([], 0)
+            assert (
+                list_unused_calibrations(session),
+                delete_unused_calibrations_among(session, KEYS),
+            ) == ([], 0)

@@ -6,10 +6,15 @@ from sqlalchemy import text
 from app.db.dialects.dialect import dialect_in
 from app.db.log import Entry, append
 from app.db.store import Store
-from app.features.datasets.queries import count_contents, dataset_rows, delete_rows, record_used_ids
+from app.features.datasets.queries import (
+    count_contents,
+    delete_rows,
+    list_dataset_rows,
+    record_used_ids,
+)
 from app.features.datasets.tables import GroupModel
 from app.features.findings.queries import insert_dismissal
-from app.features.groups.insert_queries import next_id
+from app.features.groups.insert_queries import find_next_row_id
 from app.soccer.finding import Dismissal
 from tests.databases import said_for_sqlite
 
@@ -62,6 +67,6 @@ class TestRemoval:
         with filled.write() as session:
             record_used_ids(session)
             delete_rows(session, 1)
-            assert dataset_rows(session) == []
+            assert list_dataset_rows(session) == []
             assert dialect_in(session).count_lost_references(session) == 0
-            assert next_id(session, GroupModel) == 2
+            assert find_next_row_id(session, GroupModel) == 2

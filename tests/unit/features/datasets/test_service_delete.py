@@ -16,7 +16,7 @@ from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned
+from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins, read_roles
 from app.features.people.roles import DatasetRoles, Role, Scope
@@ -46,14 +46,14 @@ def two(store: Store, once, fill, make_group, make_static) -> Store:
         other_lines = replace(make_static(10).views[0].station, lines={})
         changed = make_static(10)
         changed = changed.with_view(replace(changed.views[0], station=other_lines))
-        ingest(
+        import_groups(
             store, "demo", [replace(make_group(7), label="new"), changed], source="b", actor="ann"
         )
         spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-        ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
+        import_unassigned_frames(store, "demo", spare, source="spare", actor="ann")
         give_verdicts(store, 1, "", "deferred", actor="ben")
         save_view(store, 1, name="All", q="", actor="ben")
-        ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
+        import_groups(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
         solve_dataset(store, "other")
 
     once("demo and other", make)
@@ -111,7 +111,7 @@ class TestDeleteDataset:
     def test_no_id_is_given_again(self, two: Store, make_group) -> None:
         old = [row.id for row in list_groups(two, 2, limit=500).items]
         delete_dataset(two, "other", confirm="other", actor="eve")
-        ingest(two, "other", [make_group(7)], source="again", actor="ann")
+        import_groups(two, "other", [make_group(7)], source="again", actor="ann")
         found = get_dataset(two, "other")
         assert found.id == 3
         (row,) = list_groups(two, 3).items
@@ -133,7 +133,7 @@ class TestDeleteDataset:
         assert rows(two, "calibration") == rows(two, "solution") == 0
 
     def test_calibrations_stay_while_something_is_to_be_solved(self, two, make_group) -> None:
-        ingest(two, "third", [make_group(7)], source="test", actor="ann")
+        import_groups(two, "third", [make_group(7)], source="test", actor="ann")
         before = rows(two, "calibration")
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         assert rows(two, "calibration") == before

@@ -19,7 +19,7 @@ from app.errors import InputError
 from app.evaluation.frame import FrameNames, NamedFrame
 from app.features.exports.service import ExportReport, export_dataset, require_possible
 from app.features.groups.submit import load
-from app.features.imports.cameras import ingest_cameras
+from app.features.imports.cameras import import_given_cameras
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.cameras import read_cameras
@@ -287,7 +287,7 @@ class TestWhatIsWrittenIsFoundAgain:
         for name in ("cameras", "sn-calibration"):
             export_dataset(store, "demo", name, tmp_path / name, everything=True)
             cameras = read_cameras(tmp_path / name, Report())
-            report = ingest_cameras(store, "demo", cameras, source="x", actor="ann")
+            report = import_given_cameras(store, "demo", cameras, source="x", actor="ann")
             assert (report.unchanged, report.changed, report.problems) == (6, 0, [])
 
     @pytest.mark.parametrize("scheme", ["alike", "alike in a match"])

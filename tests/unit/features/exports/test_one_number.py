@@ -16,7 +16,7 @@ from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.routes import GroupRow
 from app.features.queue.service import list_groups
@@ -147,7 +147,7 @@ def solved(store: Store, request: pytest.FixtureRequest) -> Store:
     """The sample's groups, with planted faults, under a policy."""
     policy: Policy = request.param
     groups = [scene.group for scene in make_scenes(groups=GROUPS, seed=3)]
-    ingest(store, "demo", groups, source="test", actor="ann")
+    import_groups(store, "demo", groups, source="test", actor="ann")
     if policy != PAPER:
         change_policy(store, "demo", policy, if_match=None, actor="ann")
     solve_dataset(store, "demo")

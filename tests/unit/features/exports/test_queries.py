@@ -6,7 +6,11 @@ from sqlalchemy import insert, literal, select, update
 from app.db.log import Entry, append
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
+from app.features.exports.queries import (
+    count_left_out_groups,
+    find_newest_entry_time,
+    list_exported_groups,
+)
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import SolutionModel
 from app.soccer.solution import SOLVER_VERSION
@@ -49,26 +53,26 @@ class TestExportedGroups:
     def test_an_accepted_group_goes_out_or_says_why_not(self, solved, values, left_out) -> None:
         with solved.write() as session:
             session.execute(update(QueueModel).values(**{**ACCEPTED, **values}))
-            assert left_out_groups(session, 1) == left_out
-            assert exported_groups(session, 1, everything=False) == ([] if left_out else [1])
+            assert count_left_out_groups(session, 1) == left_out
+            assert list_exported_groups(session, 1, everything=False) == ([] if left_out else [1])
 
     @pytest.mark.parametrize("said", [True, False])
     def test_one_that_this_solver_has_not_solved_stays(self, filled, said: bool) -> None:
         with filled.write() as session:
             session.execute(update(QueueModel).values(**{**ACCEPTED, "solved": said}))
-            assert left_out_groups(session, 1) == {"unsolved": 1}
-            assert exported_groups(session, 1, everything=False) == []
+            assert count_left_out_groups(session, 1) == {"unsolved": 1}
+            assert list_exported_groups(session, 1, everything=False) == []
 
     def test_an_export_of_everything_takes_every_group(self, filled) -> None:
         with filled.read() as session:
-            assert exported_groups(session, 1, everything=True) == [1]
-            assert exported_groups(session, 1, everything=False) == []
+            assert list_exported_groups(session, 1, everything=True) == [1]
+            assert list_exported_groups(session, 1, everything=False) == []
 
 
 class TestNewestWord:
     def test_freezing_does_not_count_as_a_change(self, filled) -> None:
         with filled.write() as session:
-            assert newest_entry_time(session, 1) is None
+            assert find_newest_entry_time(session, 1) is None
             append(session, [Entry("edit", "ann", "2026-01-02", {}, 1)])
             append(session, [Entry("freeze", "ann", "2026-01-03", {}, 1)])
-            assert newest_entry_time(session, 1) == "2026-01-02"
+            assert find_newest_entry_time(session, 1) == "2026-01-02"

@@ -15,7 +15,7 @@ import pytest
 
 from app.features.datasets.service import dataset_id
 from app.features.exports import routes as module
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs import runner as job_run
 from app.features.jobs.service import Jobs
 from app.features.maintenance.upkeep import clean_up
@@ -150,7 +150,7 @@ class TestMakeExport:
             ))
             for n in range(3)
         ]  # fmt: skip
-        ingest(app.state.services.store, "many", framed, source="test", actor="local")
+        import_groups(app.state.services.store, "many", framed, source="test", actor="local")
         order = {**ORDER, "dataset": "many", "images": "copy"}
         assert api.post(API, json=order).status_code == 400
         (tmp_path / "2.png").write_bytes(b"a picture")
@@ -159,7 +159,7 @@ class TestMakeExport:
     def test_a_format_without_room_for_anything_that_is_there_is_refused(self, app, api) -> None:
         services = app.state.services
         bare = Group("1.png", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
-        ingest(services.store, "bare", [bare], source="test", actor="local")
+        import_groups(services.store, "bare", [bare], source="test", actor="local")
         answer = api.post(API, json={**ORDER, "dataset": "bare"})
         assert (answer.status_code, "camera" in answer.json()["detail"]) == (400, True)
         assert services.jobs.find() == []
@@ -307,7 +307,7 @@ class TestRestart:
         for view in views:
             (tmp_path / view.key).write_bytes(b"a picture")
         framed = replace(group, views=tuple(views))
-        ingest(services.store, "framed", [framed], source="test", actor="local")
+        import_groups(services.store, "framed", [framed], source="test", actor="local")
         solve_dataset(services.store, "framed")
 
         def reader(media: Media, *_: object) -> SentPicture:

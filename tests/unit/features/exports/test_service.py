@@ -16,7 +16,7 @@ from app.features.exports.service import (
     FORMATS,
     TRACKS,
     export_dataset,
-    possible_formats,
+    list_formats_with_problems,
     require_possible,
 )
 from app.features.groups.edit import set_ball
@@ -372,7 +372,7 @@ class TestImages:
 
 class TestPossibleFormats:
     def test_a_format_that_has_no_place_for_the_groups_says_why(self, store, three) -> None:
-        answers = {one.format: one for one in possible_formats(store, "demo")}
+        answers = {one.format: one for one in list_formats_with_problems(store, "demo")}
         refused = [name for name, one in answers.items() if one.reason is not None]
         assert refused == ["issia-3d", "issia", *TRACKS]
         assert "is not from ISSIA" in answers["issia"].reason
@@ -380,7 +380,11 @@ class TestPossibleFormats:
 
     def test_of_static_cameras_it_is_the_other_way_round(self, store, fill, make_static) -> None:
         fill(make_static(10))
-        refused = {one.format for one in possible_formats(store, "demo") if one.reason is not None}
+        refused = {
+            one.format
+            for one in list_formats_with_problems(store, "demo")
+            if one.reason is not None
+        }
         assert {"soccernet-v3", "soccernet-v3d"} <= refused
         assert not {"issia", "issia-3d"} & refused
 

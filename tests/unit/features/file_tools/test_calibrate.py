@@ -211,7 +211,8 @@ class TestScoreFiles:
         for file in (tmp_path / "out").glob("camera_*.json"):
             file.rename(tmp_path / "cameras" / f"camera_other_{file.stem}.json")
         with pytest.raises(
-            InputError, match="no camera file has the frame name of a line file: there is a camera of"
+            InputError,
+            match="no camera file has the frame name of a line file: there is a camera of",
         ):
             score_files(lines, tmp_path / "cameras", size=SIZE)
 

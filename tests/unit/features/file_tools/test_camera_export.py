@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import ReviewError
-from app.features.file_tools.camera_export import by_frame, export_cameras
+from app.features.file_tools.camera_export import export_cameras, key_by_frame_number
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
 from tests.cameras import EVERY_COEFFICIENT, SIZE, looking, wide, write_cameras
@@ -113,7 +113,10 @@ class TestOpenTrackIO:
 
 class TestByFrame:
     def test_numbers_count_and_other_names_do_not(self) -> None:
-        assert by_frame({"00012": "a", "clip/7": "b", "north": "c", "²": "d"}) == {12: "a", 7: "b"}
+        assert key_by_frame_number({"00012": "a", "clip/7": "b", "north": "c", "²": "d"}) == {
+            12: "a",
+            7: "b",
+        }
 
 
 class TestCommand:

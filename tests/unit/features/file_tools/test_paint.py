@@ -12,7 +12,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.features.file_tools.paint import UniqueNames, agree_files, snap_files
+from app.features.file_tools.paint import UniqueNames, measure_paint_agreement_of_files, snap_files
 from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
@@ -125,7 +125,7 @@ class TestAgreeFiles:
         with zipfile.ZipFile(archive, "w") as file:
             for name in ("good.png", "cut.png", "crowd.png"):
                 file.write(folder / "images" / name, name)
-        rows = agree_files(folder / "cameras", [archive], settings=Settings())
+        rows = measure_paint_agreement_of_files(folder / "cameras", [archive], settings=Settings())
         by_frame = {row["frame"]: row for row in rows}
         assert by_frame["good"]["supported"] > 0.8
         assert by_frame["crowd"]["outcome"] == by_frame["cut"]["outcome"] == "nothing"

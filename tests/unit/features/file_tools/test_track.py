@@ -11,7 +11,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.file_tools import track
-from app.features.file_tools.track import count_outcomes, frame_row, pitch_row, track_files
+from app.features.file_tools.track import count_outcomes, frame_to_row, pitch_to_row, track_files
 from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.soccer.frames import ImageSize
@@ -113,7 +113,7 @@ def test_the_pitch_that_is_shown_is_told_and_cameras_are_of_it_where_asked(
     sigma = pitch["sigma"]
     assert (sigma["length"], sigma["width"]) == pytest.approx((0.15, 0.05))
     assert sigma["tripod"] == pytest.approx(0.1)
-    assert pitch_row(None, on_shown=True) is None
+    assert pitch_to_row(None, on_shown=True) is None
 
 
 def test_cameras_of_the_far_side_are_turned_where_no_lines_say_it(
@@ -160,5 +160,5 @@ def test_the_worker_process_reads_clip_and_lines_and_says_what_is_wrong(
 
 
 def test_numbers_of_rows_are_counted():
-    rows = [frame_row(frame(number, "tracked")) for number in range(2)]
+    rows = [frame_to_row(frame(number, "tracked")) for number in range(2)]
     assert count_outcomes(rows) == {"frames": 2, "tracked": 2, "bridged": 0, "lost": 0}

@@ -9,11 +9,11 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
-from app.features.findings.queries import GroupDismissals, dismissed_kinds
+from app.features.findings.queries import GroupDismissals, split_open_and_dismissed_kinds
 from app.features.findings.service import (
     FindingName,
     count_groups,
-    finding_values,
+    iterate_findings_as_json,
     read_findings,
     set_dismissal,
 )
@@ -64,7 +64,7 @@ class TestCovers:
 class TestDismissedKinds:
     def test_one_of_two_findings_of_a_kind_leaves_the_other_open(self) -> None:
         findings = (HERE, replace(HERE, view="7_1.png"), Finding("no_paint", "None."))
-        kinds = dismissed_kinds(findings, GroupDismissals(1, (SAID,)))
+        kinds = split_open_and_dismissed_kinds(findings, GroupDismissals(1, (SAID,)))
         assert kinds == (["ball_size", "no_paint"], ["ball_size"])
 
 
@@ -167,7 +167,7 @@ class TestSetDismissal:
 class TestFindings:
     def test_the_list_has_them_with_who_checked_them(self, store, found) -> None:
         dismiss(store, found, first(found), note="fine")
-        values = list(finding_values(store, "demo"))
+        values = list(iterate_findings_as_json(store, "demo"))
         said = [value["dismissed"] for value in values]
         assert said[0] is not None
         assert (said[0]["by"], said[0]["note"]) == ("ann", "fine")

@@ -6,7 +6,7 @@ from app.features.datasets.service import dataset_id
 from app.features.groups import group_edits
 from app.features.groups.edit import SetPitch
 from app.features.groups.group_edits import edit_groups
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.submit import load
 from app.features.solutions.service import stale_groups
 
@@ -38,7 +38,7 @@ class TestGiveEdits:
             assert state.group.pitch.width == 70.0
             entry = read_history(store, number)[-1]
             assert (entry.actor, entry.body["why"]) == ("ann", "measured")
-            back = undo(store, number, if_match=state.etag, actor="bob")
+            back = undo_group_edit(store, number, if_match=state.etag, actor="bob")
             assert back.group.pitch.width == 68.0
 
     def test_what_changes_nothing_leaves_no_trace_but_where_more_is_said(self, store, ids) -> None:

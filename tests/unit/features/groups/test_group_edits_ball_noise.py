@@ -15,10 +15,10 @@ from app.features.groups.group_edits import (
     apply_noise_factors,
     read_last_ball_actors,
 )
-from app.features.groups.history import read_history, undo
-from app.features.groups.submit import load, preview, solve_and_keep, submit, submit_all
+from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.submit import load, preview, solve_and_keep, submit, submit_edits
 from app.features.imports.edits_export import group_to_merge
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.match_estimates.queries import (
     NOISE,
     Factor,
@@ -102,7 +102,9 @@ class TestGiveFactors:
         give(store, *FACTORS)
         group = make_static(10)
         views = tuple(replace(view, media=None) for view in group.views)
-        ingest(store, "demo", [replace(group, views=views, label="again")], source="b", actor="ann")
+        import_groups(
+            store, "demo", [replace(group, views=views, label="again")], source="b", actor="ann"
+        )
         assert load(store, static).group.label == "again"
         assert set(noise(store, static).values()) == {2.0}
         assert "noise" not in str(group_to_merge(load(store, static).group)["views"])
@@ -186,7 +188,7 @@ class TestWithNoise:
         assert own is not None
         wanted = noise_factor(FACTORS, own.station.key, "ann")
         assert own.noise == wanted != given.get(key, 1.0)
-        undo(store, static, if_match=load(store, static).etag, actor="ann")
+        undo_group_edit(store, static, if_match=load(store, static).etag, actor="ann")
         assert noise(store, static) == given
 
     def test_a_prediction_that_somebody_accepts_is_not_theirs(
@@ -219,6 +221,6 @@ class TestReadPlaced:
         state = load(store, static)
         keys = [view.key for view in state.group.views[:2]]
         edits = [set_ball(key, BALL) for key in keys]
-        submit_all(store, static, edits, if_match=state.etag, actor="ann")
+        submit_edits(store, static, edits, if_match=state.etag, actor="ann")
         with store.read() as session:
             assert read_last_ball_actors(session, [static]) == {static: dict.fromkeys(keys, "ann")}

@@ -7,7 +7,12 @@ import pytest
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.groups.edit import SetLines, SetStationLines, set_ball
-from app.features.groups.history import EntryChanges, read_entry_changes, read_history, undo
+from app.features.groups.history import (
+    EntryChanges,
+    read_entry_changes,
+    read_history,
+    undo_group_edit,
+)
 from app.features.groups.submit import load, submit
 from app.features.stations.service import load_station, submit_station
 from app.soccer.annotation import BallAnnotation
@@ -33,7 +38,7 @@ class TestReadStep:
             if_match=edited.etag,
             actor="bob",
         )
-        undo(store, state.id, if_match=edited.etag, actor="bob")
+        undo_group_edit(store, state.id, if_match=edited.etag, actor="bob")
         brought, ball, lines, back = steps(store, state.id)
         assert (brought.first, [view.key for view in brought.views]) == (True, ["7.png", "7_1.png"])
         assert brought.views[0].before is None

@@ -7,7 +7,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, set_ball
-from app.features.groups.history import read_history, redo, undo
+from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.state import GroupState
 from app.features.groups.submit import submit
 from app.soccer.annotation import BallAnnotation
@@ -35,40 +35,40 @@ class TestUndo:
         now = states[-1]
         for earlier in reversed(states[:-1]):
             assert now.can_undo
-            now = undo(store, state.id, if_match=now.etag, actor="ann")
+            now = undo_group_edit(store, state.id, if_match=now.etag, actor="ann")
             assert now.group == earlier.group
             assert now.solution == earlier.solution
         assert not now.can_undo
         for later in states[1:]:
             assert now.can_redo
-            now = redo(store, state.id, if_match=now.etag, actor="ann")
+            now = redo_group_edit(store, state.id, if_match=now.etag, actor="ann")
             assert now.group == later.group
         assert not now.can_redo
 
     def test_a_fresh_edit_clears_redo(self, store, state) -> None:
         after = edited(store, state, set_ball("7.png", BALL))
-        back = undo(store, state.id, if_match=after.etag, actor="ann")
+        back = undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
         assert back.can_redo
         fresh = edited(store, back, set_ball("7.png", None))
         assert fresh.can_undo
         assert not fresh.can_redo
         with pytest.raises(ConflictError, match="nothing to redo"):
-            redo(store, state.id, if_match=fresh.etag, actor="ann")
+            redo_group_edit(store, state.id, if_match=fresh.etag, actor="ann")
 
     def test_survives_a_restart(self, store, state) -> None:
         after = edited(store, state, set_ball("7.png", BALL))
         with closing(Store.open(store.settings)) as other:
-            back = undo(other, state.id, if_match=after.etag, actor="ben")
+            back = undo_group_edit(other, state.id, if_match=after.etag, actor="ben")
         assert back.group == state.group
         assert (back.can_undo, back.can_redo) == (False, True)
 
     def test_without_an_edit_there_is_nothing_to_undo(self, store, state) -> None:
         with pytest.raises(ConflictError, match="nothing to undo"):
-            undo(store, state.id, if_match=state.etag, actor="ann")
+            undo_group_edit(store, state.id, if_match=state.etag, actor="ann")
 
     def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
         after = edited(store, state, set_ball("7.png", BALL))
-        undo(store, state.id, if_match=after.etag, actor="ben")
+        undo_group_edit(store, state.id, if_match=after.etag, actor="ben")
         entries = read_history(store, state.id)
         assert [(item.kind, item.actor) for item in entries] == [
             ("import", "ann"),
@@ -81,5 +81,5 @@ class TestUndo:
     def test_several_balls_come_back(self, store, state) -> None:
         two = edited(store, state, SetBalls("7.png", (BALL, BALL)))
         picked = edited(store, two, set_ball("7.png", BALL))
-        back = undo(store, state.id, if_match=picked.etag, actor="ann")
+        back = undo_group_edit(store, state.id, if_match=picked.etag, actor="ann")
         assert back.group.view("7.png").balls == (BALL, BALL)

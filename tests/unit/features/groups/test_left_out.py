@@ -10,11 +10,11 @@ from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.history import redo, undo
+from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.imports.merge import merge_edits
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.service import list_groups
@@ -97,9 +97,9 @@ class TestUndo:
     def test_undo_takes_it_back_and_redo_brings_it_again(self, store, state) -> None:
         left = change(store, LEAVE)
         assert (why(store), left.verdict.note) == (WHY, None)
-        back = undo(store, 1, if_match=left.etag, actor="ann")
+        back = undo_group_edit(store, 1, if_match=left.etag, actor="ann")
         assert back.group == state.group
-        redo(store, 1, if_match=back.etag, actor="ann")
+        redo_group_edit(store, 1, if_match=back.etag, actor="ann")
         assert why(store) == WHY
 
     def test_the_log_alone_gives_it_again(self, store, state) -> None:
@@ -116,7 +116,7 @@ class TestUndo:
         assert why(store) == LeftOut("duplicate_view")
         assert other.stored.inputs_hash == left.stored.inputs_hash
         assert (other.verdict.stale, judged.verdict.stale) == (False, False)
-        undo(store, 1, if_match=other.etag, actor="ann")
+        undo_group_edit(store, 1, if_match=other.etag, actor="ann")
         assert why(store) == WHY
 
 
@@ -146,7 +146,7 @@ class TestImport:
     def test_the_dataset_brings_new_extras_and_it_stays(self, store, state, make_group) -> None:
         change(store, LEAVE)
         newer = replace(three_views(make_group(7)), label="another label")
-        ingest(store, "demo", [newer], source="again", actor="ann")
+        import_groups(store, "demo", [newer], source="again", actor="ann")
         assert (load(store, 1).group.label, why(store)) == ("another label", WHY)
 
 
@@ -183,9 +183,9 @@ class TestFixed:
     def test_after_undo_of_all_edits_a_group_is_not_fixed(self, store, state) -> None:
         left = change(store, LEAVE)
         self.judge(store, "accepted")
-        undo(store, 1, if_match=load(store, 1).etag, actor="ann")
+        undo_group_edit(store, 1, if_match=load(store, 1).etag, actor="ann")
         assert self.fixed(store) == (False, False)
-        redo(store, 1, if_match=load(store, 1).etag, actor="ann")
+        redo_group_edit(store, 1, if_match=load(store, 1).etag, actor="ann")
         assert self.fixed(store) == (True, True)
         assert left.group == load(store, 1).group
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.soccer.group import FARTHEST, Group, Media
 
@@ -85,7 +85,7 @@ class TestNeighbours:
             replace(second, media=Media(str(folder.parent / "7.png"))),
         )
         store = app.state.services.store
-        ingest(store, "clip", [replace(group, views=views)], source="test", actor="local")
+        import_groups(store, "clip", [replace(group, views=views)], source="test", actor="local")
         return {}
 
     def test_lists_the_frames_that_there_are_with_their_addresses(self, api, clip) -> None:

@@ -52,7 +52,9 @@ def test_who_was_killed_is_asked_once_more(pool: WorkerPool, tmp_path: Path) -> 
 
 
 def test_killed_twice_it_says_nothing_of_the_picture(pool: WorkerPool, tmp_path: Path) -> None:
-    with pytest.raises(OverloadedError, match="killed, most likely because the machine ran out of memory"):
+    with pytest.raises(
+        OverloadedError, match="killed, most likely because the machine ran out of memory"
+    ):
         PictureTask(pool, be_killed, tmp_path).result()
 
 

@@ -9,12 +9,12 @@ from app.db.store import Store
 from app.errors import StorageError
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
 from app.features.groups.group_edits import apply_noise_factors
-from app.features.groups.history import redo, undo
+from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned
+from app.features.imports.cameras import import_given_cameras
+from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.match_estimates.queries import Factor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station, undo_station
@@ -38,7 +38,7 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         IncludeView("7_1.png", False),
     ):
         state = submit(store, ids[0], edit, if_match=state.etag, actor="ann")
-    for step in (undo, undo, redo):
+    for step in (undo_group_edit, undo_group_edit, redo_group_edit):
         state = step(store, ids[0], if_match=state.etag, actor="ben")
     state = set_verdict(store, ids[0], "rejected", "other", "odd", if_match=state.etag, actor="ben")
     station = load_station(store, load(store, ids[2]).station_ids["cam2"])
@@ -58,11 +58,11 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         store, ids[2], set_ball(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
     )
     _import_changed(store, make_group, make_static)
-    ingest_cameras(
+    import_given_cameras(
         store, "demo", {"8_1": opposite, "cam2": opposite}, source="cameras", actor="ann"
     )
     spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-    ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
+    import_unassigned_frames(store, "demo", spare, source="spare", actor="ann")
     change_policy(store, "demo", STRICT, if_match=None, actor="ann")
     return store
 
@@ -79,8 +79,8 @@ def _import_changed(store: Store, make_group, make_static) -> None:
         replace(eight, views=eight.views[:1]),
         static.with_view(replace(camera, station=replace(camera.station, lines=lines))),
     ]
-    ingest(store, "demo", groups, source="second", actor="ann")
-    ingest(store, "demo", [eight], source="third", actor="ann")
+    import_groups(store, "demo", groups, source="second", actor="ann")
+    import_groups(store, "demo", [eight], source="third", actor="ann")
 
 
 class TestReplay:

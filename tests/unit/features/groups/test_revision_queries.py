@@ -3,8 +3,8 @@ from __future__ import annotations
 from app.db.log import Entry, append, newest_entry
 from app.features.groups.revision_queries import (
     StoredChange,
-    changes_after_entry,
-    groups_solved_after,
+    iterate_changes_after_entry,
+    list_groups_solved_after,
 )
 from app.features.solutions.queries import newest_solution
 
@@ -16,8 +16,10 @@ class TestLoggedChanges:
             append(session, [Entry("station_edit", "ann", "t", {}, 1, station_id=1)])
             append(session, [Entry("edit", "bob", "t", {}, 1, 1)])
             assert newest_entry(session) == 3
-            assert list(changes_after_entry(session, 2)) == [StoredChange(3, 1, "edit", "bob", 1)]
-            assert set(changes_after_entry(session, 0)) == {
+            assert list(iterate_changes_after_entry(session, 2)) == [
+                StoredChange(3, 1, "edit", "bob", 1)
+            ]
+            assert set(iterate_changes_after_entry(session, 0)) == {
                 StoredChange(2, 1, "station_edit", "ann", None),
                 StoredChange(2, 1, "station_edit", "ann", 1),
                 StoredChange(3, 1, "edit", "bob", 1),
@@ -27,4 +29,4 @@ class TestLoggedChanges:
 class TestSolvedGroups:
     def test_nothing_is_solved_where_nothing_was(self, filled) -> None:
         with filled.read() as session:
-            assert (newest_solution(session), groups_solved_after(session, 0)) == (0, [])
+            assert (newest_solution(session), list_groups_solved_after(session, 0)) == (0, [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.db.store import Store
 from app.features.groups.edit import IncludeView, SetStationLines
-from app.features.groups.history import undo
+from app.features.groups.history import undo_group_edit
 from app.features.groups.state import (
     GroupHead,
     GroupState,
@@ -14,7 +14,7 @@ from app.features.groups.state import (
     read_group_head,
 )
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.stations.service import load_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
@@ -39,7 +39,7 @@ class TestReadEtags:
     def test_what_is_undone_is_not_what_it_was(self, store: Store, state: GroupState) -> None:
         edit = IncludeView("7.png", False)
         edited = submit(store, state.id, edit, if_match=state.etag, actor="ann")
-        undone = undo(store, state.id, if_match=edited.etag, actor="ann")
+        undone = undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         assert undone.stored.inputs_hash == state.stored.inputs_hash
         assert etags_of(store, state.id) == {state.id: undone.etag} != {state.id: state.etag}
 
@@ -79,7 +79,9 @@ class TestReadEtags:
         etag = load(store, ids[1]).etag
         submit(store, ids[1], edit, if_match=etag, actor="ann")
         # The same group comes with another ball: what a person edited stays, with a finding.
-        ingest(store, "demo", [make_group(8, ball=(6.0, 2.0, -0.5))], source="b", actor="ann")
+        import_groups(
+            store, "demo", [make_group(8, ball=(6.0, 2.0, -0.5))], source="b", actor="ann"
+        )
         fill()
         states = {number: load(store, number) for number in ids}
         assert all(state.solution.findings for state in states.values())

@@ -5,13 +5,13 @@ from sqlalchemy import insert, select
 from app.db.dialects.dialect import dialect_in
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
-from app.features.groups.queries import upsert_unassigned
+from app.features.groups.queries import upsert_unassigned_frames
 from app.features.groups.state_snapshot_queries import (
-    all_groups,
-    all_import_findings,
-    all_stations,
-    all_unassigned,
-    all_verdicts,
+    iterate_groups,
+    iterate_stations,
+    iterate_verdicts,
+    list_all_import_findings,
+    list_all_unassigned_frames,
     replace_all_rows,
 )
 from app.features.paint.proposal_queries import Proposal, read_proposals, save_proposals
@@ -29,17 +29,19 @@ class TestAll:
     def test_everything_that_the_log_can_make_anew_is_read(self, filled: Store, full_group) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            upsert_unassigned(session, 1, {("cam1", "99"): b"x"})
+            upsert_unassigned_frames(session, 1, {("cam1", "99"): b"x"})
             said = {"group_id": 1, "kind": "edited", "sentence": "kept"}
             session.execute(insert(ImportFindingModel), [said])
         with filled.read() as session:
-            stations = {item.station.key: item.station for item in all_stations(session)}
+            stations = {item.station.key: item.station for item in iterate_stations(session)}
             assert stations == {view.station.key: view.station for view in full_group.views}
-            assert [item.group for item in all_groups(session)] == [full_group]
-            (verdict,) = all_verdicts(session)
+            assert [item.group for item in iterate_groups(session)] == [full_group]
+            (verdict,) = iterate_verdicts(session)
             assert {**verdict, "id": 7} == vars(VERDICT)
-            assert [(row.camera, row.frame) for row in all_unassigned(session)] == [("cam1", "99")]
-            assert [row.sentence for row in all_import_findings(session)] == ["kept"]
+            assert [(row.camera, row.frame) for row in list_all_unassigned_frames(session)] == [
+                ("cam1", "99")
+            ]
+            assert [row.sentence for row in list_all_import_findings(session)] == ["kept"]
 
 
 def whole(session):
@@ -54,16 +56,16 @@ class TestRewrite:
     def test_rows_are_replaced_while_verdicts_refer_to_them(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            upsert_unassigned(session, 1, {("cam1", "99"): b"x"})
+            upsert_unassigned_frames(session, 1, {("cam1", "99"): b"x"})
             stations, groups, views = whole(session)
             label = [{**row, "label": "anew"} for row in groups]
             replace_all_rows(
                 session, stations=stations, groups=label, views=views, noticed=[], unassigned=[]
             )
         with filled.read() as session:
-            assert [item.group.label for item in all_groups(session)] == ["anew"]
-            assert list(all_unassigned(session)) == []
-            assert len(list(all_verdicts(session))) == 1
+            assert [item.group.label for item in iterate_groups(session)] == ["anew"]
+            assert list(list_all_unassigned_frames(session)) == []
+            assert len(list(iterate_verdicts(session))) == 1
             assert dialect_in(session).count_lost_references(session) == 0
 
     def test_what_nobody_said_stays_with_the_views_that_are_there_again(

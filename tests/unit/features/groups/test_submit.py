@@ -18,7 +18,7 @@ from app.errors import (
 )
 from app.features.groups import state as state_module
 from app.features.groups.edit import IncludeView, SetBalls, SetLines, SetPicture, set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, preview, solve_and_keep, submit
 from app.features.policies.service import change_policy
@@ -170,7 +170,9 @@ class TestSubmit:
         self, store, fill, make_static
     ) -> None:
         state = load(store, fill(make_static())[0])
-        with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set") as caught:
+        with pytest.raises(
+            SharedStationError, match="picture geometry of view cam1 cannot be set"
+        ) as caught:
             change(store, state, SetPicture("cam1", OPEN))
         assert "given camera" in str(caught.value.hint)
         with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set"):
@@ -182,7 +184,7 @@ class TestSubmit:
 
         monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
         after = change(store, state, set_ball("7.png", BALL))
-        undo(store, state.id, if_match=after.etag, actor="ann")
+        undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
 
     def test_the_queue_is_in_step(self, store, state) -> None:
         after = change(store, state, set_ball("7.png", None))
@@ -260,7 +262,7 @@ class TestCost:
     ) -> None:
         after = change(store, state, set_ball("7.png", BALL))
         with counted(store) as cost:
-            undo(store, state.id, if_match=after.etag, actor="ann")
+            undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
         assert (cost.reads, cost.writes, cost.commits) == (1, 1, 1)
         assert cost.statements <= 14
 

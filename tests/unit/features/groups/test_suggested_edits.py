@@ -4,12 +4,12 @@ import pytest
 
 from app.features.groups.suggested_edits import (
     FixGuide,
-    condition_sentence,
+    describe_condition,
     edit_of_fix,
-    guide_of_finding,
-    guide_of_fix,
-    offers_of_finding,
-    offers_of_fix,
+    find_guide_of_finding,
+    find_guide_of_fix,
+    list_edits_of_finding,
+    list_edits_of_fix,
     rank_of_fix,
 )
 from app.soccer.annotation import BallAnnotation
@@ -84,7 +84,7 @@ class TestOffers:
         ],
     )
     def test_say_what_the_button_does(self, fix, label):
-        (offer,) = offers_of_fix(GROUP, fix)
+        (offer,) = list_edits_of_fix(GROUP, fix)
         assert (offer.label, offer.edit) == (label, edit_of_fix(GROUP, fix))
 
     @pytest.mark.parametrize(
@@ -98,39 +98,41 @@ class TestOffers:
         ],
     )
     def test_say_what_stands_beside_the_change_in_the_picture(self, fix, caption):
-        assert [offer.caption for offer in offers_of_fix(GROUP, fix)] == [caption]
+        assert [offer.caption for offer in list_edits_of_fix(GROUP, fix)] == [caption]
 
     def test_of_several_balls_each_that_is_seen_can_be_kept(self):
         first = GROUP.views[0]
         hidden, other = BallAnnotation(out_of_view=True), BallAnnotation(point=ImagePoint(5, 6))
         several = GROUP.with_view(replace(first, balls=(hidden, *first.balls, other)))
-        found = offers_of_fix(several, Fix("pick_ball", "a"))
+        found = list_edits_of_fix(several, Fix("pick_ball", "a"))
         assert [offer.label for offer in found] == ["Keep ball 2", "Keep ball 3"]
         assert [offer.edit.balls[0] for offer in found] == [*first.balls, other]
         assert edit_of_fix(several, Fix("pick_ball", "a")) is None
 
     def test_where_one_ball_is_left_there_is_none_to_pick(self):
-        assert offers_of_fix(GROUP, Fix("pick_ball", "a")) == ()
+        assert list_edits_of_fix(GROUP, Fix("pick_ball", "a")) == ()
 
     def test_a_finding_without_a_fix_offers_no_edit(self):
-        assert offers_of_fix(GROUP, None) == offers_of_fix(GROUP, Fix("swap_sides")) == ()
+        assert list_edits_of_fix(GROUP, None) == list_edits_of_fix(GROUP, Fix("swap_sides")) == ()
 
 
 class TestGuide:
     def test_says_which_marking_to_draw(self):
-        assert guide_of_fix(Fix("draw_marking", "a", MARKING)) == FixGuide("Draw it", draws=MARKING)
+        assert find_guide_of_fix(Fix("draw_marking", "a", MARKING)) == FixGuide(
+            "Draw it", draws=MARKING
+        )
 
     def test_says_where_to_look_for_the_ball(self):
         place = ImagePoint(5.0, 6.0)
-        found = guide_of_fix(Fix("look_ball", "a", to="b"), place)
+        found = find_guide_of_fix(Fix("look_ball", "a", to="b"), place)
         assert found == FixGuide("Show the place", "is the ball here?", looks=place)
 
     def test_says_that_the_picture_is_to_be_read(self):
-        assert guide_of_fix(Fix("read_paint", "a")) == FixGuide("Read its paint", reads=True)
+        assert find_guide_of_fix(Fix("read_paint", "a")) == FixGuide("Read its paint", reads=True)
 
     def test_where_an_edit_mends_nobody_is_led_anywhere(self):
-        assert guide_of_fix(Fix("swap_sides", "a")) is None
-        assert guide_of_fix(None) is None
+        assert find_guide_of_fix(Fix("swap_sides", "a")) is None
+        assert find_guide_of_fix(None) is None
 
 
 class TestOffersOfFinding:
@@ -138,43 +140,43 @@ class TestOffersOfFinding:
         first = GROUP.views[0]
         large = replace(first.ball, point=None, box=Box(10.0, 20.0, 34.0, 30.0))
         found = Finding("ball_size", "", "a", number=4.0)
-        (offer,) = offers_of_finding(GROUP.with_view(replace(first, balls=(large,))), found)
+        (offer,) = list_edits_of_finding(GROUP.with_view(replace(first, balls=(large,))), found)
         assert (offer.label, offer.edit.balls[0].box) == ("Fit the box", Box(23.0, 31.0, 8.0, 8.0))
 
     def test_a_ball_without_a_box_has_none_to_fit(self):
         first = GROUP.views[0]
         alone = BallAnnotation(point=ImagePoint(5.0, 6.0))
         group = GROUP.with_view(replace(first, balls=(alone,)))
-        assert offers_of_finding(group, Finding("ball_size", "", "a", number=4.0)) == ()
+        assert list_edits_of_finding(group, Finding("ball_size", "", "a", number=4.0)) == ()
 
     def test_any_other_offers_what_its_fix_offers(self):
         fix = Fix("swap_sides", "a")
-        assert offers_of_finding(
+        assert list_edits_of_finding(
             GROUP, Finding("sides_swapped", "", "a", fix=fix)
-        ) == offers_of_fix(GROUP, fix)
+        ) == list_edits_of_fix(GROUP, fix)
 
 
 class TestGuideOfFinding:
     def test_a_visible_marking_that_nobody_drew_is_to_be_drawn(self):
         found = Finding("visible_not_annotated", "", "a", MARKING)
-        assert guide_of_finding(found) == guide_of_fix(Fix("draw_marking", "a", MARKING))
+        assert find_guide_of_finding(found) == find_guide_of_fix(Fix("draw_marking", "a", MARKING))
 
     def test_any_other_leads_where_its_fix_leads(self):
         found = Finding("no_paint", "", "a", fix=Fix("read_paint", "a"))
-        assert guide_of_finding(found) == guide_of_fix(found.fix)
-        assert guide_of_finding(Finding("low_parallax", "")) is None
+        assert find_guide_of_finding(found) == find_guide_of_fix(found.fix)
+        assert find_guide_of_finding(Finding("low_parallax", "")) is None
 
 
 class TestSentence:
     def test_names_the_view_by_its_letter_and_a_point_by_its_number(self):
         dropped = Fix("drop_point", "b", "Middle line", index=1)
-        assert condition_sentence(GROUP, dropped) == "point 2 of Middle line in B was deleted"
-        moved = condition_sentence(GROUP, replace(dropped, action="move_point"), 3.14159)
+        assert describe_condition(GROUP, dropped) == "point 2 of Middle line in B was deleted"
+        moved = describe_condition(GROUP, replace(dropped, action="move_point"), 3.14159)
         assert moved == "point 2 of Middle line in B moved 3.1 px"
 
     def test_names_the_27th_view_as_the_gates_do(self):
         many = Group("g", tuple(View(f"{n}", Station(f"{n}", SIZE)) for n in range(27)))
-        assert condition_sentence(many, Fix("exclude_view", "26")).startswith("V27 ")
+        assert describe_condition(many, Fix("exclude_view", "26")).startswith("V27 ")
 
 
 class TestRank:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.features.groups import suggestions as remedies
-from app.features.groups.suggested_edits import edit_of_fix, marking_influences
+from app.features.groups.suggested_edits import edit_of_fix, measure_marking_influences
 from app.features.groups.suggestions import find_suggestions
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.finding import Finding, Fix
@@ -172,7 +172,7 @@ class TestFindRemedies:
 class TestInfluences:
     def test_each_marking_is_predicted_by_the_others(self):
         station = view("a", MAIN, BALL, noise_px=0.5).station
-        found = marking_influences(station, Pitch(), PAPER.calibration)
+        found = measure_marking_influences(station, Pitch(), PAPER.calibration)
         assert [item.marking for item in found] == list(station.lines)
         predicted = [item.largest_px_without for item in found]
         assert np.median(predicted) < 4.0
@@ -180,7 +180,9 @@ class TestInfluences:
 
     def test_a_bad_marking_is_the_one_without_which_the_view_fits(self):
         station = spoilt(view("a", MAIN, BALL), markings=1, pixels=60.0).station
-        found = marking_influences(station, Pitch(), replace(PAPER.calibration, check_labels=False))
+        found = measure_marking_influences(
+            station, Pitch(), replace(PAPER.calibration, check_labels=False)
+        )
         marking = sorted(station.lines)[0]
         by_name = {item.marking: item for item in found}
         best = max(found, key=lambda item: item.jac_without[2])
@@ -192,5 +194,6 @@ class TestInfluences:
         lines = {name: points[:2] for name, points in list(station.lines.items())[:4]}
         few = replace(station, lines=make_lines(lines))
         assert all(
-            item.jac_without is None for item in marking_influences(few, Pitch(), PAPER.calibration)
+            item.jac_without is None
+            for item in measure_marking_influences(few, Pitch(), PAPER.calibration)
         )

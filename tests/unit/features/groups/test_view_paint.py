@@ -10,7 +10,7 @@ import pytest
 
 from app.errors import OverloadedError
 from app.features.groups.edit import SetLines, set_ball
-from app.features.groups.history import read_history, redo, undo
+from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
@@ -83,9 +83,9 @@ class TestFollow:
         before = calibrations(painted)
         changed = calibrations_of(change(painted, paint, without_a_line(painted)))
         state = load(painted, 1)
-        back = undo(painted, 1, if_match=state.etag, actor="ann", paint=paint)
+        back = undo_group_edit(painted, 1, if_match=state.etag, actor="ann", paint=paint)
         assert calibrations_of(back) == before
-        again = redo(painted, 1, if_match=back.etag, actor="ann", paint=paint)
+        again = redo_group_edit(painted, 1, if_match=back.etag, actor="ann", paint=paint)
         assert calibrations_of(again) == changed
         assert not again.can_redo and again.can_undo
 

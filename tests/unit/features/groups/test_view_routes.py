@@ -21,7 +21,7 @@ from app.features.groups.view_routes import (
     clamp_width,
     get_neighbours,
 )
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.soccer.group import Media
 from app.worker_pool import PoolTask
 
@@ -281,7 +281,7 @@ class TestImage:
             archive.writestr("7.png", b"GIF89a")
         views = tuple(replace(view, media=Media(str(path), view.key)) for view in group.views)
         store = app.state.services.store
-        ingest(store, "framed", [replace(group, views=views)], source="test", actor="local")
+        import_groups(store, "framed", [replace(group, views=views)], source="test", actor="local")
         return path
 
     @pytest.mark.parametrize("width", [None, 208])

@@ -7,14 +7,14 @@ from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.body import GONE
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 
 
 def bring(store, groups, **options):
-    return ingest(store, "demo", groups, source="test", actor="ann", **options)
+    return import_groups(store, "demo", groups, source="test", actor="ann", **options)
 
 
 def told(store, group_id: int) -> list[str]:

@@ -13,8 +13,8 @@ from app.features.groups.edit import SetLines, SetStationCamera
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import ingest
+from app.features.imports.cameras import import_given_cameras
+from app.features.imports.ingest import import_groups
 from app.features.imports.sources import ImportSource, import_source
 from app.features.solutions.service import solve_dataset, stale_groups
 from app.features.stations.service import load_station, submit_station
@@ -26,7 +26,7 @@ from tests.cameras import FULL_HD
 
 
 def attach(store, cameras):
-    return ingest_cameras(store, "demo", cameras, source="cameras.zip", actor="ann")
+    return import_given_cameras(store, "demo", cameras, source="cameras.zip", actor="ann")
 
 
 class TestIngestCameras:
@@ -99,7 +99,7 @@ class TestIngestCameras:
     ) -> None:
         known = {"7": covariance_to_json(row_by_row(np.eye(8) * 1e-4), opposite, FULL_HD)}
         options = {"source": "x", "actor": "ann"}
-        ingest_cameras(store, "demo", {"7": opposite}, covariances=known, **options)
+        import_given_cameras(store, "demo", {"7": opposite}, covariances=known, **options)
         assert attach(store, {"7": opposite}).unchanged == 1
         station = load(store, state.id).group.views[0].station
         assert station.given_covariance is not None
@@ -137,7 +137,9 @@ class TestIngestCameras:
         size = state.group.view("7.png").size
         half = opposite.scaled(0.5, 0.5)
         halved = ImageSize(size.width // 2, size.height // 2)
-        report = ingest_cameras(store, "demo", {"7": half}, source="x", actor="ann", size=halved)
+        report = import_given_cameras(
+            store, "demo", {"7": half}, source="x", actor="ann", size=halved
+        )
         given = load(store, state.id).group.view("7.png").station.given
         assert report.problems == []
         assert given.focal_length == opposite.focal_length
@@ -150,7 +152,7 @@ class TestIngestCameras:
         halved = ImageSize(size.width // 2, size.height // 2)
         half, sizes = opposite.scaled(0.5, 0.5), {"7": halved}
         for said, told in ((None, 0), (halved, 0), (ImageSize(640, 480), 1)):
-            report = ingest_cameras(
+            report = import_given_cameras(
                 store, "demo", {"7": half}, source="x", actor="ann", size=said, sizes=sizes
             )
             assert len(report.problems) == told
@@ -173,7 +175,7 @@ class TestIngestCameras:
             bare = bare.with_view(replace(view, station=replace(view.station, given=None)))
         (group_id,) = fill(bare, solved=False)
         attach(store, {"7": opposite})
-        ingest(store, "demo", [replace(bare, label="new")], source="x", actor="ann")
+        import_groups(store, "demo", [replace(bare, label="new")], source="x", actor="ann")
         after = load(store, group_id)
         assert after.group.label == "new"
         assert after.group.view("7.png").station.given == opposite
@@ -190,6 +192,6 @@ class TestIngestCameras:
 
     def test_needs_a_dataset(self, store, opposite) -> None:
         with pytest.raises(NotFoundError):
-            ingest_cameras(store, "nothing", {"7": opposite}, source="x", actor="ann")
+            import_given_cameras(store, "nothing", {"7": opposite}, source="x", actor="ann")
         with pytest.raises(NotFoundError):
             get_dataset(store, "nothing")

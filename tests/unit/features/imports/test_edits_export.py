@@ -13,7 +13,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
-from app.features.findings.queries import group_findings
+from app.features.findings.queries import list_group_findings
 from app.features.findings.service import FindingName, set_dismissal
 from app.features.groups.edit import (
     IncludeView,
@@ -22,17 +22,17 @@ from app.features.groups.edit import (
     SetStationLines,
     set_ball,
 )
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.cameras import ingest_cameras
+from app.features.imports.cameras import import_given_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
 from app.features.imports.ingest import (
     UnassignedFrame,
-    ingest,
-    ingest_unassigned,
-    unassigned_frames,
+    import_groups,
+    import_unassigned_frames,
+    read_unassigned_frames,
 )
 from app.features.imports.merge import merge_edits
 from app.features.pitches.service import change_pitches, read_pitches
@@ -110,16 +110,16 @@ def busy(store, once, fill, make_group, make_static, opposite):
         edit(store, ids[0], set_ball("7.png", BALL))
         edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
         edit(store, ids[1], IncludeView("8_1.png", False))
-        undo(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
+        undo_group_edit(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
         judge(store, ids[0], "deferred", actor="ben")
         judge(store, ids[1], "accepted")
         judge(store, ids[2], "accepted", note="seen on video")
         station = load_station(store, load(store, ids[3]).station_ids["cam2"])
         lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
         submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
-        ingest_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
+        import_given_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
         spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-        ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
+        import_unassigned_frames(store, "demo", spare, source="spare", actor="ann")
         change_policy(store, "demo", replace(STRICT, min_jac=0.5), if_match=None, actor="ann")
         solve_dataset(store, "demo")
         return ids
@@ -141,7 +141,7 @@ class TestRoundTrip:
         kept = []
         for home in (there, store):
             with home.read() as session:
-                kept.append(list(unassigned_frames(session, get_dataset(home, "demo").id)))
+                kept.append(list(read_unassigned_frames(session, get_dataset(home, "demo").id)))
         assert kept[0] == kept[1]
         assert_replays(there)
 
@@ -190,7 +190,7 @@ def both(store, there, fill, make_group, make_static):
     """Two homes that imported the same two groups."""
     groups = [make_group(7), make_static(10)]
     fill(*groups)
-    ingest(there, "demo", groups, source="test", actor="zoe")
+    import_groups(there, "demo", groups, source="test", actor="zoe")
     solve_dataset(there, "demo")
     return store, there
 
@@ -252,7 +252,7 @@ class TestMerge:
         before = ball_of(here, 1, "7.png")
         edit(here, 1, set_ball("7.png", BALL))
         bring(here, there)
-        undo(here, 1, if_match=load(here, 1).etag, actor="ann")
+        undo_group_edit(here, 1, if_match=load(here, 1).etag, actor="ann")
         bring(here, there)
         assert ball_of(there, 1, "7.png") == before
         assert not load(there, 1).stored.edited
@@ -293,7 +293,7 @@ class TestMerge:
         here, there = both
         edit(here, 1, set_ball("7.png", BALL))
         newer = make_group(7, ball=(6.0, 2.0, -0.5))
-        ingest(there, "demo", [newer], source="test", actor="zoe")
+        import_groups(there, "demo", [newer], source="test", actor="zoe")
         assert bring(there, here).findings == 1
         assert ball_of(here, 1, "7.png") == BALL
         assert ball_of(here, 1, "7_1.png") == newer.view("7_1.png").ball
@@ -303,7 +303,7 @@ class TestMerge:
     def test_an_older_state_of_the_source_does_not_come_back(self, both, bring, make_group) -> None:
         here, there = both
         newer = make_group(7, ball=(6.0, 2.0, -0.5))
-        ingest(here, "demo", [newer], source="test", actor="ann")
+        import_groups(here, "demo", [newer], source="test", actor="ann")
         edit(there, 1, set_ball("7_1.png", OTHER))
         assert bring(there, here).findings == 1
         assert ball_of(here, 1, "7.png") == newer.view("7.png").ball
@@ -448,7 +448,7 @@ class TestPitch:
 
     @pytest.fixture
     def sized(self, store: Store, match) -> Store:
-        ingest(store, "demo", match, source="files", actor="ann")
+        import_groups(store, "demo", match, source="files", actor="ann")
         resize(store, SMALL)
         return store
 
@@ -470,12 +470,12 @@ class TestPitch:
     def test_who_changed_it_too_keeps_the_size_and_is_told(
         self, sized, there, bring, match
     ) -> None:
-        ingest(there, "demo", match, source="files", actor="ben")
+        import_groups(there, "demo", match, source="files", actor="ben")
         resize(there, Pitch(101.0, 65.0))
         bring(sized, there)
         assert read_pitches(there, "demo").items[0].pitch == Pitch(101.0, 65.0)
         with there.read() as session:
-            ((view, sentence),) = group_findings(session, 1)
+            ((view, sentence),) = list_group_findings(session, 1)
         assert view is None
         assert "edited the pitch" in sentence
         before = entries(there)

@@ -9,16 +9,16 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.imports.cameras import ingest_cameras
+from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import (
     UnassignedFrame,
     ensure_dataset,
-    ingest,
-    ingest_unassigned,
-    unassigned_frames,
+    import_groups,
+    import_unassigned_frames,
+    read_unassigned_frames,
 )
 from app.features.stations.service import load_station, submit_station
 from app.formats.report import Report
@@ -29,7 +29,7 @@ from tests.unit.features.independent_annotations.begun import begin_take
 
 
 def again(store: Store, *groups: Group):
-    return ingest(store, "demo", groups, source="test", actor="ann")
+    return import_groups(store, "demo", groups, source="test", actor="ann")
 
 
 def without_lines(group: Group) -> Group:
@@ -72,7 +72,7 @@ class TestIngest:
         take = begin_take(store, group, person="ann")
         name = load(store, take.copy_id).dataset
         with pytest.raises(ConflictError, match="independent annotations"):
-            ingest(store, name, [make_group(7)], source="test", actor="lea")
+            import_groups(store, name, [make_group(7)], source="test", actor="lea")
         assert load(store, take.copy_id).group == load(store, group).group
 
     def test_a_group_comes_back_as_it_went_in(self, store, fill, make_group) -> None:
@@ -114,7 +114,7 @@ class TestIngest:
             yield
 
         with pytest.raises(NotFoundError):
-            ingest(store, "demo", failing(), source="test", actor="ann")
+            import_groups(store, "demo", failing(), source="test", actor="ann")
         assert list_datasets(store) == []
 
     def test_a_dataset_that_is_there_is_filled(self, store, make_group) -> None:
@@ -133,7 +133,7 @@ class TestIngest:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            ingest(store, "demo", killed(), source="test", actor="ann")
+            import_groups(store, "demo", killed(), source="test", actor="ann")
         assert get_dataset(store, "demo").groups == 2
         report = again(store, *groups)
         assert (report.new, report.unchanged) == (3, 2)
@@ -154,7 +154,7 @@ class TestIngest:
         one = replace(make_group(9), views=make_group(9).views[:1])
         told = Report()
         groups = [make_group(7), make_group(8), one]
-        report = ingest(store, "demo", groups, source="test", actor="ann", limit_report=told)
+        report = import_groups(store, "demo", groups, source="test", actor="ann", limit_report=told)
         assert (report.new, report.missing) == (1, 0)
         assert [problem.record for problem in told.problems] == [
             make_group(7).key,
@@ -164,7 +164,7 @@ class TestIngest:
     def test_progress_counts_the_groups_done(self, store, make_group) -> None:
         calls: list[int] = []
         groups = [make_group(7), make_group(8)]
-        ingest(store, "demo", groups, source="x", actor="ann", progress=calls.append)
+        import_groups(store, "demo", groups, source="x", actor="ann", progress=calls.append)
         assert calls == [2]
 
     def test_media_are_kept_by_absolute_path(self, store, fill, make_group, monkeypatch, tmp_path):
@@ -243,7 +243,7 @@ class TestAChangedSource:
         self, store, fill, state, make_group
     ) -> None:
         edited = submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
-        undo(store, state.id, if_match=edited.etag, actor="ann")
+        undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)
         assert again(store, changed).findings == 0
         assert load(store, state.id).group == changed
@@ -344,7 +344,7 @@ class TestAChangedSource:
     ) -> None:
         (group_id,) = fill(make_static(10))
         if camera_alone:
-            ingest_cameras(store, "demo", {"cam1": opposite}, source="x", actor="ann")
+            import_given_cameras(store, "demo", {"cam1": opposite}, source="x", actor="ann")
         station_id = load(store, group_id).station_ids["cam1"]
         station = load_station(store, station_id)
         edit = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
@@ -404,15 +404,15 @@ class TestMissingGroups:
         assert get_dataset(store, "demo").groups == 3
 
     def test_groups_of_another_source_are_not_missing(self, store, make_group) -> None:
-        ingest(store, "demo", [make_group(7)], source="first", actor="ann")
-        report = ingest(store, "demo", [make_group(8)], source="second", actor="ann")
+        import_groups(store, "demo", [make_group(7)], source="first", actor="ann")
+        report = import_groups(store, "demo", [make_group(8)], source="second", actor="ann")
         assert (report.missing, report.problems) == (0, [])
 
     def test_a_group_belongs_to_the_source_that_changed_it_last(self, store, make_group) -> None:
-        ingest(store, "demo", [make_group(7), make_group(8)], source="first", actor="ann")
+        import_groups(store, "demo", [make_group(7), make_group(8)], source="first", actor="ann")
         moved = with_ball(make_group(7), "7.png", 300.0)
-        ingest(store, "demo", [moved], source="second", actor="ann")
-        report = ingest(store, "demo", [make_group(8)], source="first", actor="ann")
+        import_groups(store, "demo", [moved], source="second", actor="ann")
+        report = import_groups(store, "demo", [make_group(8)], source="first", actor="ann")
         assert report.missing == 0
 
     def test_the_first_import_misses_nothing(self, store, make_group) -> None:
@@ -427,24 +427,24 @@ def frames(count: int, x: float = 1.5) -> list[UnassignedFrame]:
 def kept(store) -> list[UnassignedFrame]:
     """The spare frames of the only dataset."""
     with store.read() as session:
-        return list(unassigned_frames(session, 1))
+        return list(read_unassigned_frames(session, 1))
 
 
 class TestIngestSpare:
     def test_frames_come_back(self, store) -> None:
-        report = ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
+        report = import_unassigned_frames(store, "demo", frames(3), source="x", actor="ann")
         assert report.new == 3
         assert kept(store) == frames(3)
 
     def test_again_it_changes_nothing_and_follows_changes(self, store) -> None:
-        ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
-        same = ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
+        import_unassigned_frames(store, "demo", frames(3), source="x", actor="ann")
+        same = import_unassigned_frames(store, "demo", frames(3), source="x", actor="ann")
         assert (same.new, same.changed, same.unchanged) == (0, 0, 3)
-        moved = ingest_unassigned(store, "demo", frames(3, 9.0)[:1], source="x", actor="ann")
+        moved = import_unassigned_frames(store, "demo", frames(3, 9.0)[:1], source="x", actor="ann")
         assert moved.changed == 1
         assert kept(store) == [frames(1, 9.0)[0], *frames(3)[1:]]
 
     def test_many_come_in_batches(self, store, monkeypatch) -> None:
         monkeypatch.setattr("app.features.imports.ingest.BATCH", 4)
-        ingest_unassigned(store, "demo", frames(10), source="x", actor="ann")
+        import_unassigned_frames(store, "demo", frames(10), source="x", actor="ann")
         assert len(kept(store)) == 10

@@ -213,5 +213,7 @@ class TestImportInWorker:
     ) -> None:
         path = heavy(tmp_path / "heavy", 16_000_000)
         limit(monkeypatch, store, {"import_seconds": 1})
-        with pytest.raises(TooLargeError, match=r"^data takes more than 1 seconds of processor time$"):
+        with pytest.raises(
+            TooLargeError, match=r"^data takes more than 1 seconds of processor time$"
+        ):
             apart(store, path)

@@ -84,7 +84,8 @@ class TestStation:
 
 class TestParseGroup:
     @pytest.mark.parametrize(
-        ("shared", "said"), [(True, "contains the whole static camera"), ("yes", "neither true nor false")]
+        ("shared", "said"),
+        [(True, "contains the whole static camera"), ("yes", "neither true nor false")],
     )
     def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
         self, shared: Any, said: str

@@ -4,10 +4,10 @@ from app.db.log import Entry, append
 from app.features.imports.queries import (
     VERDICT,
     KnownGroup,
-    group_verdicts,
-    known_groups,
-    newest_imports,
-    shared_stations,
+    find_newest_imports,
+    list_known_groups,
+    list_shared_stations,
+    list_verdicts_of_groups,
 )
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts
 
@@ -18,8 +18,12 @@ class TestKnownGroups:
     def test_gives_all_groups_or_those_of_some_keys(self, filled) -> None:
         expected = [KnownGroup(1, "m/7.png", "m", "source")]
         with filled.read() as session:
-            assert known_groups(session, 1) == known_groups(session, 1, ["m/7.png"]) == expected
-            assert known_groups(session, 1, []) == known_groups(session, 2) == []
+            assert (
+                list_known_groups(session, 1)
+                == list_known_groups(session, 1, ["m/7.png"])
+                == expected
+            )
+            assert list_known_groups(session, 1, []) == list_known_groups(session, 2) == []
 
 
 class TestNewestImports:
@@ -28,17 +32,17 @@ class TestNewestImports:
             for source in ("old", "new"):
                 append(session, [Entry("import", "ann", "t", {"source": source}, 1, 1)])
             append(session, [Entry("edit", "ann", "t", {}, 1, 1)])
-            found = newest_imports(session, [1, 2])
+            found = find_newest_imports(session, [1, 2])
         assert [(entry.group_id, entry.body["source"]) for entry in found] == [(1, "new")]
 
 
 class TestSharedStations:
     def test_a_camera_of_one_view_is_no_shared_station(self, filled, full_group) -> None:
         with filled.read() as session:
-            (found,) = shared_stations(session, 1)
+            (found,) = list_shared_stations(session, 1)
             assert found.station == full_group.views[1].station
-            assert shared_stations(session, 1, "cam1") == [found]
-            assert shared_stations(session, 1, "m/7.png") == []
+            assert list_shared_stations(session, 1, "cam1") == [found]
+            assert list_shared_stations(session, 1, "m/7.png") == []
 
 
 class TestGroupVerdicts:
@@ -48,4 +52,4 @@ class TestGroupVerdicts:
         with filled.write() as session:
             given = [StoredVerdict(1, 1, **first), StoredVerdict(2, 1, **second)]
             insert_verdicts(session, 1, given, actor="ann", at="t")
-            assert group_verdicts(session, [1, 2]) == {1: [first, second]}
+            assert list_verdicts_of_groups(session, [1, 2]) == {1: [first, second]}

@@ -17,7 +17,7 @@ import pytest
 from app.db.log import read_log
 from app.features.datasets.service import get_dataset
 from app.features.imports.jobs import resume_imports
-from app.features.imports.queries import shared_stations
+from app.features.imports.queries import list_shared_stations
 from app.features.imports.upload_queries import get_upload
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.solve.jobs import resume_solving
@@ -356,6 +356,6 @@ class TestRig:
         assert (proposed.state, proposed.kind) == ("done", "rig"), proposed.problem
         assert (proposed.result["accepted"], len(proposed.result["cameras"])) == (None, 4)
         with store.read() as session:
-            given = [item.station for item in shared_stations(session, proposed.dataset_id)]
+            given = [item.station for item in list_shared_stations(session, proposed.dataset_id)]
         assert all(station.given_covariance is None for station in given)
         assert finished(app, api.post(API, json=wanted)).result["rig_job"] is None

@@ -21,9 +21,9 @@ from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import (
     UnassignedFrame,
-    ingest,
-    ingest_unassigned,
-    unassigned_frames,
+    import_groups,
+    import_unassigned_frames,
+    read_unassigned_frames,
 )
 from app.features.imports.sources import FORMATS, USERS, ImportSource, import_source
 from app.features.queue.service import list_groups
@@ -159,10 +159,10 @@ class TestThereAndBack:
         first = replace(group.views[0], extras=Extras((person,), (), {"ball": {"SHOT": "true"}}))
         fill(replace(group, views=(first, *group.views[1:])), make_static(-3))
         spare = UnassignedFrame("cam2", "99", Extras(boxes=(person,)))
-        ingest_unassigned(store, "demo", [spare], source="test", actor="ann")
+        import_unassigned_frames(store, "demo", [spare], source="test", actor="ann")
         again = there_and_back(store, "issia", tmp_path / out)
         with store.read() as session:
-            assert list(unassigned_frames(session, dataset_id(store, "again"))) == [spare]
+            assert list(read_unassigned_frames(session, dataset_id(store, "again"))) == [spare]
         for key, group in groups_of(store, "demo").items():
             views = [replace(view, media=None) for view in group.views]
             assert list(again[key].views) == views
@@ -183,7 +183,7 @@ class TestThereAndBack:
             replace(view, station=replace(view.station, given=None)) for view in make_group(7).views
         ]
         store_groups = [replace(make_group(7), views=tuple(views))]
-        ingest(store, "again", store_groups, source="test", actor="ann")
+        import_groups(store, "again", store_groups, source="test", actor="ann")
         source = ImportSource("cameras", tmp_path / "out")
         imported = import_source(store, "again", source, store.settings)
         assert (imported.result.changed, imported.result.problems) == (2, [])
@@ -542,7 +542,9 @@ class TestMirroredPeople:
             assert view is not None
             dataset = get_dataset(store, "old").id
             with store.read() as session:
-                spare = [one for one in unassigned_frames(session, dataset) if one.camera == "cam2"]
+                spare = [
+                    one for one in read_unassigned_frames(session, dataset) if one.camera == "cam2"
+                ]
             every = (view.extras, *(one.extras for one in spare))
             return [[box["points"]["x1"] for box in extras.boxes] for extras in every]
 

@@ -22,9 +22,9 @@ from app.features.imports.upload_queries import (
     delete_upload,
     expire_uploads,
     get_upload,
-    keep_upload,
     list_uploads,
-    safe_name,
+    make_safe_file_name,
+    save_upload,
     upload_path,
 )
 
@@ -196,22 +196,22 @@ class TestSafeName:
         ],
     )
     def test_an_unsafe_name_becomes_the_nearest_safe_one(self, sent: str, name: str) -> None:
-        assert safe_name(sent) == name
+        assert make_safe_file_name(sent) == name
 
     @pytest.mark.parametrize("sent", ["", "..", "/", "...", "\x00", "\x00" * 130 + "a"])
     def test_a_name_without_a_single_safe_letter_is_refused(self, sent: str) -> None:
         with pytest.raises(InputError):
-            safe_name(sent)
+            make_safe_file_name(sent)
 
     @given(
         st.lists(st.sampled_from(["j", "j" * 19, "j" * 130, ".", " ", "_", "/", "ü"])).map("".join)
     )
     def test_a_safe_name_is_its_own(self, sent: str) -> None:
         try:
-            name = safe_name(sent)
+            name = make_safe_file_name(sent)
         except InputError:
             return
-        assert safe_name(name) == name
+        assert make_safe_file_name(name) == name
         assert len(name) <= 120
         assert name == name.strip(" .")
 
@@ -273,7 +273,7 @@ class TestKeepUpload:
         upload, abort = send(settings, by="ann"), UploadWriter.abort
 
         def slow(writer: UploadWriter) -> None:
-            keep_upload(settings, upload.id)
+            save_upload(settings, upload.id)
             abort(writer)
 
         monkeypatch.setattr(UploadWriter, "abort", slow)
@@ -285,7 +285,7 @@ class TestKeepUpload:
 class TestExpireUploads:
     def test_old_ones_go_and_those_that_a_dataset_reads_stay(self, settings: Settings) -> None:
         old, kept, new = (send(settings, f"{name}.zip") for name in ("old", "kept", "new"))
-        keep_upload(settings, kept.id)
+        save_upload(settings, kept.id)
         then = (datetime.now(UTC) - timedelta(days=8)).isoformat()
         for upload in (old, kept):
             path = settings.uploads / upload.id / "upload.json"
@@ -332,7 +332,7 @@ class TestExpireUploads:
 class TestDeleteUpload:
     def test_is_refused_while_frames_are_read_from_it(self, settings: Settings) -> None:
         upload = send(settings)
-        keep_upload(settings, upload.id)
+        save_upload(settings, upload.id)
         with pytest.raises(InputError, match="reads its frames"):
             delete_upload(settings, upload.id)
         other = send(settings, "b.zip")

@@ -17,10 +17,10 @@ from app.features.imports.upload_queries import (
     Upload,
     UploadWriter,
     delete_upload,
-    keep_upload,
     list_uploads,
+    save_upload,
 )
-from app.features.imports.upload_quota import person_quota, used_bytes
+from app.features.imports.upload_quota import count_used_bytes, find_person_quota
 
 
 @pytest.fixture
@@ -43,9 +43,9 @@ def send(
 
 class TestQuotaOf:
     def test_counts_on_the_server_of_a_team_alone(self, settings: Settings) -> None:
-        assert person_quota(settings) == 1000
-        assert person_quota(settings.model_copy(update={"upload_quota_bytes": 0})) is None
-        assert person_quota(settings.model_copy(update={"team": False})) is None
+        assert find_person_quota(settings) == 1000
+        assert find_person_quota(settings.model_copy(update={"upload_quota_bytes": 0})) is None
+        assert find_person_quota(settings.model_copy(update={"team": False})) is None
 
 
 class TestQuota:
@@ -61,7 +61,7 @@ class TestQuota:
         assert "TOUCHLINE_UPLOAD_QUOTA_BYTES" in caught.value.hint
         assert [path.name for path in settings.uploads.iterdir()] == [first.id]
         assert send(settings, "c.zip", 400, declared=declared)
-        assert used_bytes(settings, "ann") == 1000
+        assert count_used_bytes(settings, "ann") == 1000
 
     def test_tokens_count_for_their_person_and_others_for_themselves(
         self, settings: Settings
@@ -70,18 +70,18 @@ class TestQuota:
         with pytest.raises(TooLargeError):
             send(settings, "b.zip", 200, by="ann")
         assert send(settings, "b.zip", 200, by="ben")
-        assert (used_bytes(settings, "ann"), used_bytes(settings, "ben")) == (900, 200)
+        assert (count_used_bytes(settings, "ann"), count_used_bytes(settings, "ben")) == (900, 200)
 
     def test_what_is_on_its_way_counts_as_much_as_its_sender_says_that_it_has(
         self, settings: Settings
     ) -> None:
         writer = UploadWriter(settings, "a.zip", by="ann", declared=700)
         assert list_uploads(settings) == []
-        assert used_bytes(settings, "ann") == 700
+        assert count_used_bytes(settings, "ann") == 700
         with pytest.raises(TooLargeError):
             UploadWriter(settings, "b.zip", by="ann", declared=400)
         writer.abort()
-        assert used_bytes(settings, "ann") == 0
+        assert count_used_bytes(settings, "ann") == 0
 
     def test_many_at_once_of_which_nobody_says_how_large_they_are_get_no_more(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
@@ -94,8 +94,10 @@ class TestQuota:
 
         with ThreadPoolExecutor(8) as pool:
             list(pool.map(attempt, range(8)))
-        assert used_bytes(settings, "ann") == sum(item.bytes for item in list_uploads(settings))
-        assert used_bytes(settings, "ann") <= 1000
+        assert count_used_bytes(settings, "ann") == sum(
+            item.bytes for item in list_uploads(settings)
+        )
+        assert count_used_bytes(settings, "ann") <= 1000
 
     def test_one_that_lost_its_sender_stops_counting(self, settings: Settings) -> None:
         writer = UploadWriter(settings, "a.zip", by="ann", declared=700)
@@ -103,16 +105,16 @@ class TestQuota:
         for folder, _, names in os.walk(settings.uploads):
             for path in (Path(folder), *(Path(folder, name) for name in names)):
                 os.utime(path, (then, then))
-        assert used_bytes(settings, "ann") == 0
+        assert count_used_bytes(settings, "ann") == 0
         writer.abort()
 
     def test_a_deleted_one_makes_room_and_one_that_a_dataset_reads_counts(
         self, settings: Settings
     ) -> None:
         kept, other = send(settings, "a.zip", 500), send(settings, "b.zip", 500)
-        keep_upload(settings, kept.id)
+        save_upload(settings, kept.id)
         delete_upload(settings, other.id)
-        assert used_bytes(settings, "ann") == 500
+        assert count_used_bytes(settings, "ann") == 500
 
     def test_without_a_quota_nobody_counts(self, settings: Settings) -> None:
         free = settings.model_copy(update={"upload_quota_bytes": 0})

@@ -9,7 +9,7 @@ import pytest
 from app.config import Settings
 from app.errors import TooLargeError
 from app.features.imports.upload_queries import Upload
-from app.features.imports.uploads import begin_upload, finish_upload, own_uploads
+from app.features.imports.uploads import begin_upload, finish_upload, list_own_uploads
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 
 ANN, BEN = (Visibility(all_but=False, name=name) for name in ("ann", "ben"))
@@ -37,6 +37,6 @@ class TestOwnUploads:
     def test_each_sees_what_they_sent_and_an_admin_everything(self, settings: Settings) -> None:
         anns, bens = send(settings, b"{}", "ann"), send(settings, b"[]", "ben")
         assert (anns.by, bens.by) == (("ann",), ("ben",))
-        assert own_uploads(settings, ANN) == [anns]
-        assert own_uploads(settings, BEN) == [bens]
-        assert own_uploads(settings, EVERYTHING) == [bens, anns]
+        assert list_own_uploads(settings, ANN) == [anns]
+        assert list_own_uploads(settings, BEN) == [bens]
+        assert list_own_uploads(settings, EVERYTHING) == [bens, anns]

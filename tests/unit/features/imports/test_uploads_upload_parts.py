@@ -22,7 +22,7 @@ from app.features.imports.upload_queries import (
     list_uploads,
     upload_path,
 )
-from app.features.imports.upload_quota import used_bytes
+from app.features.imports.upload_quota import count_used_bytes
 from app.features.imports.uploads import PartWriter, begin_upload_in_parts
 
 FILM = bytes(range(256)) * 40
@@ -87,7 +87,7 @@ class TestBeginInParts:
             begin(settings, size=0)
         team = settings.model_copy(update={"team": True, "upload_quota_bytes": len(FILM) + 100})
         begin(team)
-        assert used_bytes(team, "ann") == len(FILM)
+        assert count_used_bytes(team, "ann") == len(FILM)
         with pytest.raises(TooLargeError, match=r"10,240 are used, and this file needs 101"):
             begin(team, size=101)
         assert begin(team).bytes == 0

@@ -8,7 +8,7 @@ from app.db.store import Store
 from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations import service as take
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.service import begin_in_session, get_annotation
+from app.features.independent_annotations.service import begin_annotation_in_session, get_annotation
 
 
 def begin_for_batch(
@@ -16,7 +16,7 @@ def begin_for_batch(
 ) -> IndependentAnnotation:
     """Let a person begin a group on a batch's terms, and solve their copy."""
     with store.write() as session:
-        begun = begin_in_session(session, group_id, person=person, **terms)
+        begun = begin_annotation_in_session(session, group_id, person=person, **terms)
     solve_and_keep(store, begun.copy_id)
     return begun
 

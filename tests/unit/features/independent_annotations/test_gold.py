@@ -13,15 +13,15 @@ from app.features.groups.history import read_history
 from app.features.groups.submit import load, submit
 from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.gold import (
-    mark_group,
+    mark_gold_group,
     median_interval,
-    read_report,
+    read_gold_report,
     set_gold_start,
-    unmark_group,
-    wilson,
+    unmark_gold_group,
+    wilson_interval,
 )
-from app.features.independent_annotations.known_truth import BatchTerms, begin_next
-from app.features.independent_annotations.queries import gold_truth
+from app.features.independent_annotations.known_truth import BatchTerms, begin_next_annotation
+from app.features.independent_annotations.queries import read_gold_truth
 from app.features.independent_annotations.service import submit_annotation
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
@@ -42,7 +42,7 @@ def terms(store, fill, make_group) -> BatchTerms:
     """A batch of two groups of three; the third one is gold."""
     groups = fill(*(make_group(number) for number in (1, 2, 3)))
     judge(store, groups[2])
-    mark_group(store, groups[2], "imported", actor="lea")
+    mark_gold_group(store, groups[2], "imported", actor="lea")
     dataset_id = load(store, groups[0]).dataset_id
     return BatchTerms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
 
@@ -50,20 +50,20 @@ def terms(store, fill, make_group) -> BatchTerms:
 class TestMark:
     def test_only_a_group_with_a_verdict_is_made_gold(self, store, state) -> None:
         with pytest.raises(ConflictError):
-            mark_group(store, state.id, "bare", actor="lea")
+            mark_gold_group(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError):
-            mark_group(store, state.id, "half", actor="lea")
+            mark_gold_group(store, state.id, "half", actor="lea")
         judge(store, state.id)
-        assert mark_group(store, state.id, "bare", actor="lea").start == "bare"
-        assert unmark_group(store, state.id, actor="lea").group == state.id
+        assert mark_gold_group(store, state.id, "bare", actor="lea").start == "bare"
+        assert unmark_gold_group(store, state.id, actor="lea").group == state.id
         with pytest.raises(NotFoundError):
-            unmark_group(store, state.id, actor="lea")
+            unmark_gold_group(store, state.id, actor="lea")
 
     def test_the_history_of_a_group_does_not_tell_that_it_is_gold(self, store, state) -> None:
         judge(store, state.id)
         before = [entry.kind for entry in read_history(store, state.id)]
         etag = load(store, state.id).etag
-        mark_group(store, state.id, "bare", actor="lea")
+        mark_gold_group(store, state.id, "bare", actor="lea")
         assert [entry.kind for entry in read_history(store, state.id)] == before
         assert load(store, state.id).etag == etag
 
@@ -71,16 +71,16 @@ class TestMark:
 class TestStartWith:
     def test_what_is_true_stays_although_the_group_is_another_by_now(self, store, state) -> None:
         judge(store, state.id)
-        marked = mark_group(store, state.id, "bare", actor="lea")
+        marked = mark_gold_group(store, state.id, "bare", actor="lea")
         with store.read() as session:
-            truth = gold_truth(session, state.id)
+            truth = read_gold_truth(session, state.id)
         view = state.group.views[0]
         change(store, state.id, set_ball(view.key, BallAnnotation(box=Box(1, 1, 9, 9))), "ann")
         changed = set_gold_start(store, state.id, "without_balls", actor="max")
         assert changed == replace(marked, start="without_balls")
-        assert read_report(store, state.dataset_id).groups == (changed,)
+        assert read_gold_report(store, state.dataset_id).groups == (changed,)
         with store.read() as session:
-            assert gold_truth(session, state.id) == truth
+            assert read_gold_truth(session, state.id) == truth
 
     def test_of_an_ordinary_group_there_is_nothing_to_begin_with(self, store, state) -> None:
         with pytest.raises(NotFoundError, match="not a gold group"):
@@ -88,7 +88,7 @@ class TestStartWith:
         with pytest.raises(NotFoundError, match="there is no group 99"):
             set_gold_start(store, 99, "bare", actor="lea")
         judge(store, state.id)
-        mark_group(store, state.id, "bare", actor="lea")
+        mark_gold_group(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError) as refused:
             set_gold_start(store, state.id, "half", actor="lea")
         assert refused.value.pointer == "/start"
@@ -97,7 +97,9 @@ class TestStartWith:
 class TestMixing:
     def test_each_gold_group_once_and_it_looks_like_the_others(self, store, terms) -> None:
         copies, kinds = [], []
-        while (take := begin_next(store, terms, person="ann", chance=Random(1))) is not None:
+        while (
+            take := begin_next_annotation(store, terms, person="ann", chance=Random(1))
+        ) is not None:
             copies.append(load(store, take.copy_id))
             kinds.append(take.kind)
             judge(store, take.copy_id, actor="ann")
@@ -115,11 +117,13 @@ class TestMixing:
         ("start", "balls", "lines"), [("without_balls", 0, True), ("bare", 0, False)]
     )
     def test_it_is_stripped_of_what_is_measured(self, store, terms, start, balls, lines) -> None:
-        gold = read_report(store, terms.dataset_id).groups[0]
-        mark_group(store, gold.group, start, actor="lea")
+        gold = read_gold_report(store, terms.dataset_id).groups[0]
+        mark_gold_group(store, gold.group, start, actor="lea")
         chance = Random(1)
         takes = []
-        while (take := begin_next(store, terms, person="ann", chance=chance)) is not None:
+        while (
+            take := begin_next_annotation(store, terms, person="ann", chance=chance)
+        ) is not None:
             takes.append(take)
             judge(store, take.copy_id, actor="ann")
         (found,) = [take for take in takes if take.kind == "gold"]
@@ -129,7 +133,7 @@ class TestMixing:
 
 class TestReadReport:
     def test_it_says_how_far_somebody_is_from_the_truth(self, store, terms) -> None:
-        while (take := begin_next(store, terms, person="ann")) is not None:
+        while (take := begin_next_annotation(store, terms, person="ann")) is not None:
             if take.kind == "gold":
                 group = load(store, take.copy_id).group
                 view = group.views[0]
@@ -142,7 +146,7 @@ class TestReadReport:
             reject = ("rejected", "ann", "bad_field_lines")
             state, actor, reason = reject if take.kind == "gold" else ("accepted", "ann", None)
             judge(store, take.copy_id, state, actor, reason)
-        (person,) = read_report(store, terms.dataset_id).people
+        (person,) = read_gold_report(store, terms.dataset_id).people
         (result,) = person.results
         assert (result.verdict, result.true_verdict, result.right) == (
             "rejected",
@@ -159,7 +163,9 @@ class TestReadReport:
     ) -> None:
         take = next(
             one
-            for one in iter(lambda: begin_next(store, terms, person="ann", chance=Random(1)), None)
+            for one in iter(
+                lambda: begin_next_annotation(store, terms, person="ann", chance=Random(1)), None
+            )
             if one.kind == "gold" or not submit_annotation(store, one.id, actor="ann")
         )
         view = load(store, take.copy_id).group.views[0]
@@ -167,13 +173,13 @@ class TestReadReport:
         wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
         change(store, take.copy_id, set_ball(view.key, wrong), "ann")
         submit_annotation(store, take.id, actor="ann")
-        (first,) = read_report(store, terms.dataset_id).people[0].results
+        (first,) = read_gold_report(store, terms.dataset_id).people[0].results
         assert (first.error.ball_px, first.submissions) == (pytest.approx(30.0), 1)
         return_annotation(store, take.id, "look again", actor="lea")
-        assert read_report(store, terms.dataset_id).people[0].results == (first,)
+        assert read_gold_report(store, terms.dataset_id).people[0].results == (first,)
         change(store, take.copy_id, set_ball(view.key, view.balls[0]), "ann")
         judge(store, take.copy_id, actor="ann")
-        (second,) = read_report(store, terms.dataset_id).people[0].results
+        (second,) = read_gold_report(store, terms.dataset_id).people[0].results
         assert second == replace(first, submissions=2)
 
 
@@ -196,6 +202,6 @@ class TestNumbers:
         assert median_interval([1.0] * 5).low is None
 
     def test_of_nothing_there_is_no_share(self) -> None:
-        assert wilson(0, 0) == (None, None)
-        low, high = wilson(10, 10)
+        assert wilson_interval(0, 0) == (None, None)
+        low, high = wilson_interval(10, 10)
         assert low == pytest.approx(0.722, abs=1e-3) and high == pytest.approx(1.0)

@@ -14,8 +14,8 @@ from app.features.datasets.service import get_dataset
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
-from app.features.independent_annotations.gold import mark_group, read_report
+from app.features.imports.ingest import import_groups
+from app.features.independent_annotations.gold import mark_gold_group, read_gold_report
 from app.features.independent_annotations.service import get_annotation_of_copy
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -46,7 +46,7 @@ def film(store: Store, tmp_path: Path) -> dict[int, int]:
                 replace(view, media=Media(f"{view.key}.mp4", frame=frame)) for view in group.views
             )
             groups.append(replace(group, views=views))
-    ingest(store, "film", groups, source="issia", actor="local")
+    import_groups(store, "film", groups, source="issia", actor="local")
     solve_dataset(store, "film")
     dataset = get_dataset(store, "film").id
     rows = list_groups(store, dataset, limit=9).items
@@ -70,7 +70,7 @@ class TestGoldInAFilm:
     def test_it_is_mixed_in_looks_like_any_frame_and_its_error_is_shown(
         self, store: Store, film: dict[int, int]
     ) -> None:
-        mark_group(store, film[GOLD], "imported", actor="lea")
+        mark_gold_group(store, film[GOLD], "imported", actor="lea")
         frames = ",".join(str(film[FIRST + n]) for n in range(3))
         new = NewBatch("film", f"id:{frames}", annotators=["ann"], gold_every=2)
         batch = make_batch(store, "film", new, actor="lea").id
@@ -93,7 +93,7 @@ class TestGoldInAFilm:
         assert (kinds.count("gold"), kinds.count("independent")) == (1, 3)
         assert len(shapes) == 1
         assert get_batch(store, batch).submitted == 3
-        (person,) = read_report(store, "film").people
+        (person,) = read_gold_report(store, "film").people
         (result,) = person.results
         assert (person.person, result.group) == ("ann", film[GOLD])
         assert result.error.ball_px == pytest.approx(5.0)
@@ -104,7 +104,7 @@ class TestGoldInAFilm:
     def test_its_annotator_begins_without_the_ball_and_has_the_cameras(
         self, store: Store, film: dict[int, int], start: str
     ) -> None:
-        mark_group(store, film[GOLD], start, actor="lea")
+        mark_gold_group(store, film[GOLD], start, actor="lea")
         new = NewBatch("film", f"id:{film[FIRST]}", annotators=["ann"], gold_every=1)
         batch = make_batch(store, "film", new, actor="lea").id
         copy = Leases(store).next(batch, ANN).group
@@ -114,5 +114,5 @@ class TestGoldInAFilm:
         # Static cameras are everybody's: their lines are not those of this picture.
         assert all(view.station.lines for view in views)
         Leases(store).submit(batch, copy, ANN, actor="ann")
-        ((result,),) = [one.results for one in read_report(store, "film").people]
+        ((result,),) = [one.results for one in read_gold_report(store, "film").people]
         assert (result.error.ball_px, result.error.balls_missing) == (None, 6)

@@ -10,21 +10,21 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.agreement.service import after_submission
+from app.features.agreement.service import compare_or_adopt_submission
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
 from app.features.batches.leases import BatchMember, Leases
-from app.features.batches.progress import my_work
+from app.features.batches.progress import list_own_batches
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
-from app.features.independent_annotations.gold import TruthSource, read_report, set_gold_start
+from app.features.imports.ingest import import_groups
+from app.features.independent_annotations.gold import TruthSource, read_gold_report, set_gold_start
 from app.features.independent_annotations.known_truth import (
     BatchTerms,
     GoldChoice,
-    begin_next,
-    mark_known,
+    begin_next_annotation,
+    mark_groups_with_known_truth,
 )
 from app.features.independent_annotations.queries import GOLD
 from app.features.independent_annotations.service import get_annotation_of_copy
@@ -61,7 +61,7 @@ def scenes(store: Store, tmp_path: Path):
             for view in scene.group.views
         )
         groups.append(replace(scene.group, views=views))
-    ingest(store, "demo", groups, source="files", actor="local")
+    import_groups(store, "demo", groups, source="files", actor="local")
     return made
 
 
@@ -91,15 +91,15 @@ def drawn_as_it_is(store: Store, copy: int, scene, aside: float) -> None:
 
 class TestSample:
     def test_errors_are_those_against_the_true_cameras_and_ball(self, store, scenes) -> None:
-        chosen = mark_known(store, "demo", SAMPLE, actor="lea")
+        chosen = mark_groups_with_known_truth(store, "demo", SAMPLE, actor="lea")
         assert (len(chosen.groups), chosen.left_out) == (3, 1)
         terms = BatchTerms(4, load(store, 1).dataset_id, [4], 1, True, "2000", gold_every=1)
-        take = begin_next(store, terms, person="ann")
+        take = begin_next_annotation(store, terms, person="ann")
         assert take is not None and take.kind == "gold"
         scene = scenes[take.group_id - 1]
         drawn_as_it_is(store, take.copy_id, scene, 0.0)
         judge(store, take.copy_id, "ann")
-        report = read_report(store, "demo")
+        report = read_gold_report(store, "demo")
         assert {one.source for one in report.groups} == {TruthSource.SAMPLE}
         ((result,),) = [person.results for person in report.people]
         assert result.error.line_px < 0.5 and result.error.ball_px < 0.01
@@ -107,18 +107,18 @@ class TestSample:
         assert (result.right, result.true_verdict) == (None, "unreviewed")
 
     def test_balls_that_are_aside_are_off_by_that_much(self, store, scenes) -> None:
-        mark_known(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
+        mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
         take = begin_for_batch(store, 1, "ann", kind=GOLD, nameless=True)
         drawn_as_it_is(store, take.copy_id, scenes[0], 6.0)
         judge(store, take.copy_id, "ann")
-        ((result,),) = [person.results for person in read_report(store, "demo").people]
+        ((result,),) = [person.results for person in read_gold_report(store, "demo").people]
         assert result.error.ball_px == pytest.approx(6)
         assert result.error.line_px < 0.5 and result.error.ball_m > 0.05
 
     def test_what_annotators_begin_with_changes_nothing_of_what_is_known(
         self, store, scenes
     ) -> None:
-        mark_known(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
+        mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
         judge(store, 1, "lea")
         # Said twice it is changed once.
         for _ in range(2):
@@ -133,10 +133,10 @@ class TestSample:
         truth = tmp_path / TRUTH
         truth.rename(tmp_path / "elsewhere.json")
         with pytest.raises(InputError, match="none of these groups has known true values"):
-            mark_known(store, "demo", SAMPLE, actor="lea")
+            mark_groups_with_known_truth(store, "demo", SAMPLE, actor="lea")
         truth.symlink_to(tmp_path / "elsewhere.json")
         with pytest.raises(InputError, match="none of these groups has known true values"):
-            mark_known(store, "demo", SAMPLE, actor="lea")
+            mark_groups_with_known_truth(store, "demo", SAMPLE, actor="lea")
 
 
 class TestVersion:
@@ -145,13 +145,13 @@ class TestVersion:
         for person in ("ann", "bo"):
             copy = begin_take(store, 2, person=person).copy_id
             judge(store, copy, person)
-        assert after_submission(store, copy) == "agreed"
+        assert compare_or_adopt_submission(store, copy) == "agreed"
         judge(store, 1, "ann")
         for person, moved in (("ann", 0.0), ("bo", 40.0)):
             copy = begin_take(store, 3, person=person).copy_id
             drawn_as_it_is(store, copy, scenes[2], moved)
             judge(store, copy, person)
-        assert after_submission(store, copy) == "open"
+        assert compare_or_adopt_submission(store, copy) == "open"
         judge(store, 3, "cy")
         freeze_dataset(store, "demo", FreezeRequest("v1"), actor="lea")
         key = load(store, 2).group.views[0].key
@@ -159,13 +159,15 @@ class TestVersion:
         frozen = load(store, 2)
         submit(store, 2, set_ball(key, ball), if_match=frozen.etag, actor="cy")
         choice = GoldChoice(TruthSource.VERSION, version="v1")
-        assert mark_known(store, "demo", choice, actor="lea").groups == (2,)
+        assert mark_groups_with_known_truth(store, "demo", choice, actor="lea").groups == (2,)
         take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)
         judge(store, take.copy_id, "dee")
-        ((result,),) = [person.results for person in read_report(store, "demo").people]
+        ((result,),) = [person.results for person in read_gold_report(store, "demo").people]
         assert (result.right, result.error.ball_px, result.error.line_px) == (True, 0, 0)
         with pytest.raises(InputError, match="give the frozen version"):
-            mark_known(store, "demo", GoldChoice(TruthSource.VERSION), actor="lea")
+            mark_groups_with_known_truth(
+                store, "demo", GoldChoice(TruthSource.VERSION), actor="lea"
+            )
 
 
 class TestRunningBatch:
@@ -178,13 +180,13 @@ class TestRunningBatch:
         leases, ada = Leases(store), BatchMember("ada")
         first = leases.next(batch.id, ada).group
         leases.submit(batch.id, first, ada, actor="ada")
-        mark_known(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
+        mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
         change_batch(store, batch.id, actor="lea", gold_every=1)
         copy = leases.next(batch.id, ada).group
         assert load(store, copy).group.label == "Group 1"
         judge(store, copy, "ada")
-        assert [one.person for one in read_report(store, "demo").people] == ["ada"]
-        assert my_work(store, lambda _: ada)[0].left == 2
+        assert [one.person for one in read_gold_report(store, "demo").people] == ["ada"]
+        assert list_own_batches(store, lambda _: ada)[0].left == 2
         second = get_annotation_of_copy(store, leases.next(batch.id, ada).group).group_id
         change_batch(store, batch.id, actor="lea", no_gold=True)
         assert {first, second, leases.next(batch.id, ada).group} <= {2, 3, 4} and first != second

@@ -7,19 +7,19 @@ import pytest
 
 from app.db.log import newest_entry, verify_chain
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.batches.own_annotations import own_left
+from app.features.batches.own_annotations import count_own_groups_left
 from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, solve_and_keep, submit
 from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
-from app.features.independent_annotations.gold import mark_group
+from app.features.independent_annotations.gold import mark_gold_group
 from app.features.independent_annotations.known_truth import (
     BatchTerms,
-    begin_next,
+    begin_next_annotation,
     count_gold_left,
     is_gold_turn,
 )
@@ -206,10 +206,12 @@ class TestStart:
         groups = fill(*(make_group(number) for number in range(1, 6)))
         for group, start in zip(groups[3:], starts, strict=True):
             judge(store, group, actor="lea")
-            mark_group(store, group, start, actor="lea")
+            mark_gold_group(store, group, start, actor="lea")
         terms = BatchTerms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
         kinds = []
-        while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
+        while (
+            take := begin_next_annotation(store, terms, person="ann", chance=Random(3))
+        ) is not None:
             kinds.append(take.kind)
             copy = load(store, take.copy_id).group
             assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
@@ -324,7 +326,7 @@ class TestAdoptTake:
         with pytest.raises(ConflictError):
             judge(store, take.copy_id, "deferred")
         assert faults(store) == []
-        back = undo(store, state.id, if_match=after.etag, actor="lea")
+        back = undo_group_edit(store, state.id, if_match=after.etag, actor="lea")
         assert back.group == state.group
 
     def test_a_view_that_was_left_out_is_left_out_then(self, store, state) -> None:
@@ -411,12 +413,12 @@ class TestBeginNext:
 
         def left(person: str) -> int:
             with store.read() as session:
-                return own_left(session, batch, person)
+                return count_own_groups_left(session, batch, person)
 
         for person, comes in (("ann", 3), ("ben", 3), ("cleo", 0)):
             assert left(person) == comes
             for rest in range(comes, 0, -1):
-                take = begin_next(store, terms, person=person)
+                take = begin_next_annotation(store, terms, person=person)
                 assert left(person) == rest
                 submit_annotation(store, take.id, actor=person)
             assert left(person) == 0
@@ -426,9 +428,9 @@ class TestBeginNext:
         terms = BatchTerms(5, load(store, groups[0]).dataset_id, groups, 2, True, "2000")
         had = []
         for person in ("ann", "ben", "cleo"):
-            while (take := begin_next(store, terms, person=person)) is not None:
+            while (take := begin_next_annotation(store, terms, person=person)) is not None:
                 had.append((person, take.group_id))
-                assert begin_next(store, terms, person=person) == take
+                assert begin_next_annotation(store, terms, person=person) == take
                 submit_annotation(store, take.id, actor=person)
         assert had == [(name, group) for name in ("ann", "ben") for group in groups]
         assert len(list_annotations(store, terms.dataset_id, lambda _: False, person="ann")) == 2

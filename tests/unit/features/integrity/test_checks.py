@@ -15,7 +15,7 @@ from app.config import Settings
 from app.db.check import Check
 from app.db.home import make_home
 from app.db.store import Store
-from app.features.imports.upload_queries import UploadWriter, keep_upload
+from app.features.imports.upload_queries import UploadWriter, save_upload
 from app.features.integrity import checks
 from app.features.integrity.checks import examine_home, examine_surroundings
 from app.features.people.login_queries import put_identity
@@ -72,7 +72,10 @@ class TestSignOn:
             other = {**provider.described(), "issuer": "https://other.example"}
             there = "/.well-known/openid-configuration"
             provider.instead[there] = lambda handler: tell(handler, other)
-            assert "is not the provider in TOUCHLINE_SSO_ISSUER" in faults(settings)["single sign-on"].sentence
+            assert (
+                "is not the provider in TOUCHLINE_SSO_ISSUER"
+                in faults(settings)["single sign-on"].sentence
+            )
         assert "valid response" in faults(settings)["single sign-on"].sentence
         half = Settings(home=tmp_path / "home", sso_issuer=provider.address)
         assert "lacks TOUCHLINE_SSO_CLIENT_ID" in faults(half)["single sign-on"].sentence
@@ -165,7 +168,7 @@ class TestExamineSurroundings:
         writer = UploadWriter(settings, "frames.zip")
         writer.write(b"frames")
         upload = writer.finish()
-        keep_upload(settings, upload.id)
+        save_upload(settings, upload.id)
         part = settings.uploads / "x.part"
         part.touch()
         os.utime(part, (0, 0))

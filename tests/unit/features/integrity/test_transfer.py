@@ -10,7 +10,7 @@ from sqlalchemy import text
 from app.config import Settings
 from app.db.store import Store
 from app.errors import DamagedError, InputError, StorageError
-from app.features.groups.revision_queries import newest_change_id
+from app.features.groups.revision_queries import find_newest_change_id
 from app.features.integrity import transfer as module
 from app.features.integrity.transfer import transfer_database
 from tests.databases import POSTGRESQL
@@ -47,7 +47,7 @@ class TestTransfer:
         target.yields.mkdir(parents=True)
         with closing(Store.open(source)) as store, store.write() as session:
             session.execute(text("UPDATE groups SET split = split"))
-            assert newest_change_id(session) == 2
+            assert find_newest_change_id(session) == 2
         done = transfer_database(source, target)
         assert done.entries == 3
         # Marks of changes are the target's own, and nothing remembers those of the source.
@@ -57,7 +57,7 @@ class TestTransfer:
             made = "INSERT INTO dataset (name, created, policy, policy_hash)"
             statement = text(f"{made} VALUES ('x', '', '', '') RETURNING id")
             assert session.scalar(statement) == 2
-            assert newest_change_id(session) == 1
+            assert find_newest_change_id(session) == 1
 
     def test_one_that_was_stopped_goes_on_and_nothing_else_opens_its_target(
         self, source: Settings, databases

@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.features.integrity.transfer import settings_of_both_databases
+from app.features.integrity.transfer import make_settings_of_both_databases
 
 ADDRESS = "postgresql://ann:secret@db/touchline"
 
@@ -30,7 +30,7 @@ def file(tmp_path: Path) -> Path:
 def test_a_home_that_goes_into_a_database_keeps_its_files(
     settings: Settings, file: Path, tmp_path: Path
 ) -> None:
-    begin, end = settings_of_both_databases(str(tmp_path / "home"), str(file), settings)
+    begin, end = make_settings_of_both_databases(str(tmp_path / "home"), str(file), settings)
     assert (begin.home, begin.database_url) == (tmp_path / "home", None)
     assert (end.home, end.database_url) == (tmp_path / "home", ADDRESS)
 
@@ -38,7 +38,7 @@ def test_a_home_that_goes_into_a_database_keeps_its_files(
 def test_a_database_that_goes_into_a_home_makes_a_new_home(
     settings: Settings, tmp_path: Path
 ) -> None:
-    begin, end = settings_of_both_databases(
+    begin, end = make_settings_of_both_databases(
         "postgresql://db/touchline", str(tmp_path / "new"), settings
     )
     assert begin.database_url == "postgresql://db/touchline"
@@ -48,18 +48,18 @@ def test_a_database_that_goes_into_a_home_makes_a_new_home(
 @pytest.mark.parametrize("address", [ADDRESS, "postgresql://db/touchline?user=ann&password=secret"])
 def test_a_password_that_everybody_could_read_is_refused(settings: Settings, address: str) -> None:
     with pytest.raises(InputError, match="can read the password in FROM"):
-        settings_of_both_databases(address, "home", settings)
+        make_settings_of_both_databases(address, "home", settings)
     with pytest.raises(InputError, match="can read the password in TO"):
-        settings_of_both_databases("home", address, settings)
+        make_settings_of_both_databases("home", address, settings)
 
 
 def test_a_file_that_others_may_read_is_refused(settings: Settings, file: Path) -> None:
     file.chmod(0o640)
     with pytest.raises(InputError, match="other users can read"):
-        settings_of_both_databases(str(file), "home", settings)
+        make_settings_of_both_databases(str(file), "home", settings)
 
 
 def test_a_file_without_an_address_is_refused(settings: Settings, file: Path) -> None:
     file.write_text("db/touchline")
     with pytest.raises(InputError, match="holds no address of a database"):
-        settings_of_both_databases("home", str(file), settings)
+        make_settings_of_both_databases("home", str(file), settings)

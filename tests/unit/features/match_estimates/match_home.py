@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.formats.sn_calibration import LineFile
 from app.soccer.group import Group, Station, View
@@ -23,7 +23,7 @@ def ingest_match(home: Path, match: str, files: Iterable[LineFile]) -> None:
         view = View(f"{file.stem}.png", station)
         groups.append(Group(f"{match}/{file.stem}.png", (view,), match=match))
     with closing(Store.open(Settings(home=home))) as store:
-        ingest(store, "demo", groups, source="files", actor="ann")
+        import_groups(store, "demo", groups, source="files", actor="ann")
 
 
 def ingest_by_policies(home: Path, match: Iterable[Group], policies: Mapping[str, Policy]) -> None:
@@ -31,5 +31,5 @@ def ingest_by_policies(home: Path, match: Iterable[Group], policies: Mapping[str
     groups = list(match)
     with closing(Store.open(Settings(home=home))) as store:
         for dataset, policy in policies.items():
-            ingest(store, dataset, groups, source="files", actor="ann")
+            import_groups(store, dataset, groups, source="files", actor="ann")
             change_policy(store, dataset, policy, if_match=None, actor="ann")

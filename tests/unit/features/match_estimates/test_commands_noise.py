@@ -12,7 +12,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from tests.unit.features.policies.test_commands import Run, run  # noqa: F401
 from tests.unit.features.policies.test_noise import blurred
@@ -36,7 +36,7 @@ def filled_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home, rng = tmp_path_factory.mktemp("noise") / "home", np.random.default_rng(5)
     with closing(Store.open(Settings(home=home))) as store:
         groups = [blurred(str(n), rng, given=False, noisy="b") for n in range(40)]
-        ingest(store, "noisy", groups, source="test", actor="ann")
+        import_groups(store, "noisy", groups, source="test", actor="ann")
         solve_dataset(store, "noisy")
     return home
 

@@ -13,8 +13,8 @@ from app.command_line import app
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError
-from app.features.imports.ingest import ingest
-from app.features.imports.queries import shared_stations
+from app.features.imports.ingest import import_groups
+from app.features.imports.queries import list_shared_stations
 from tests.rigs import groups
 
 
@@ -23,7 +23,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
     """A home with the balls that four static cameras show."""
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path))
     store = Store.open(Settings())
-    ingest(store, "rig", groups(45), source="test", actor="ann")
+    import_groups(store, "rig", groups(45), source="test", actor="ann")
     yield store
     store.close()
 
@@ -31,7 +31,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
 def known(store: Store) -> list[bool]:
     """Of each static camera, whether anything is known of its uncertainty."""
     with store.read() as session:
-        stations = shared_stations(session, 1)
+        stations = list_shared_stations(session, 1)
     return [item.station.given_covariance is not None for item in stations]
 
 

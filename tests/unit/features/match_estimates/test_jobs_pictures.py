@@ -12,7 +12,7 @@ import pytest
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import jobs as pictures_job
@@ -47,7 +47,7 @@ def frames(match: str) -> list[Group]:
 @pytest.fixture
 def two(store: Store) -> Store:
     """A match whose pictures are too wide, and one whose are not."""
-    ingest(store, "demo", [*frames(PLAIN), *frames(WIDE)], source="files", actor="ann")
+    import_groups(store, "demo", [*frames(PLAIN), *frames(WIDE)], source="files", actor="ann")
     return store
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates.jobs import POSITIONS
@@ -23,7 +23,7 @@ from tests.waiting import SECONDS
 def two(store: Store) -> Store:
     """Two matches, and a policy that uses what they share."""
     groups = [replace(group, match=f"{place % 2}") for place, group in enumerate(match())]
-    ingest(store, "demo", groups, source="files", actor="ann")
+    import_groups(store, "demo", groups, source="files", actor="ann")
     change_policy(store, "demo", SHARING, if_match=None, actor="ann")
     return store
 

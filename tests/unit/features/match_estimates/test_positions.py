@@ -8,11 +8,11 @@ import pytest
 
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetLines, SetPicture
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates import queries as positions_in_store
 from app.features.match_estimates.positions import (
@@ -62,7 +62,7 @@ def shared(store, once):
     """The match, its positions shared, and solved."""
 
     def fill():
-        ingest(store, "demo", match(), source="files", actor="ann")
+        import_groups(store, "demo", match(), source="files", actor="ann")
         solve_dataset(store, "demo")
         change_policy(store, "demo", SHARING, if_match=None, actor="ann")
         share_positions(store, "demo", actor="ann")
@@ -97,7 +97,7 @@ def draw(store, number):
 
 class TestSharePositions:
     def test_is_refused_where_the_policy_would_not_use_it(self, store):
-        ingest(store, "demo", match(), source="files", actor="ann")
+        import_groups(store, "demo", match(), source="files", actor="ann")
         with pytest.raises(ConflictError, match="does not use"):
             share_positions(store, "demo", actor="ann")
 
@@ -158,7 +158,7 @@ class TestSharePositions:
         assert state(shared).current is False
 
     def test_too_few_pictures_share_nothing(self, store):
-        ingest(store, "demo", match()[:3], source="files", actor="ann")
+        import_groups(store, "demo", match()[:3], source="files", actor="ann")
         change_policy(store, "demo", SHARING, if_match=None, actor="ann")
         share_positions(store, "demo", actor="ann")
         assert (state(store).shared, state(store).current) == (0, True)
@@ -177,14 +177,14 @@ class TestSharePositions:
     def test_undo_of_a_group_takes_back_its_own_edits_alone(self, shared):
         draw(shared, 1)
         positions = load(shared, 1).group.positions
-        after = undo(shared, 1, if_match=load(shared, 1).etag, actor="ann")
+        after = undo_group_edit(shared, 1, if_match=load(shared, 1).etag, actor="ann")
         assert after.group.positions == positions
         assert state(shared).current is True
 
     def test_an_import_keeps_it(self, shared):
         first, *_ = match()
         changed = replace(first, label="the source says more of it now")
-        ingest(shared, "demo", (changed,), source="files", actor="ann")
+        import_groups(shared, "demo", (changed,), source="files", actor="ann")
         assert load(shared, 1).group.label == changed.label
         assert len(load(shared, 1).group.positions) == 1
         with shared.read() as session:
@@ -224,7 +224,7 @@ class TestSharePositions:
 
     def test_a_group_that_comes_from_another_match_brings_nothing_said_there(self, shared):
         first, *_ = match()
-        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
         assert {item.match: item.current for item in get_positions(shared, "demo").items} == {
             MATCH: False,
             "b": None,
@@ -232,11 +232,11 @@ class TestSharePositions:
 
     def test_where_a_newer_group_came_from_elsewhere_its_own_share_counts(self, shared):
         *_, fifth, sixth = match()
-        ingest(shared, "demo", (replace(fifth, match="b"),), source="files", actor="ann")
+        import_groups(shared, "demo", (replace(fifth, match="b"),), source="files", actor="ann")
         share_positions(shared, "demo", ["b"], actor="ann")
         draw(shared, 1)
         share_positions(shared, "demo", [MATCH], actor="ann")
-        ingest(shared, "demo", (replace(sixth, match="b"),), source="files", actor="ann")
+        import_groups(shared, "demo", (replace(sixth, match="b"),), source="files", actor="ann")
         (other,) = [item for item in get_positions(shared, "demo").items if item.match == "b"]
         assert other.current is False
 
@@ -245,7 +245,7 @@ class TestSharePositions:
         first, *_ = match()
 
         def estimate(task):
-            ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+            import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
             return whole(task)
 
         monkeypatch.setattr(editing, "_estimate_match", estimate)
@@ -254,7 +254,7 @@ class TestSharePositions:
 
     def test_an_import_into_another_match_leaves_it_behind(self, shared):
         first, *_ = match()
-        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
         assert load(shared, 1).group.positions == {}
 
     def test_a_version_holds_it_and_is_verified_bit_for_bit(self, shared):
@@ -303,11 +303,11 @@ class TestTakeBackPositions:
 
     def test_what_a_group_had_in_another_match_is_not_taken_back(self, shared):
         first, *_ = match()
-        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
         with pytest.raises(ConflictError, match="the frames of b share no camera position"):
             take_back(shared, "b")
 
     def test_where_nothing_was_shared_it_is_refused(self, store):
-        ingest(store, "demo", match(), source="files", actor="ann")
+        import_groups(store, "demo", match(), source="files", actor="ann")
         with pytest.raises(ConflictError, match="share no camera position"):
             take_back(store, MATCH)

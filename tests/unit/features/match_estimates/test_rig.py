@@ -10,7 +10,7 @@ from app.errors import ConflictError, InputError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibration, SetStationCamera
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.match_estimates import rig
 from app.features.match_estimates.rig import (
     CAMERAS,
@@ -155,7 +155,7 @@ class TestAccept:
     def test_importing_the_dataset_again_changes_nothing_of_it(self, store, proposed) -> None:
         accept_rig(store, proposed, CAMERAS, actor="ann")
         before = stations(store, proposed)
-        report = ingest(store, "demo", groups(), source="test", actor="ann")
+        report = import_groups(store, "demo", groups(), source="test", actor="ann")
         assert (report.changed, report.findings) == (0, 0)
         assert stations(store, proposed) == before
 
@@ -231,7 +231,7 @@ class TestAccept:
         edit = SetStationCamera(GIVEN[view.key], covariance)
         submit_station(store, before.id, edit, if_match=before.etag, actor="ann")
         edited = load_station(store, before.id)
-        report = ingest(store, "demo", bare, source="test", actor="ann")
+        report = import_groups(store, "demo", bare, source="test", actor="ann")
         assert (report.changed, report.findings) == (0, 0)
         assert load_station(store, before.id) == edited
 

@@ -90,7 +90,10 @@ def test_a_take_back_that_is_sent_again_is_answered_as_the_first_time(
 def test_a_second_take_back_is_refused(api, shared) -> None:
     assert api.delete(POSITIONS, params={"match": shared}).status_code == 202
     answer = api.delete(POSITIONS, params={"match": shared})
-    assert (answer.status_code, "share no camera position" in answer.json()["detail"]) == (409, True)
+    assert (answer.status_code, "share no camera position" in answer.json()["detail"]) == (
+        409,
+        True,
+    )
 
 
 def test_where_solving_cannot_be_asked_for_nothing_is_taken_back(

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.http.deps import Services
 from tests.rigs import groups
 
@@ -15,7 +15,7 @@ ADDRESS = "/api/v1/datasets/rig/rig"
 def services(app) -> Services:
     """The application's, with a dataset of four static cameras."""
     services: Services = app.state.services
-    ingest(services.store, "rig", groups(45), source="test", actor="ann")
+    import_groups(services.store, "rig", groups(45), source="test", actor="ann")
     return services
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE, looking
@@ -100,7 +100,7 @@ class TestOfDataset:
         store = Store.open(Settings(home=home))
         media = Media(str(tmp_path / "gone.png"))
         group = Group("1", (View("a", Station("a", SIZE), media=media),), match="m")
-        ingest(store, "demo", [group], source="files", actor="ann")
+        import_groups(store, "demo", [group], source="files", actor="ann")
         store.close()
         return partial(touchline, "propose", "--dataset", "demo")
 

@@ -9,7 +9,7 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.jobs.service import Jobs
 from app.features.paint import jobs as paint_job
@@ -39,7 +39,7 @@ def without_files(groups: list[Group]) -> list[Group]:
 @pytest.fixture
 def asked(store: Store) -> Store:
     """A match whose pictures are gone, and a policy that uses their paint."""
-    ingest(store, "demo", without_files(match()), source="files", actor="ann")
+    import_groups(store, "demo", without_files(match()), source="files", actor="ann")
     change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
     return store
 

@@ -8,7 +8,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.jobs.service import Jobs
 from app.features.paint import jobs as proposals_job
 from app.features.paint import proposals as editing
@@ -31,7 +31,7 @@ def gone(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store
         Group(f"{n}", (View("a", Station(f"{n}", SIZE), media=Media(str(tmp_path / f"{n}.png"))),))
         for n in range(VIEWS)
     ]
-    ingest(store, "demo", groups, source="files", actor="ann")
+    import_groups(store, "demo", groups, source="files", actor="ann")
     return store
 
 

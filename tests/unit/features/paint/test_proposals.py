@@ -16,13 +16,13 @@ from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError
 from app.features.groups import pictures as proposal_reading
 from app.features.groups.edit import SetLines
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.pictures import MISSING
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.edits_export import group_to_merge
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.paint import proposals as editing
 from app.features.paint.proposals import (
     ProposalRun,
@@ -101,7 +101,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
 
 @pytest.fixture
 def filled(store: Store, groups: list[Group]) -> Store:
-    ingest(store, "demo", groups, source="files", actor="ann")
+    import_groups(store, "demo", groups, source="files", actor="ann")
     solve_dataset(store, "demo")
     return store
 
@@ -129,7 +129,9 @@ class TestProposeViews:
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        ingest(store, "demo", [Group("5", (view("cam1", media),))], source="files", actor="ann")
+        import_groups(
+            store, "demo", [Group("5", (view("cam1", media),))], source="files", actor="ann"
+        )
         seen: list[bool] = []
 
         def look(task, settings):  # type: ignore[no-untyped-def]
@@ -174,7 +176,7 @@ class TestProposeViews:
             Group("4", (view("4", None, given=cropped),), match="m"),
             Group("5", (view("5", None, lines=mixed),), match="m"),
         ]
-        ingest(store, "demo", [*groups, *odd], source="files", actor="ann")
+        import_groups(store, "demo", [*groups, *odd], source="files", actor="ann")
         solve_dataset(store, "demo")
         propose_views(store, "demo")
         ((camera,),) = asked
@@ -214,7 +216,7 @@ class TestProposeViews:
         self, store, groups, asked, tmp_path: Path
     ):
         draw(tmp_path / "b.png", empty=True)
-        ingest(store, "demo", groups, source="files", actor="ann")
+        import_groups(store, "demo", groups, source="files", actor="ann")
         propose_views(store, "demo")
         solve_dataset(store, "demo")
         assert propose_views(store, "demo") == ProposalRun(views=1, nothing=1)
@@ -225,7 +227,7 @@ class TestProposeViews:
         shared = [
             Group(str(number), (view("cam1", media, shared=True),), match="m") for number in (1, 2)
         ]
-        ingest(store, "demo", shared, source="files", actor="ann")
+        import_groups(store, "demo", shared, source="files", actor="ann")
         assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
         assert counts(store) == (1, 1, 1, 0, 0, 0)
 
@@ -235,7 +237,7 @@ class TestProposeViews:
             Group(str(number), (view(f"{number}.png", draw(tmp_path / f"{number}.png")),))
             for number in range(3)
         ]
-        ingest(store, "demo", many, source="files", actor="ann")
+        import_groups(store, "demo", many, source="files", actor="ann")
 
         def stop(_done, _total):
             raise JobCancelled
@@ -266,7 +268,7 @@ class TestAccepting:
         assert set(edit["source"].values()) == {"proposed"} and edit["edit"] == "set_lines"
         said = freeze_annotations(state.group)
         assert '"proposed":["' in said.texts[said.key]
-        back = undo(filled, 2, if_match=state.etag, actor="bob")
+        back = undo_group_edit(filled, 2, if_match=state.etag, actor="bob")
         assert back.group == before.group and back.group.view(key).station.proposed == ()
 
     def test_who_says_the_lines_is_part_of_what_is_said(self, filled, asked):
@@ -303,7 +305,7 @@ class TestAccepting:
         moved = SetLines(key, {first: state.group.view(key).station.lines[first][:-1]})
         after = submit(filled, 2, moved, if_match=state.etag, actor="bob")
         assert after.group.view(key).station.proposed == tuple(rest)
-        back = undo(filled, 2, if_match=after.etag, actor="bob")
+        back = undo_group_edit(filled, 2, if_match=after.etag, actor="bob")
         assert back.group.view(key).station.proposed == (first, *rest)
 
     def test_what_is_accepted_is_no_longer_open_and_undo_opens_it(self, filled, asked):
@@ -312,7 +314,7 @@ class TestAccepting:
         accept(filled)
         assert counts(filled) == (0, 0, 0, 0, 0, 1)
         assert found(filled, "proposal:any") == []
-        undo(filled, 2, if_match=load(filled, 2).etag, actor="bob")
+        undo_group_edit(filled, 2, if_match=load(filled, 2).etag, actor="bob")
         assert found(filled, "proposal:any") == [2]
 
 
@@ -326,7 +328,9 @@ class TestDrawnLines:
         first = view("p.png", draw(tmp_path / "p.png"), lines=few)
         second = view("q.png", draw(tmp_path / "q.png"), lines=lines_of(CAMERA))
         bare = view("r.png", None, lines=few)
-        ingest(store, "demo", [Group("3", (first, second, bare), match="m")], source="f", actor="a")
+        import_groups(
+            store, "demo", [Group("3", (first, second, bare), match="m")], source="f", actor="a"
+        )
         return store
 
     def test_are_looked_at_once_they_are_solved(self, poor, asked):
@@ -342,7 +346,7 @@ class TestDrawnLines:
         names = iter(lines_of(CAMERA))
         mixed = {next(names): points for points in reversed(lines_of(CAMERA).values())}
         wrong = view("w.png", draw(tmp_path / "w.png"), lines=mixed)
-        ingest(store, "demo", [Group("1", (wrong,), match="m")], source="f", actor="a")
+        import_groups(store, "demo", [Group("1", (wrong,), match="m")], source="f", actor="a")
         solve_dataset(store, "demo")
         calibration = load(store, 1).solution.views[0].calibration
         assert calibration.camera is not None and calibration.unobservable
@@ -366,7 +370,7 @@ class TestDrawnLines:
         assert after.solution.views[0].calibration.camera is not None
         assert counts(poor) == (0, 0, 0, 0, 0, 1)
         assert not get_group_proposals(poor, 1)[0][1]
-        back = undo(poor, 1, if_match=after.etag, actor="bob")
+        back = undo_group_edit(poor, 1, if_match=after.etag, actor="bob")
         assert back.group == before.group
         assert get_group_proposals(poor, 1)[0][1]
 
@@ -396,7 +400,7 @@ class TestDrawnLines:
         shared = [
             Group(str(n), (view("cam1", media, shared=True, lines=few),), match="m") for n in (1, 2)
         ]
-        ingest(store, "demo", shared, source="files", actor="ann")
+        import_groups(store, "demo", shared, source="files", actor="ann")
         solve_dataset(store, "demo")
         assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
 
@@ -426,7 +430,7 @@ class TestForget:
         assert forget_proposals(filled, "demo") == 0
 
     def test_leaves_other_datasets_alone(self, filled, groups, asked):
-        ingest(filled, "other", groups, source="files", actor="ann")
+        import_groups(filled, "other", groups, source="files", actor="ann")
         propose_views(filled, "demo")
         propose_views(filled, "other")
         assert forget_proposals(filled, "other") == 1

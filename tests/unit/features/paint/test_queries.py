@@ -12,7 +12,11 @@ from app.db.store import Store
 from app.errors import DamagedError, StorageError
 from app.features.datasets.queries import delete_rows
 from app.features.groups.queries import read_groups
-from app.features.groups.revision_queries import next_revision, refresh_inputs_hashes, save_revision
+from app.features.groups.revision_queries import (
+    make_next_revision,
+    refresh_inputs_hashes,
+    save_revision,
+)
 from app.features.paint.queries import insert_readings, match_paint, read_readings
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 
@@ -28,7 +32,7 @@ def give(store: Store, *readings: PaintReading) -> None:
         (stored,) = read_groups(session, [1]).values()
         keys = [view.key for view in stored.group.views]
         paint = dict(zip(keys, readings, strict=False))
-        after = next_revision(stored, replace(stored.group, paint=paint), "t")
+        after = make_next_revision(stored, replace(stored.group, paint=paint), "t")
         save_revision(session, stored, after)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.soccer.group import Media
 from tests.waiting import SECONDS
 
@@ -42,7 +42,9 @@ def test_an_unknown_match_is_404(api, using) -> None:
 def test_it_is_read_by_a_job_told_in_the_history_and_taken_back(app, api, using, group) -> None:
     lost = (replace(view, media=Media(f"/gone/{view.key}")) for view in group.views)
     with_pictures = replace(group, views=tuple(lost))
-    ingest(app.state.services.store, "broadcast", [with_pictures], source="test", actor="ann")
+    import_groups(
+        app.state.services.store, "broadcast", [with_pictures], source="test", actor="ann"
+    )
     job = api.post(PAINT, json={}).json()
     assert job["kind"] == "paint"
     done = app.state.services.jobs.wait(job["id"], SECONDS)

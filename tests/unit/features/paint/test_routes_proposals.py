@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.soccer.group import Media
 from app.soccer.pitch import Pitch
 from tests.unit.paint.lawns import TRUE, drawn, lawn
@@ -29,7 +29,7 @@ def group_id(app, api, group, tmp_path: Path) -> int:
     )
     views = (replace(first, media=Media(str(path))), replace(second, media=None))
     store = app.state.services.store
-    ingest(store, "bare", [replace(group, views=views)], source="test", actor="local")
+    import_groups(store, "bare", [replace(group, views=views)], source="test", actor="local")
     found = api.get(f"{API}/groups", params={"dataset": "bare"}).json()["items"][0]["id"]
     assert isinstance(found, int)
     return found

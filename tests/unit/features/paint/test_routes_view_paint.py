@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.soccer.group import Media
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE
@@ -34,7 +34,7 @@ def document(app, api, group, tmp_path: Path) -> dict[str, Any]:
     station = replace(first.station, lines=lines_of(CAMERA))
     views = (replace(first, media=Media(str(path)), station=station), second)
     store = app.state.services.store
-    ingest(store, "painted", [replace(group, views=views)], source="test", actor="local")
+    import_groups(store, "painted", [replace(group, views=views)], source="test", actor="local")
     row = api.get(f"{API}/groups", params={"dataset": "painted"}).json()["items"][0]
     return api.get(f"{API}/groups/{row['id']}").json()
 

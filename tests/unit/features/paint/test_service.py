@@ -15,13 +15,13 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups import pictures as paint_reading
 from app.features.groups.edit import SetLines, set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.edits_export import group_to_merge
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.paint import service as editing
 from app.features.paint.service import get_paint, read_paint, take_back_paint
 from app.features.policies.service import change_policy
@@ -114,7 +114,7 @@ def painted(store, once, pictures, here) -> Store:
     """The two groups, their paint read, and solved."""
 
     def fill():
-        ingest(store, "demo", groups(pictures), source="files", actor="ann")
+        import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         solve_dataset(store, "demo")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
         read_paint(store, "demo", actor="ann", run="first")
@@ -154,7 +154,7 @@ def inside(box, place):
 
 class TestReadPaint:
     def test_is_refused_where_the_policy_would_not_use_it(self, store, pictures):
-        ingest(store, "demo", groups(pictures), source="files", actor="ann")
+        import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         with pytest.raises(ConflictError, match="does not use the paint"):
             read_paint(store, "demo", actor="ann")
 
@@ -258,7 +258,7 @@ class TestReadPaint:
     def test_undo_of_the_lines_brings_their_paint_back(self, painted):
         before = calibrations(painted)
         draw(painted, 1)
-        undo(painted, 1, if_match=load(painted, 1).etag, actor="ann")
+        undo_group_edit(painted, 1, if_match=load(painted, 1).etag, actor="ann")
         assert calibrations(painted) == before
 
     def test_where_other_people_hide_paint_now_it_is_read_again(self, painted, pictures, looked):
@@ -270,7 +270,7 @@ class TestReadPaint:
             replace(first.views[0], extras=replace(first.views[0].extras, boxes=boxes[1:]))
         )
         before = load(painted, 1)
-        ingest(painted, "demo", [changed, other], source="files", actor="ann")
+        import_groups(painted, "demo", [changed, other], source="files", actor="ann")
         assert state(painted).old == 1
         solve_dataset(painted, "demo")
         after = load(painted, 1)
@@ -293,7 +293,7 @@ class TestReadPaint:
         first, other = groups(pictures)
         reading = load(painted, 1).group.paint
         bare = replace(first, views=tuple(replace(view, extras=Extras()) for view in first.views))
-        ingest(painted, "demo", [bare, other], source="files", actor="ann")
+        import_groups(painted, "demo", [bare, other], source="files", actor="ann")
         # What a process was at while that happened is given afterwards.
         with painted.write() as session:
             editing._give_readings(session, 1, {1: reading}, "ann", {"run": "late"})
@@ -320,7 +320,7 @@ class TestReadPaint:
         picture = cv2.imread(str(file))
         cv2.imwrite(str(other), np.full_like(picture, 127))
         view = replace(changed.views[0], media=Media(str(other)))
-        ingest(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
+        import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
         assert len(load(painted, 1).group.paint) == 2
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
@@ -331,7 +331,7 @@ class TestReadPaint:
     def test_a_picture_that_is_gone_keeps_what_was_read_of_it(self, painted, pictures, tmp_path):
         changed = groups(pictures)[0]
         view = replace(changed.views[0], media=Media(str(tmp_path / "gone.png")))
-        ingest(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
+        import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
         read_paint(painted, "demo", actor="ann")
         assert load(painted, 1).group.paint[view.key].reason is None
         draw(painted, 1)
@@ -346,7 +346,7 @@ class TestReadPaint:
     ):
         first, second = groups(pictures)
         bare = first.with_view(replace(first.views[0], media=None))
-        ingest(store, "demo", [bare, second], source="files", actor="ann")
+        import_groups(store, "demo", [bare, second], source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
         read_paint(store, "demo", actor="ann")
         solve_dataset(store, "demo")
@@ -368,7 +368,7 @@ class TestReadPaint:
             media=Media(str(tmp_path / "half.png")),
             station=replace(changed.views[0].station, flipped=True),
         )
-        ingest(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
+        import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         found, truth = calibrations(painted)[0], scenes()[0].truth.view(view.key).camera
@@ -378,7 +378,7 @@ class TestReadPaint:
     def test_a_run_that_ends_early_is_taken_up_where_it_was(
         self, store, pictures, here, looked, monkeypatch
     ):
-        ingest(store, "demo", groups(pictures), source="files", actor="ann")
+        import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
         monkeypatch.setattr(editing, "_PER_WORKER", 1)
 
@@ -392,7 +392,7 @@ class TestReadPaint:
         assert (len(looked), state(store).read) == (4, 4)
 
     def test_pictures_are_read_in_processes_of_their_own(self, store, pictures, looked):
-        ingest(store, "demo", groups(pictures)[:1], source="files", actor="ann")
+        import_groups(store, "demo", groups(pictures)[:1], source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
         read_paint(store, "demo", actor="ann", workers=1)
         assert (state(store).painted, looked) == (2, [])
@@ -407,7 +407,7 @@ class TestKept:
         assert load(painted, 1).stored == before
 
     def test_without_paint_reading_groups_costs_no_statement_more(self, store, pictures, counted):
-        ingest(store, "demo", groups(pictures), source="files", actor="ann")
+        import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         with counted(store) as cost, store.read() as session:
             read_groups(session, [1, 2])
         assert cost.statements == 1
@@ -433,7 +433,7 @@ class TestKept:
 
     def test_an_import_keeps_it(self, painted, pictures):
         changed = replace(groups(pictures)[0], label="the source says more of it now")
-        ingest(painted, "demo", [changed], source="files", actor="ann")
+        import_groups(painted, "demo", [changed], source="files", actor="ann")
         assert len(load(painted, 1).group.paint) == 2
         with painted.read() as session:
             assert replay_log(session) == read_state_snapshot(session)

@@ -13,7 +13,7 @@ from app.features.datasets.service import require_matches
 from app.features.groups.edit import SetLines
 from app.features.groups.queries import read_groups
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.paint import service
 from app.features.paint.service import take_back_paint
 from app.features.paint.tripod import share_tripods
@@ -28,7 +28,9 @@ def dataset(store) -> Store:
     """Four groups of a match, and one without; each with its paint, as if it had just been read."""
     groups = [*match()[1].values()]
     groups.append(replace(groups[0], key="alone", match=""))
-    ingest(store, "demo", [replace(each, paint={}) for each in groups], source="f", actor="ann")
+    import_groups(
+        store, "demo", [replace(each, paint={}) for each in groups], source="f", actor="ann"
+    )
     change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
     with store.write() as session:
         wanted = {number: each.paint for number, each in enumerate(groups, start=1)}

@@ -8,13 +8,13 @@ from sqlalchemy import Engine, event
 
 from app.errors import InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.service import dataset_id
-from app.features.findings.service import finding_values
+from app.features.findings.service import iterate_findings_as_json
 from app.features.groups.edit import SetLines
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,
     estimate_pitches,
@@ -58,7 +58,7 @@ def solved(store, once):
     """The season, solved, and the pitch of its matches estimated."""
 
     def fill():
-        ingest(store, "demo", season(), source="files", actor="ann")
+        import_groups(store, "demo", season(), source="files", actor="ann")
         solve_dataset(store, "demo")
         estimate_pitches(store, "demo")
 
@@ -98,7 +98,11 @@ class TestEstimatePitches:
         assert proposal.proposed.width == pytest.approx(66.0, abs=0.3)
 
     def test_the_match_has_one_finding(self, solved):
-        (found,) = [item for item in finding_values(solved, "demo") if item["kind"] == "pitch_size"]
+        (found,) = [
+            item
+            for item in iterate_findings_as_json(solved, "demo")
+            if item["kind"] == "pitch_size"
+        ]
         assert found["group"] == f"{SMALL}/0.png"
         listed = list_groups(solved, dataset_id(solved, "demo"), "finding:pitch_size").items
         assert [row.key for row in listed] == [found["group"]]
@@ -121,7 +125,7 @@ class TestEstimatePitches:
             estimate_pitches(solved, "demo")
 
     def test_a_match_of_few_frames_says_why_there_is_no_size(self, store):
-        ingest(store, "demo", season()[:3], source="files", actor="ann")
+        import_groups(store, "demo", season()[:3], source="files", actor="ann")
         (item,) = estimate_pitches(store, "demo").items
         assert (item.estimate, item.proposed) == (None, None)
         assert "needs 5" in item.problem
@@ -130,7 +134,7 @@ class TestEstimatePitches:
         wide = PictureGeometry(1.05, (0.0, 0.0), (0.001, 0.001, 0.001))
         groups = [stretched(group, wide) for group in season() if group.match == RIGHT]
         open_ones = [stretched(group, OPEN) for group in season() if group.match == SMALL]
-        ingest(store, "demo", [*groups, *open_ones], source="files", actor="ann")
+        import_groups(store, "demo", [*groups, *open_ones], source="files", actor="ann")
         found = {item.match: item for item in estimate_pitches(store, "demo").items}
         assert found[RIGHT].proposed is None
         assert found[RIGHT].estimate.length == pytest.approx(105.0, abs=0.3)
@@ -141,7 +145,7 @@ class TestEstimatePitches:
 class TestGroupsWithoutMatch:
     def test_another_size_is_proposed_and_accepted_for_all_of_them(self, store):
         nameless = [replace(group, match="") for group in season()[:6]]
-        ingest(store, "demo", nameless, source="files", actor="ann")
+        import_groups(store, "demo", nameless, source="files", actor="ann")
         (item,) = estimate_pitches(store, "demo").proposals
         assert item.proposed.length == pytest.approx(103.0, abs=0.3)
         assert item.proposed.width == pytest.approx(66.0, abs=0.3)
@@ -152,26 +156,26 @@ class TestGroupsWithoutMatch:
 
     def test_a_size_holds_for_those_that_it_was_said_of(self, store):
         first, second, third = (replace(group, match="") for group in season()[:3])
-        ingest(store, "demo", [first, second], source="files", actor="ann")
+        import_groups(store, "demo", [first, second], source="files", actor="ann")
         accept(store, match="", pitch=TRUE)
         (item,) = read_pitches(store, "demo").items
         assert item.previous == Pitch()
         changed = replace(first, label="the source says more of it now")
-        ingest(store, "demo", [changed, second, third], source="files", actor="ann")
+        import_groups(store, "demo", [changed, second, third], source="files", actor="ann")
         assert [load(store, n).group.pitch for n in (1, 2, 3)] == [TRUE, TRUE, Pitch()]
         assert load(store, 1).group.label == changed.label
         # One more came since: the size before was not that of all.
         assert read_pitches(store, "demo").items[0].previous is None
         with store.write() as session:
             give_pitch(session, 1, [3], Pitch(101.0, 65.0), "ann")
-        ingest(store, "demo", [first], source="files", actor="ann")
+        import_groups(store, "demo", [first], source="files", actor="ann")
         assert [load(store, n).group.pitch.length for n in (1, 2, 3)] == [103.0, 103.0, 101.0]
         assert read_pitches(store, "demo").items[0].previous is None
         assert_replays(store)
 
     def test_of_several_pitches_nothing_is_proposed_and_that_is_said(self, store):
         nameless = [replace(group, match="") for group in season()]
-        ingest(store, "demo", nameless, source="files", actor="ann")
+        import_groups(store, "demo", nameless, source="files", actor="ann")
         (item,) = estimate_pitches(store, "demo").items
         assert (item.estimate, item.proposed) == (None, None)
         assert "pitches of several sizes" in item.problem
@@ -184,7 +188,7 @@ class TestGroupsWithoutMatch:
             for group in season()[:2]
             for view in group.views
         ]
-        ingest(store, "demo", bare, source="files", actor="ann")
+        import_groups(store, "demo", bare, source="files", actor="ann")
         assert estimate_pitches(store, "demo").items == ()
 
 
@@ -197,7 +201,9 @@ class TestChangePitches:
     def test_the_finding_goes_once_the_size_is_accepted(self, solved):
         accept(solved)
         solve_dataset(solved, "demo")
-        assert "pitch_size" not in {item["kind"] for item in finding_values(solved, "demo")}
+        assert "pitch_size" not in {
+            item["kind"] for item in iterate_findings_as_json(solved, "demo")
+        }
 
     def test_the_size_before_takes_it_back(self, solved):
         accept(solved)
@@ -221,7 +227,7 @@ class TestChangePitches:
         view = state.group.views[0].key
         submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
         accept(solved)
-        state = undo(solved, 1, if_match=load(solved, 1).etag, actor="ann")
+        state = undo_group_edit(solved, 1, if_match=load(solved, 1).etag, actor="ann")
         assert state.group.pitch == TRUE
         assert state.group.views[0].station.lines == season()[0].views[0].station.lines
 
@@ -249,13 +255,13 @@ class TestChangePitches:
 
     def test_an_import_keeps_it_and_new_groups_of_the_match_get_it(self, store):
         first, second, third, *_ = season()
-        ingest(store, "demo", (first, second), source="files", actor="ann")
+        import_groups(store, "demo", (first, second), source="files", actor="ann")
         accept(store)
-        ingest(store, "demo", (first, third), source="files", actor="ann")
+        import_groups(store, "demo", (first, third), source="files", actor="ann")
         changed = Group(
             second.key, second.views, match=SMALL, label="the source says more of it now"
         )
-        ingest(store, "demo", (changed,), source="files", actor="ann")
+        import_groups(store, "demo", (changed,), source="files", actor="ann")
         assert [load(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
         assert load(store, 2).group.label == changed.label
         with store.read() as session:
@@ -263,22 +269,22 @@ class TestChangePitches:
 
     def test_an_import_keeps_it_for_groups_that_came_later(self, store):
         first, second, third, *_ = season()
-        ingest(store, "demo", (first, second), source="files", actor="ann")
+        import_groups(store, "demo", (first, second), source="files", actor="ann")
         accept(store)
-        ingest(store, "demo", (third,), source="files", actor="ann")
+        import_groups(store, "demo", (third,), source="files", actor="ann")
         changed = Group(third.key, third.views, match=SMALL, label="the source says more now")
-        ingest(store, "demo", (changed,), source="files", actor="ann")
+        import_groups(store, "demo", (changed,), source="files", actor="ann")
         assert load(store, 3).group == replace(changed, pitch=TRUE)
         assert [entry.kind for entry in read_history(store, 3)] == ["import", "pitch", "import"]
         assert_replays(store)
 
     def test_a_group_that_comes_later_gets_the_newest_size(self, store):
         first, second, third, *_ = season()
-        ingest(store, "demo", (first, second), source="files", actor="ann")
+        import_groups(store, "demo", (first, second), source="files", actor="ann")
         with store.write() as session:
             give_pitch(session, 1, [2], TRUE, "ann")
             give_pitch(session, 1, [1], Pitch(101.0, 65.0), "ann")
-        ingest(store, "demo", (third,), source="files", actor="ann")
+        import_groups(store, "demo", (third,), source="files", actor="ann")
         assert load(store, 3).group.pitch == Pitch(101.0, 65.0)
 
 
@@ -328,7 +334,7 @@ class TestReadPitches:
             replace(group, key=f"{group.key}+", match=f"{number}")
             for number, group in enumerate(season())
         ]
-        ingest(solved, "demo", more, source="files", actor="ann")
+        import_groups(solved, "demo", more, source="files", actor="ann")
         assert len(questions(solved)) == one
 
 

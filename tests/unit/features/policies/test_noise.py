@@ -16,7 +16,7 @@ from app.features.groups.edit import set_ball
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
 from app.features.groups.submit import submit
-from app.features.imports.ingest import ensure_dataset, ingest
+from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies import noise
 from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
 from app.features.policies.service import change_policy, policy_with, read_policy
@@ -102,7 +102,7 @@ def _mean_sigma(store: Store) -> float:
 def make(store: Store, *, given: bool) -> None:
     rng = np.random.default_rng(1)
     groups = [blurred(str(n), rng, given=given) for n in range(25)]
-    ingest(store, "demo", groups, source="test", actor="ann")
+    import_groups(store, "demo", groups, source="test", actor="ann")
     solve_dataset(store, "demo")
 
 
@@ -121,7 +121,7 @@ class TestReadNoise:
     def test_a_camera_and_a_person_with_noisier_balls_are_named(self, store: Store) -> None:
         rng = np.random.default_rng(5)
         groups = [blurred(str(n), rng, given=False, noisy="b") for n in range(40)]
-        ingest(store, "demo", groups, source="test", actor="ann")
+        import_groups(store, "demo", groups, source="test", actor="ann")
         solve_dataset(store, "demo")
         with store.write() as session:
             append(session, [*placings(read_states_of(store))])
@@ -153,7 +153,7 @@ class TestReadNoise:
             for n in range(8)
             for group in [blurred(str(n), rng, given=False)]
         ]
-        ingest(store, "demo", groups, source="test", actor="ann")
+        import_groups(store, "demo", groups, source="test", actor="ann")
         solve_dataset(store, "demo")
         found = read_noise(store, "demo")
         assert found.line_estimate is not None and found.line_estimate.views == 24
@@ -259,7 +259,7 @@ def make_lined(store: Store, policy: Policy = PAPER, groups: int = 10) -> None:
         for n in range(groups)
         for group in [blurred(str(n), rng, given=False)]
     ]
-    ingest(store, "demo", made, source="test", actor="ann", policy=policy)
+    import_groups(store, "demo", made, source="test", actor="ann", policy=policy)
     if policy is PAPER:
         solve_dataset(store, "demo")
 
@@ -324,7 +324,7 @@ class TestFollowing:
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         make_lined(store, TOUCHLINE)
-        monkeypatch.setattr(noise, "is_copy", lambda *_: True)
+        monkeypatch.setattr(noise, "is_copy_dataset", lambda *_: True)
         solve_fully(store, "demo", None, nobody)
         assert read_policy(store, "demo").policy == TOUCHLINE
 
@@ -333,7 +333,7 @@ class TestFollowing:
     ) -> None:
         make_lined(store, TOUCHLINE)
         solve_fully(store, "demo", None, nobody)
-        ingest(
+        import_groups(
             store,
             "demo",
             [blurred("bad", np.random.default_rng(2), given=False)],
@@ -369,6 +369,6 @@ class TestFollowing:
         make_lined(store, TOUCHLINE)
         solve_fully(store, "demo", None, nobody)
         rng = np.random.default_rng(1)
-        ingest(store, "demo", [blurred("new", rng, given=False)], source="more", actor="ann")
+        import_groups(store, "demo", [blurred("new", rng, given=False)], source="more", actor="ann")
         report = solve_fully(store, "demo", None, nobody)
         assert (report.total, report.solved) in {(1, 1), (11, 11)}

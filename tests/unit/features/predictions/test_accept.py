@@ -7,7 +7,7 @@ import pytest
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.frame import Detection
 from app.features.groups.edit import set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
@@ -112,7 +112,10 @@ class TestAccept:
     def test_can_be_undone(self, store, cleared, predictions) -> None:
         accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         after = load(store, cleared.id)
-        assert undo(store, cleared.id, if_match=after.etag, actor="bob").group == cleared.group
+        assert (
+            undo_group_edit(store, cleared.id, if_match=after.etag, actor="bob").group
+            == cleared.group
+        )
 
     def test_done_again_it_changes_nothing(self, store, cleared, predictions) -> None:
         request = AcceptRequest(predictions.id, replace=True)
@@ -190,7 +193,7 @@ class TestAcceptBox:
         after = accept_box(store, view, less_sure, if_match=cleared.etag, actor="bob")
         assert after.group.view("7.png").ball.box == Box(10, 300, 14, 14)
         assert after.group.view("7.png").ball.predicted_by == "yolo"
-        back = undo(store, cleared.id, if_match=after.etag, actor="bob")
+        back = undo_group_edit(store, cleared.id, if_match=after.etag, actor="bob")
         assert back.group == cleared.group
 
     def test_a_view_with_a_ball_keeps_it_unless_it_is_to_be_replaced(

@@ -6,8 +6,8 @@ import pytest
 
 from app.errors import NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import redo, undo
-from app.features.groups.submit import load, submit, submit_all
+from app.features.groups.history import redo_group_edit, undo_group_edit
+from app.features.groups.submit import load, submit, submit_edits
 from app.features.predictions.accept import AcceptedBall, accept_box, group_predictions
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, delete_predictions
@@ -81,9 +81,9 @@ class TestAcceptedBall:
     def test_stays_with_who_accepted_it_when_others_undo_and_redo(self, store, ids, add) -> None:
         add("yolo", ("7.png", 10, 0.75))
         state = accept_first(store, ids[0], "bob")
-        state = undo(store, ids[0], if_match=state.etag, actor="eve")
+        state = undo_group_edit(store, ids[0], if_match=state.etag, actor="eve")
         assert group_predictions(store, ids[0]).accepted == ()
-        redo(store, ids[0], if_match=state.etag, actor="eve")
+        redo_group_edit(store, ids[0], if_match=state.etag, actor="eve")
         (ball,) = group_predictions(store, ids[0]).accepted
         assert ball.actor == "bob"
 
@@ -91,9 +91,9 @@ class TestAcceptedBall:
         add("yolo", ("7.png", 10, 0.75))
         state = accept_first(store, ids[0], "bob")
         ball = state.group.views[0].ball
-        state = undo(store, ids[0], if_match=state.etag, actor="bob")
+        state = undo_group_edit(store, ids[0], if_match=state.etag, actor="bob")
         edits = [set_ball("7.png", ball), set_ball(state.group.views[1].key, None)]
-        submit_all(store, ids[0], edits, if_match=state.etag, actor="eve")
+        submit_edits(store, ids[0], edits, if_match=state.etag, actor="eve")
         (found,) = group_predictions(store, ids[0]).accepted
         assert found.actor == "eve"
 

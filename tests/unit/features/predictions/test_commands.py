@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 from app.command_line import app
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.predictions.evaluation import run_tables
 from app.features.solutions.service import solve_dataset
 from app.formats.report import Report
@@ -30,7 +30,9 @@ def home(tmp_path_factory: pytest.TempPathFactory, scenes) -> Path:
     home = tmp_path_factory.mktemp("evaluate")
     write_soccernet_v3(home / "tree", [scene.group for scene in scenes])
     store = Store.open(Settings(home=home / "home"))
-    ingest(store, "small", read_soccernet_v3(home / "tree", Report()), source="t", actor="local")
+    import_groups(
+        store, "small", read_soccernet_v3(home / "tree", Report()), source="t", actor="local"
+    )
     solve_dataset(store, "small")
     store.close()
     return home / "home"

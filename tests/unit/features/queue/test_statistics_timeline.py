@@ -5,7 +5,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.submit import load
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.queue.statistics import read_timeline
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -18,7 +18,7 @@ FRAMES = (12, 10, 11, 40)
 def filmed(store: Store, make_static) -> Store:
     """Four frames of one match, imported out of order, and solved."""
     groups = [make_static(frame, (5.0, 2.0 + frame / 10, -0.5)) for frame in FRAMES]
-    ingest(store, "film", groups, source="test", actor="ann")
+    import_groups(store, "film", groups, source="test", actor="ann")
     solve_dataset(store, "film")
     return store
 

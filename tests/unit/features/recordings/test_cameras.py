@@ -16,11 +16,11 @@ import pytest
 from app.db.idempotency import without_response
 from app.db.store import Store
 from app.errors import ConflictError, InputError, JobCancelled
-from app.features.datasets.queries import unused_frames
+from app.features.datasets.queries import list_unused_frame_files
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.imports.cameras import ingest_cameras
+from app.features.imports.cameras import import_given_cameras
 from app.features.recordings import camera_tracking as module
 from app.features.recordings.camera_tracking import Tracked, track_now, track_stretch
 from app.features.recordings.cameras import (
@@ -312,7 +312,7 @@ def test_cameras_are_turned_by_half_and_back_and_groups_follow(
     own = tracker.truth[0]
     track(api, recording, finished)
     take(api, recording, finished, 5, 6, 7)
-    ingest_cameras(store, "cup", {"7": own}, source="mine", actor="ann")
+    import_given_cameras(store, "cup", {"7": own}, source="mine", actor="ann")
     as_tracked = api.get(f"{recording}/cameras/5").json()
 
     def turn(turned: bool) -> Any:
@@ -367,7 +367,9 @@ def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_tur
     assert answer.status_code == 409
     assert "lines of frame 7 already say which half of the pitch" in answer.json()["detail"]
     turned = Tracked([tracker.frame(number, {}) for number in range(4, 12)], (), True)
-    with pytest.raises(ConflictError, match="the cameras of this shot were changed in the meantime"):
+    with pytest.raises(
+        ConflictError, match="the cameras of this shot were changed in the meantime"
+    ):
         module.save_cameras(store, found, (4, 11), turned, [], "ann", turned_from=present)
 
 
@@ -384,7 +386,7 @@ def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
     monkeypatch.setattr("app.tracking.time_map._UNSURE", 1.0)
     take(api, recording, finished, 4, 5, 6)
     own = tracker.truth[0]
-    ingest_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
+    import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
     groups = groups_taken(store, found)
     draw(api, groups[6], tracker.truth[2])
     track(api, recording, finished)
@@ -414,7 +416,7 @@ def test_a_camera_that_somebody_gave_stays(
     store: Store = app.state.services.store
     take(api, recording, finished, 5, 6)
     own = tracker.truth[0]
-    ingest_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
+    import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
     assert track(api, recording, finished)["groups"] == 1
     groups = groups_taken(store, found)
     with store.read() as session:
@@ -445,10 +447,14 @@ def test_cameras_take_the_place_of_those_that_share_a_frame_and_leave_no_file(
     assert stretches() == [(4, 5), (6, 9), (10, 11)] and files() == 3
     assert sorted(cameras_at(store, found, [4, 6, 9, 11])) == [4, 6, 9, 11]
     with store.read() as session:
-        assert not [name for name in unused_frames(session, store.settings) if "cameras" in name]
+        assert not [
+            name for name in list_unused_frame_files(session, store.settings) if "cameras" in name
+        ]
     assert api.delete(recording).status_code == 204
     with store.read() as session:
-        assert [name for name in unused_frames(session, store.settings) if "cameras" in name]
+        assert [
+            name for name in list_unused_frame_files(session, store.settings) if "cameras" in name
+        ]
 
 
 def test_cameras_of_another_video_or_of_no_file_are_not_given(

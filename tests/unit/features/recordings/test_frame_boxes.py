@@ -13,7 +13,7 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
-from app.features.datasets.queries import unused_frames
+from app.features.datasets.queries import list_unused_frame_files
 from app.features.predictions.detect import OnnxModel
 from app.features.recordings.follow import follow_hints
 from app.features.recordings.frame_boxes import (
@@ -106,7 +106,7 @@ class TestFile:
         path = written(tmp_path / "seen.csv", (8, 104, 62, 9, 9, 0.8))
         read_boxes_of_file(store, recording, path, "seen", min_score=0.1, actor="ann")
         with store.read() as session:
-            assert unused_frames(session, store.settings) == []
+            assert list_unused_frame_files(session, store.settings) == []
         (kept,) = store.settings.recordings.glob("*.balls.npz")
         kept.write_bytes(b"no boxes")
         with pytest.raises(StorageError, match="ball is damaged"):

@@ -16,7 +16,7 @@ import pytest
 import touchline
 from app.db.log import read_log
 from app.features.datasets.service import get_dataset
-from app.features.imports.cameras import ingest_cameras
+from app.features.imports.cameras import import_given_cameras
 from app.features.recordings import index as module
 from app.soccer.frames import ImageSize
 from app.soccer.policy import TOUCHLINE
@@ -297,7 +297,9 @@ class TestTakeInstants:
             app.state.services.store,
             looking((0, 60, -15), (0, 0, 0), 160, size=ImageSize(WIDTH, HEIGHT)),
         )
-        found = ingest_cameras(store, "cup", {"40": camera}, source="camera_40.json", actor="ann")
+        found = import_given_cameras(
+            store, "cup", {"40": camera}, source="camera_40.json", actor="ann"
+        )
         assert (found.changed, found.problems) == (1, [])
         number = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][1]["id"]
         (view,) = api.get(f"/api/v1/groups/{number}").json()["views"]

@@ -11,8 +11,8 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
-from app.features.datasets.queries import unread_uploads, unused_frames
-from app.features.imports.upload_queries import UploadWriter, keep_upload, upload_path
+from app.features.datasets.queries import list_unused_frame_files, list_unused_uploads
+from app.features.imports.upload_queries import UploadWriter, save_upload, upload_path
 from app.features.jobs.service import Jobs
 from app.features.recordings import index
 from app.features.recordings import jobs as module
@@ -149,21 +149,21 @@ class TestUnused:
         recording = indexed(store, film)
         index = f"{recording.sha256}.npz"
         with store.read() as session:
-            assert index not in unused_frames(session, store.settings)
+            assert index not in list_unused_frame_files(session, store.settings)
         remove_recording(store, recording.id, actor="ann")
         with store.read() as session:
-            assert index in unused_frames(session, store.settings)
+            assert index in list_unused_frame_files(session, store.settings)
 
     def test_the_upload_of_a_recording_is_read(self, store: Store, film: Path) -> None:
         writer = UploadWriter(store.settings, film.name)
         writer.write(film.read_bytes())
         upload = writer.finish()
-        keep_upload(store.settings, upload.id)
+        save_upload(store.settings, upload.id)
         with store.read() as session:
-            assert upload.id in unread_uploads(session, store.settings)
+            assert upload.id in list_unused_uploads(session, store.settings)
         add_recording(store, "cup", upload_path(store.settings, upload.id), actor="ann")
         with store.read() as session:
-            assert upload.id not in unread_uploads(session, store.settings)
+            assert upload.id not in list_unused_uploads(session, store.settings)
 
 
 class TestJobs:

@@ -13,11 +13,11 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
-from app.features.findings.service import FindingName, finding_values, set_dismissal
+from app.features.findings.service import FindingName, iterate_findings_as_json, set_dismissal
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo
+from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load, submit
-from app.features.groups.suggested_edits import offers_of_finding
+from app.features.groups.suggested_edits import list_edits_of_finding
 from app.features.queue.refresh_queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
@@ -53,7 +53,7 @@ def judge(store: Store, verdict: Any) -> None:
 
 def told(store: Store) -> list[tuple[str, str | None]]:
     """Group and view of each finding of the track."""
-    values = finding_values(store, "demo")
+    values = iterate_findings_as_json(store, "demo")
     return [(item["group"], item["view"]) for item in values if item["kind"] == TRACK_DISAGREES]
 
 
@@ -102,7 +102,7 @@ class TestFindings:
         self, store: Store, beside: int
     ) -> None:
         state, found = load(store, beside), of_group(store, beside)
-        moved, left_out = offers_of_finding(state.group, found)
+        moved, left_out = list_edits_of_finding(state.group, found)
         assert (moved.label, left_out.label) == ("Move the ball there", "Leave it out")
         center = moved.edit.apply(state.group).views[0].ball.center
         assert (center.x, center.y) == pytest.approx(found.place)
@@ -112,12 +112,12 @@ class TestFindings:
         self, store: Store, beside: int
     ) -> None:
         state = load(store, beside)
-        moved = offers_of_finding(state.group, of_group(store, beside))[0]
+        moved = list_edits_of_finding(state.group, of_group(store, beside))[0]
         after = submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
         assert told(store) == []
         with store.read() as session:
             assert differing_rows(session)[1] == []
-        undo(store, beside, if_match=after.etag, actor="ann")
+        undo_group_edit(store, beside, if_match=after.etag, actor="ann")
         assert len(told(store)) == 1
         with store.read() as session:
             assert differing_rows(session)[1] == []
@@ -126,7 +126,7 @@ class TestFindings:
         self, store: Store, beside: int
     ) -> None:
         state = load(store, beside)
-        moved = offers_of_finding(state.group, of_group(store, beside))[0]
+        moved = list_edits_of_finding(state.group, of_group(store, beside))[0]
         submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
         solve_dataset(store, "demo")
         make(store)

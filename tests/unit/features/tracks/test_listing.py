@@ -9,7 +9,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError
 from app.features.batches.leases import BatchMember
-from app.features.batches.progress import my_work, team_work
+from app.features.batches.progress import list_own_batches, list_team_batches
 from app.features.batches.service import (
     NewBatch,
     change_batch,
@@ -18,7 +18,7 @@ from app.features.batches.service import (
     make_batch,
     remove_batch,
 )
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.solutions.service import solve_dataset
@@ -45,7 +45,7 @@ def _tracks(store: Store) -> dict[str, int]:
         replace(group, match="late", key=f"late/{group.key}")
         for group in flight_groups(40, noise_px=1.5)
     ]
-    ingest(store, "demo", [*early, *late], source="test", actor="ann")
+    import_groups(store, "demo", [*early, *late], source="test", actor="ann")
     solve_dataset(store, "demo")
     make_tracks(store, "demo", None, "ann", lambda *_: None)
     for name, role in (("bo", Role.REVIEWER), ("cy", Role.REVIEWER), ("ada", Role.ANNOTATOR)):
@@ -111,10 +111,10 @@ class TestBatchesOfTracks:
         new = NewBatch("mine", reviewers=["bo"], tracks=list(tracks.values()))
         make_batch(store, "demo", new, actor="lead")
         judge(store, tracks["early"], "rejected")
-        (mine,) = my_work(store, lambda _: BatchMember("bo"))
+        (mine,) = list_own_batches(store, lambda _: BatchMember("bo"))
         assert (mine.left, mine.batch.kind) == (1, "tracks")
-        assert my_work(store, lambda _: BatchMember("cy")) == []
-        (team,) = team_work(store, "demo")
+        assert list_own_batches(store, lambda _: BatchMember("cy")) == []
+        (team,) = list_team_batches(store, "demo")
         assert team.stalled is None
 
     def test_hold_what_nobody_else_has(self, store: Store, tracks: dict[str, int]) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.http.deps import Services
 from tests.flights import FIRST, flight_groups
@@ -20,7 +20,7 @@ TRACKS = f"{API}/datasets/flight/tracks"
 def services(app: Any) -> Services:
     """The application's, with a dataset of a ball in flight."""
     services: Services = app.state.services
-    ingest(services.store, "flight", flight_groups(60), source="test", actor="ann")
+    import_groups(services.store, "flight", flight_groups(60), source="test", actor="ann")
     solve_dataset(services.store, "flight")
     return services
 

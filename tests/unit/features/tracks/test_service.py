@@ -12,7 +12,7 @@ from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionEr
 from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.service import (
     MadeTracks,
@@ -132,7 +132,7 @@ def add_instants(store: Store, *numbers: int) -> None:
     groups = [
         recorded(item, n) for item, n in zip(flight_groups(len(numbers)), numbers, strict=True)
     ]
-    ingest(store, "demo", groups, source="test", actor="ann")
+    import_groups(store, "demo", groups, source="test", actor="ann")
     solve_dataset(store, "demo")
 
 
@@ -176,7 +176,7 @@ class TestStretchesThatChange:
 
     def test_a_rig_that_goes_on_makes_its_track_stale(self, store, flight) -> None:
         make(store)
-        ingest(store, "demo", flight_groups(62)[60:], source="test", actor="ann")
+        import_groups(store, "demo", flight_groups(62)[60:], source="test", actor="ann")
         assert only(store).stale
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.bulk import list_batches
 from app.formats.report import Report
@@ -28,7 +28,9 @@ def filled_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("filled")
     write_soccernet_v3(home / "tree", [scene.group for scene in make_scenes(2, 4, faults=False)])
     with closing(Store.open(Settings(home=home))) as store:
-        ingest(store, "demo", read_soccernet_v3(home / "tree", Report()), source="t", actor="ann")
+        import_groups(
+            store, "demo", read_soccernet_v3(home / "tree", Report()), source="t", actor="ann"
+        )
         solve_dataset(store, "demo")
     return home
 

@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import text
 
 from app.db.session import Session
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.verdicts import bulk, bulk_undo
 from app.features.verdicts.bulk import BatchRun
 from app.soccer.frames import ImageSize
@@ -186,7 +186,7 @@ class TestStoppedBetweenChunks:
             patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
             assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
         new = Group("new", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
-        ingest(app.state.services.store, "broadcast", [new], source="test", actor="local")
+        import_groups(app.state.services.store, "broadcast", [new], source="test", actor="local")
         assert api.post(VERDICTS, json=body, headers=self.KEY).json()["changed"] == 3
         assert statuses(api) == {"deferred", "unreviewed"}
 

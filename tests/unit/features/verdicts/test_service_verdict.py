@@ -9,7 +9,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import read_history, undo
+from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.policies.service import change_policy
@@ -100,7 +100,7 @@ class TestSetVerdict:
             store, state.id, set_ball("7.png", BALL), if_match=accepted.etag, actor="ben"
         )
         assert (edited.verdict.state, edited.verdict.stale) == ("accepted", True)
-        back = undo(store, state.id, if_match=edited.etag, actor="ben")
+        back = undo_group_edit(store, state.id, if_match=edited.etag, actor="ben")
         assert not back.verdict.stale
 
     def test_every_persons_verdict_is_kept_and_the_newest_counts(self, store, state) -> None:

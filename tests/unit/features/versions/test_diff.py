@@ -7,7 +7,7 @@ import pytest
 from app.errors import InputError
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ensure_dataset, ingest
+from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.diff import Setting, changelog_lines, diff_versions, version_changelog
@@ -113,7 +113,7 @@ class TestDiffVersions:
 
     def test_two_datasets_cannot_be_compared(self, store, two, make_group) -> None:
         ensure_dataset(store, "other", "ann")
-        ingest(store, "other", [make_group(7)], source="test", actor="ann")
+        import_groups(store, "other", [make_group(7)], source="test", actor="ann")
         solve_dataset(store, "other")
         other = freeze_dataset(store, "other", FreezeRequest("v1", groups="passing"), actor="ann")
         with pytest.raises(InputError, match="two datasets"):

@@ -10,7 +10,7 @@ from app.errors import ConflictError, InputError
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.queries import SolutionModel
@@ -78,7 +78,7 @@ def elsewhere(there, make_group):
     store = there
     groups = [make_group(11), make_group(9, shift=80.0), make_group(8), make_group(7)]
     groups = [moved(group) for group in [make_group(10, shift=80.0), *groups]]
-    ingest(store, "other", groups, source="somewhere", actor="zoe")
+    import_groups(store, "other", groups, source="somewhere", actor="zoe")
     solve_dataset(store, "other")
     ids = {row.key.rpartition("/")[2]: row.id for row in list_groups(store, 1, limit=9).items}
     judge(store, ids["9.png"], "accepted", note="seen on video", actor="zoe")

@@ -9,8 +9,8 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.agreement.adjudicate import decide_case, get_case, return_for_correction
-from app.features.agreement.service import after_submission, compare_submitted
+from app.features.agreement.adjudicate import adjudicate_case, read_case, return_for_correction
+from app.features.agreement.service import compare_or_adopt_submission, compare_submitted
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import set_ball
@@ -114,21 +114,23 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     batch = make_batch(allowed, "demo", new, actor="lea").id
     annotate(allowed, batch, "ada", 0.0)
     copy = annotate(allowed, batch, "bo", 40.0)
-    assert after_submission(allowed, copy) == "open"
+    assert compare_or_adopt_submission(allowed, copy) == "open"
     assert compare_submitted(allowed, groups[0], batch) == "open"
     (_, (kind, case)) = told.new()
     assert (kind, case["group"], case["people"]) == (Kind.DISPUTED, groups[0], ["ada", "bo"])
     assert case["batch"]["id"] == batch and case["disagreements"] > 0 and case["worst"] > 1
     bo = next(
-        take for take in get_case(allowed, groups[0], actor="cy").annotations if take.person == "bo"
+        take
+        for take in read_case(allowed, groups[0], actor="cy").annotations
+        if take.person == "bo"
     )
     return_for_correction(allowed, groups[0], bo.id, "look again", actor="cy")
     ((kind, back),) = told.new()
     assert (kind, back["group"], back["copy"]) == (Kind.HANDED_BACK, groups[0], copy)
 
     judge(allowed, copy, "accepted", "bo")
-    assert after_submission(allowed, copy) == "open"
-    decide_case(allowed, groups[0], bo.id, actor="cy")
+    assert compare_or_adopt_submission(allowed, copy) == "open"
+    adjudicate_case(allowed, groups[0], bo.id, actor="cy")
     assert [kind for kind, _ in told.new()] == [Kind.DISPUTED, Kind.DONE]
 
 

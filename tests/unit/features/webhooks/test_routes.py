@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import text
 from standardwebhooks import Webhook
 
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.webhooks.messages import sign_message
 
 API = "/api/v1"
@@ -19,7 +19,7 @@ URL = "https://hooks.example.org/touchline"
 def hooks(app, group, monkeypatch: pytest.MonkeyPatch) -> str:
     """Where the webhooks of the group's dataset are; the operator allows an address."""
     store = app.state.services.store
-    ingest(store, "demo", [group], source="test", actor="local")
+    import_groups(store, "demo", [group], source="test", actor="local")
     settings = store.settings.model_copy(update={"webhooks": [URL]})
     monkeypatch.setattr(store, "settings", settings)
     return f"{API}/datasets/demo/webhooks"
@@ -69,7 +69,7 @@ def test_what_cannot_be_told_is_refused_with_its_field(
 
 
 def test_a_webhook_of_another_dataset_is_unknown(api, hooks: str, app, group) -> None:
-    ingest(app.state.services.store, "other", [group], source="test", actor="local")
+    import_groups(app.state.services.store, "other", [group], source="test", actor="local")
     made = api.post(hooks, json={"url": URL, "kinds": ["job.done"]}).json()["webhook"]["id"]
     elsewhere = f"{API}/datasets/other/webhooks/{made}"
     for answer in (

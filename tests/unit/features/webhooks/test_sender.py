@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo
+from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import submit
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.maintenance.upkeep import forget_old_deliveries
@@ -90,7 +90,7 @@ class TestTelling:
             if_match=state.etag,
             actor="ann",
         )
-        after = undo(allowed, state.id, if_match=after.etag, actor="ann")
+        after = undo_group_edit(allowed, state.id, if_match=after.etag, actor="ann")
         after = judge(allowed, after)
         end_job(allowed, "failed")
         assert sender.look() == 3

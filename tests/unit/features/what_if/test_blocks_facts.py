@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import text, update
 
 from app.db.store import Store
-from app.features.groups.revision_queries import groups_after
+from app.features.groups.revision_queries import list_groups_after
 from app.features.groups.submit import load
 from app.features.solutions.queries import SolutionModel
 from app.features.what_if.blocks import read_tables
@@ -20,7 +20,7 @@ from tests.databases import said_for_sqlite
 def read(store: Store) -> tuple[YieldTable, YieldTable]:
     """The tables of every group, as it stands."""
     with store.read() as session:
-        rows: Sequence[Any] = groups_after(session, 1, 0, 100)
+        rows: Sequence[Any] = list_groups_after(session, 1, 0, 100)
         return read_tables(session, rows)
 
 

@@ -15,7 +15,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, OverloadedError
 from app.features.groups.edit import IncludeView, set_ball
-from app.features.groups.history import undo
+from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load, submit
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -77,7 +77,7 @@ class TestInStep:
         def take_back() -> None:
             group = rng.choice(ids)
             with suppress(ConflictError):
-                undo(store, group, if_match=load(store, group).etag, actor="ann")
+                undo_group_edit(store, group, if_match=load(store, group).etag, actor="ann")
 
         def bring() -> None:
             fill(make_group(rng.choice(range(14, 20))), solved=False)
@@ -105,7 +105,7 @@ class TestInStep:
         etag = load(store, group).etag
         etag = submit(store, group, set_ball("7.png", None), if_match=etag, actor="ann").etag
         assert get_yield(yields, 1).passing == 1
-        undo(store, group, if_match=etag, actor="ann")
+        undo_group_edit(store, group, if_match=etag, actor="ann")
         assert get_yield(yields, 1) == anew()
         assert get_yield(yields, 1).passing == 2
 

@@ -13,7 +13,7 @@ from app.errors import NotFoundError
 from app.features.datasets.service import get_dataset
 from app.features.groups.edit import IncludeView, set_ball
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ensure_dataset, ingest
+from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
@@ -61,7 +61,7 @@ def groups() -> list[Group]:
 def filled(tmp_path_factory: pytest.TempPathFactory, groups: list[Group]) -> Iterator[Store]:
     """A store with the groups solved, in the dataset "many"."""
     store = Store.open(Settings(home=tmp_path_factory.mktemp("yields")))
-    ingest(store, "many", groups, source="scenes", actor="ann")
+    import_groups(store, "many", groups, source="scenes", actor="ann")
     solve_dataset(store, "many")
     yield store
     store.close()
@@ -371,7 +371,7 @@ class TestYieldStore:
         self, store, fill, make_group, monkeypatch
     ) -> None:
         fill(make_group(7))
-        ingest(store, "other", [make_group(8)], source="test", actor="ann")
+        import_groups(store, "other", [make_group(8)], source="test", actor="ann")
         solve_dataset(store, "other")
         yields = YieldStore(store)
         first = yields.snapshot(get_dataset(store, "demo").id)

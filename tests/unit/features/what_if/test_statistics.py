@@ -13,7 +13,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo
+from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load, submit
 from app.features.policies.service import change_policy
 from app.features.queue.statistics import read_statistics
@@ -63,7 +63,7 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
     def take_back() -> None:
         group = rng.choice(ids)
         with suppress(ConflictError):
-            undo(store, group, if_match=load(store, group).etag, actor="ann")
+            undo_group_edit(store, group, if_match=load(store, group).etag, actor="ann")
 
     def bring() -> None:
         fill(make_group(rng.choice(range(14, 18))), solved=False)
