@@ -59,7 +59,7 @@ def serve(
     _require_safe(settings)
     from app.db.dialects.dialect import dialect_of, require_processes
     from app.db.locks import server_lock
-    from app.features.maintenance.upkeep import file_sizes
+    from app.features.maintenance.upkeep import read_database_file_sizes
     from app.features.people.service import require_no_people
     from app.http.server import listen, run, serve_with
     from app.log import log_to_stderr
@@ -81,7 +81,7 @@ def serve(
                 serve_with(settings.web_workers, _serve_part, settings, socket)
                 return
             application = create_app(settings, pool=server_pool(settings))
-            if file_sizes(settings).get("database", 0) <= QUICK_BYTES:
+            if read_database_file_sizes(settings).get("database", 0) <= QUICK_BYTES:
                 application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
             if settings.team:
@@ -91,13 +91,13 @@ def serve(
 
 def _require_safe(settings: Settings) -> None:
     """Refuse to serve where strangers could come in, or passwords would be read on their way."""
-    from app.features.maintenance.service import exposure_warning
+    from app.features.maintenance.service import find_exposure_warning
     from app.features.people.sign_on_rules import read_rules
     from app.mail import read_mail_server
 
     read_rules(settings)
     read_mail_server(settings)
-    problem = exposure_warning(settings)
+    problem = find_exposure_warning(settings)
     if problem is not None:
         raise typer.BadParameter(problem)
 

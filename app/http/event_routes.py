@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 from app.features.datasets.service import dataset_id
-from app.features.people.visibility_queries import reads_blind
+from app.features.people.visibility_queries import hides_groups_from_reader
 from app.http.deps import AppServices, SeesWhole, Services
 from app.http.events import EVENTS, Listener, first_event
 from app.http.permissions import Action, OwnedKind, Where, may
@@ -86,7 +86,7 @@ class StreamStart:
             int(seen) if self.resumed else int(moment[1]) if moment and known else newest
         )
         self.solution = int(moment[2]) if moment and known else None
-        self.numbered = not reads_blind()
+        self.numbered = not hides_groups_from_reader()
         if not self.numbered:
             # Whoever is told no id of the log is told all of it that they see.
             self.position, self.solution, self.resumed = 0, 0, False

@@ -31,7 +31,7 @@ from app.features.maintenance.service import Banner, read_banner
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
     LoggedChange,
-    newest_entry_and_solution,
+    find_newest_entry_and_solution,
     read_news,
     read_position,
     read_solved_since,
@@ -199,7 +199,7 @@ class Events:
 
     def moment(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
-        return "-".join(map(str, newest_entry_and_solution(self._store)))
+        return "-".join(map(str, find_newest_entry_and_solution(self._store)))
 
     def banner(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""

@@ -22,14 +22,14 @@ from app.features.people.ownership import (
     NamedResource,
     Ownership,
     find_ownership,
+    find_role_at,
     is_hidden_from,
-    role_at,
 )
 from app.features.people.ownership import OwnedKind as OwnedKind
 from app.features.people.roles import Action as Action
 from app.features.people.roles import DatasetRoles, Role, require_permission
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.features.queue.fields import reads_hidden_work
+from app.features.queue.fields import query_reveals_hidden_work
 from app.json_text import MAX_ID, quoted
 
 E = TypeVar("E", bound=Callable[..., Any])
@@ -265,7 +265,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
             _require_may_make(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
-            role = role_at(item.ownership, roles, login.owner)
+            role = find_role_at(item.ownership, roles, login.owner)
             require_permission(role, action, here)
             if reads_hidden_work_of(subject):
                 require_permission(role, Action.REVIEW, here)
@@ -283,7 +283,7 @@ def reads_hidden_work_of(subject: RequestSubject) -> bool:
     Queries are parameters, and fields of bodies, named ``q`` or ``query``.
     """
     texts = [value for name, value in subject.query if name in QUERIES]
-    return any(reads_hidden_work(text) for text in (*texts, *_find_queries(subject.body)))
+    return any(query_reveals_hidden_work(text) for text in (*texts, *_find_queries(subject.body)))
 
 
 def _find_queries(body: Any) -> Iterator[str]:
@@ -327,7 +327,7 @@ def _find_ownership_if_needed(
     found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
-    hidden = role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
+    hidden = find_role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
         store, named, found, login.reader
     )
     return None if hidden else found

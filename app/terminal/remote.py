@@ -104,7 +104,7 @@ def solve_values(
         As ``solve`` has it, and its sentence. Of groups whose solving broke, the first twenty are
         named.
     """
-    from app.features.solutions.service import outcome_sentence
+    from app.features.solutions.service import describe_outcome
 
     if policy is None:
         job = client.post(f"datasets/{quote_address_part(dataset)}/solve")
@@ -115,7 +115,7 @@ def solve_values(
     failed = [[item["group"], item["problem"]] for item in result["failures"]]
     values = {"total": result["groups"], "solved": result["solved"], "passed": result["passed"]}
     failing = result["failing"]
-    sentence = outcome_sentence(result["solved"], result["passed"], result["failed"], failing)
+    sentence = describe_outcome(result["solved"], result["passed"], result["failed"], failing)
     if result["advice"]:
         sentence += f". {result['advice']}"
     for name in ("estimated", "proposed", "failing", "advice"):

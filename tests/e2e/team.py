@@ -37,7 +37,7 @@ def join(home: Path, name: str, role: Role) -> None:
 
     def come(store: Store) -> None:
         _, link = invite(store, name, role, actor="local")
-        links.use_link(store, link.token, SECRET)
+        links.set_password_by_link(store, link.token, SECRET)
 
     in_store(home, come)
 

@@ -23,7 +23,7 @@ from app.features.predictions.accept import AcceptRequest, accept_predicted_ball
 from app.features.predictions.detect import DetectRequest, OnnxModel, run_detector
 from app.features.predictions.evaluation import run_tables
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
-from app.features.predictions.service import delete_predictions, view_predictions
+from app.features.predictions.service import delete_predictions, read_predictions_of_view
 from app.features.solutions.service import solve_dataset
 from app.sample.scene import read_truth
 from app.sample.write import write_sample
@@ -111,7 +111,7 @@ class TestDetect:
         hits = 0
         for state in _states(store):
             for view in state.group.views:
-                ((_set, boxes),) = view_predictions(store, state.view_ids[view.key])
+                ((_set, boxes),) = read_predictions_of_view(store, state.view_ids[view.key])
                 careful = truth[state.key].view(view.key).ball_box
                 places = [Box(box.x, box.y, box.width, box.height) for box in boxes]
                 hits += any(iou(place, careful) > 0.3 for place in places)
@@ -126,7 +126,9 @@ class TestDetect:
         monkeypatch.setattr(OnnxModel, "detect", lambda *_, **__: seen)
         found = run_detector(store, "drawn", model, DetectRequest("fixed"), actor="ann")
         view = next(iter(_states(store)[0].view_ids.values()))
-        boxes = next(boxes for item, boxes in view_predictions(store, view) if item == found)
+        boxes = next(
+            boxes for item, boxes in read_predictions_of_view(store, view) if item == found
+        )
         assert [(box.x, box.y, box.width) for box in boxes] == [(100, 50, 8)]
         delete_predictions(store, found.id, actor="ann")
 

@@ -119,7 +119,7 @@ def client(application: Any) -> Iterator[touchline.Client]:
         patch.setattr(passwords, "HASHER", cheap)
         for name, role in (("admin", Role.ADMIN), ("lead", Role.LEAD), ("viewer", Role.VIEWER)):
             _, link = invite(store, name, role, actor="local")
-            links.use_link(store, link.token, SECRET)
+            links.set_password_by_link(store, link.token, SECRET)
         fill(store, store.settings.home)
         with listen("127.0.0.1", 0) as (socket, address):
             server = make_server(application)

@@ -11,7 +11,7 @@ from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOpti
 from app.evaluation.frame import Frame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import import_groups
-from app.features.predictions.frames import live_truth
+from app.features.predictions.frames import read_live_truth
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import Report
@@ -54,7 +54,7 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
     )
     solve_dataset(store, DATASET)
     with store.read() as session:
-        frames = live_truth(session, get_dataset(store, DATASET), "passing", None).frames
+        frames = read_live_truth(session, get_dataset(store, DATASET), "passing", None).frames
     placed = [frame for frame in frames if frame.point is not None and "optimized" in frame.boxes]
     tested = [frame for frame in placed if frame.station in _TEST]
     detector = SimulatedDetector(1.0, seed)

@@ -10,7 +10,7 @@ from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOpti
 from app.evaluation.frame import Detection, Frame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import import_groups
-from app.features.predictions.frames import EvaluationTruth, live_truth
+from app.features.predictions.frames import EvaluationTruth, read_live_truth
 from app.features.solutions.service import solve_dataset
 from app.sample.scene import Scene
 from app.soccer.frames import Box
@@ -45,7 +45,7 @@ def run_study(
     import_groups(store, DATASET, [scene.group for scene in scenes], source="study", actor="study")
     solve_dataset(store, DATASET)
     with store.read() as session:
-        truth = live_truth(session, get_dataset(store, DATASET), "passing", None)
+        truth = read_live_truth(session, get_dataset(store, DATASET), "passing", None)
     boxes = true_boxes(scenes)
     ratios = tuple(_learnt(truth.frames, boxes, kind) for kind in ("annotated", "optimized"))
     cameras = _cameras(truth.frames, scenes, seed)

@@ -22,7 +22,7 @@ from app.features.imports.merge import merge_edits
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import Report
@@ -131,7 +131,7 @@ class TestExport:
 
 class TestVerify:
     def test_from_scratch_everything_comes_out_the_same(self, homes, versions) -> None:
-        report = verify(homes[1], versions[1].id)
+        report = verify_version(homes[1], versions[1].id)
         assert report.ok, report.values()
         assert report.equal == versions[1].counts["groups"]
 

@@ -122,7 +122,7 @@ class Apart:
     def add(self, name: str, everywhere: Role, **single: Role) -> None:
         """Somebody with a session."""
         person, link = invite(self.store, name, everywhere, actor="local")
-        links.use_link(self.store, link.token, SECRET)
+        links.set_password_by_link(self.store, link.token, SECRET)
         for dataset, role in single.items():
             give_role(self.store, dataset, person.id, role, actor="local")
         token = Logins(self.store).log_in(name, SECRET)

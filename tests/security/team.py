@@ -76,7 +76,7 @@ class Team:
     def add(self, name: str, role: Role) -> str:
         """Somebody more, who has logged in; their cookie."""
         _, link = invite(self.store, name, role, actor="local")
-        links.use_link(self.store, link.token, SECRET)
+        links.set_password_by_link(self.store, link.token, SECRET)
         self.cookies[name] = cookie_in(self.log_in(name))
         return self.cookies[name]
 

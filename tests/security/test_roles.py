@@ -315,7 +315,7 @@ class TestSessions:
         late = Devices(team.store, lambda: datetime.now(UTC) + LASTS + timedelta(seconds=1))
         assert late.recognise("guessed", token) is None
         _, link = renew_link(team.store, find_person(team.store, "guessed").id, actor="local")
-        links.use_link(team.store, link.token, "three other words")
+        links.set_password_by_link(team.store, link.token, "three other words")
         assert devices.recognise("guessed", token) is None, "it ends with its password"
 
     def test_a_link_sets_a_password_once_and_logs_in(self, team: Team) -> None:

@@ -14,7 +14,7 @@ from sqlalchemy import update
 from app.features.imports.ingest import ensure_dataset
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.people import access_tokens
-from app.features.people.access_tokens import new_token_text
+from app.features.people.access_tokens import make_access_token_text
 from app.features.people.roles import Role, Scope
 from app.features.people.service import change_person, find_person
 from app.features.people.tables import AccessTokenModel
@@ -45,7 +45,7 @@ class TestTokens:
         assert team.ask("DELETE", f"{API}/tokens/{ended}", role="viewer").status == 404
         assert team.ask("DELETE", f"{API}/tokens/{ended}", role="keeps").status == 204
         told = set()
-        for bearer in (gone, expired, f"Bearer {new_token_text()}"):
+        for bearer in (gone, expired, f"Bearer {make_access_token_text()}"):
             answer = self.ask(team, bearer)
             assert answer.status == 401
             assert answer.headers["www-authenticate"].startswith("Bearer")
@@ -245,7 +245,7 @@ class TestTokens:
     ) -> None:
         monkeypatch.setattr("app.http.team.TOKEN_LIMIT", parse("4/minute"))
         team.forget_attempts()
-        guesses = [self.ask(team, f"Bearer {new_token_text()}") for _ in range(5)]
+        guesses = [self.ask(team, f"Bearer {make_access_token_text()}") for _ in range(5)]
         assert [answer.status for answer in guesses] == [401] * 4 + [429]
         assert 0 < int(guesses[-1].headers["retry-after"]) <= 60
         assert self.ask(team, team.bearer("read")).status == 200

@@ -277,7 +277,9 @@ def invite_all(home: Path, names: Sequence[str]) -> None:
     ):
         for name in (LEAD, *names):
             role = Role.LEAD if name == LEAD else Role.REVIEWER
-            links.use_link(store, invite(store, name, role, actor="local")[1].token, SECRET)
+            links.set_password_by_link(
+                store, invite(store, name, role, actor="local")[1].token, SECRET
+            )
 
 
 def measure(worker: Worker, meter: counting.Meter) -> dict[str, np.ndarray]:

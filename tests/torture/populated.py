@@ -21,7 +21,7 @@ from app.features.verdicts.queries import read_verdicts
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import list_versions
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 
@@ -57,7 +57,7 @@ def said(settings: Settings) -> dict[str, Any]:
             "groups": [(state.key, state.group, state.revision, state.etag) for state in states],
             "verdicts": verdicts,
             "versions": [(one.name, one.hash, one.policy, one.counts) for one in versions],
-            "rebuilt": [verify(store, one.id).differences for one in versions],
+            "rebuilt": [verify_version(store, one.id).differences for one in versions],
             "log": log,
             "checks": [check.sentence for check in examine_database(store) if not check.ok],
         }

@@ -27,7 +27,7 @@ from app.evaluation.result import Axis, Figure, Panel, Series, figure_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.jobs.queries import _json_column as job_text
-from app.features.solutions.codec import dumps, from_json, to_json
+from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
@@ -289,7 +289,7 @@ class TestCommandLine:
 class TestStored:
     def test_a_solution_comes_back_as_it_was(self, record: ExportRecord) -> None:
         solution = poisoned(record.solution, math.inf)
-        text = dumps(to_json(solution))
+        text = solution_json_text(to_json(solution))
         strict(text)
         assert from_json(Solution, json.loads(text)).ball == solution.ball
 

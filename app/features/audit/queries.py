@@ -12,7 +12,7 @@ from app.db.json_columns import unpack
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.people.visibility_queries import Visibility, shown_actor
+from app.features.people.visibility_queries import Visibility, shown_actor_column
 from app.soccer.actors import TOKEN
 
 
@@ -52,7 +52,7 @@ class AuditRow:
     hash: str
 
 
-_SHOWN = shown_actor(LogModel.actor, LogModel.at)
+_SHOWN = shown_actor_column(LogModel.actor, LogModel.at)
 
 
 def list_audit_rows(

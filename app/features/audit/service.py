@@ -18,7 +18,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.audit.queries import AuditQuery as AuditQuery
 from app.features.audit.queries import AuditRow, list_audit_rows
 from app.features.comments.queries import find_group
-from app.features.people.queries import person_by_id
+from app.features.people.queries import find_person_by_id
 from app.features.people.roles import PERSON, require_no_token
 from app.features.people.visibility_queries import Visibility, find_alias, insert_alias
 from app.json_text import Moment
@@ -79,7 +79,7 @@ def assign_local_work(store: Store, person_id: int, *, actor: str) -> str:
     """
     require_no_token(actor)
     with store.write() as session:
-        person = person_by_id(session, person_id)
+        person = find_person_by_id(session, person_id)
         if person is None:
             raise NotFoundError.person(person_id)
         before = find_alias(session, LOCAL_USER)

@@ -33,7 +33,7 @@ from app.features.independent_annotations.submission_queries import (
     submit_copy,
 )
 from app.features.people.visibility_queries import READER, sees_all_work
-from app.features.queue.fields import reads_hidden_work
+from app.features.queue.fields import query_reveals_hidden_work
 from app.soccer.actors import person_of
 
 OVER = ("accepted", "rejected")
@@ -98,7 +98,7 @@ def hide_others_progress(session: Session, batch: Batch) -> Batch:
     Of one that they annotate blind they see their own part alone: counts of the groups change with
     what is submitted of them, and not with what is submitted of a gold group.
     """
-    if reads_hidden_work(batch.query) and not sees_all_work(batch.dataset_id):
+    if query_reveals_hidden_work(batch.query) and not sees_all_work(batch.dataset_id):
         batch = replace(batch, query="")
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):

@@ -35,7 +35,7 @@ from app.features.batches.queries import (
 from app.features.datasets.service import dataset_id, strip_and_check_title
 from app.features.independent_annotations.queries import list_gold_heads
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify
+from app.features.notifications.service import notify_person
 from app.features.people.roles import Action, role_allows
 from app.features.people.service import list_members
 from app.features.queue.queries import Listing
@@ -482,7 +482,7 @@ def _notify_people(session: Session, batch: Batch, people: Iterable[str], actor:
     groups = "groups" if batch.gold_every is not None else plural(batch.groups, batch.kind[:-1])
     sentence = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
-        notify(
+        notify_person(
             session, name, NotificationKind.ASSIGNED, sentence,
             actor=actor, address="/work", dataset_id=batch.dataset_id,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from app.db.session import Base, Session
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.tables import PersonModel
-from app.features.people.visibility_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor_column
 
 
 class ThreadModel(Base):
@@ -204,7 +204,7 @@ def _comments_by_thread(session: Session, threads: Sequence[int]) -> dict[int, l
         select(
             CommentModel.id,
             CommentModel.thread_id,
-            shown_actor(CommentModel.actor, CommentModel.at).label("actor"),
+            shown_actor_column(CommentModel.actor, CommentModel.at).label("actor"),
             CommentModel.at,
             CommentModel.edited,
             CommentModel.text,

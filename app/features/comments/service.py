@@ -32,9 +32,9 @@ from app.features.comments.queries import (
     set_thread_resolved,
 )
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify
+from app.features.notifications.service import notify_person
 from app.features.people.logins import read_roles
-from app.features.people.queries import MemberRow, person_by_name, read_members
+from app.features.people.queries import MemberRow, find_person_by_name, read_members
 from app.features.people.roles import Role
 from app.soccer.actors import is_actor_of, person_of
 
@@ -242,7 +242,7 @@ def _notify_people(
     rings = [(name, NotificationKind.MENTION, "mentioned you") for name in named]
     rings += [(name, NotificationKind.REPLY, "replied") for name in spoke if name not in named]
     for name, kind, did in rings:
-        notify(
+        notify_person(
             session,
             name,
             kind,
@@ -258,7 +258,7 @@ def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) 
     """Ids of those among some names who see a group's dataset; the others are not told apart."""
     found: dict[str, int] = {}
     for name in names:
-        row = person_by_name(session, name)
+        row = find_person_by_name(session, name)
         if row is not None and not row.disabled:
             roles = read_roles(session, row.id, Role(row.role))
             if roles.role_in(group.dataset_id) is not Role.NONE:

@@ -12,7 +12,7 @@ from app.features.datasets import service as deletion
 from app.features.datasets import service as review
 from app.features.datasets.service import Dataset, DatasetContents, read_contents
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.policies.schemas import PolicyDocument
 from app.features.queue.service import summarize_groups
 from app.features.solve.jobs import request_solve
@@ -144,9 +144,9 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
-@router.post("/{dataset}/solve", operation_id="solveDataset", **by_job(404))
+@router.post("/{dataset}/solve", operation_id="solveDataset", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Solve what has no solution for its present state, policy and solver, as a job.
 

@@ -193,13 +193,13 @@ def import_(
 
 def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
-    from app.features.jobs.runner import ending_sentence
+    from app.features.jobs.runner import describe_result
     from app.features.paint.proposals import propose_views
 
     with opened_store(settings) as store, show_progress("Proposing cameras") as progress:
         run = propose_views(store, dataset, progress=progress)
     if not silent:
-        say(ending_sentence("proposals", asdict(run)) or "")
+        say(describe_result("proposals", asdict(run)) or "")
 
 
 def _usual_policy(format_: str) -> str | None:

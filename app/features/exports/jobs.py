@@ -24,7 +24,7 @@ from app.errors import InputError, NotFoundError
 from app.features.datasets.service import get_dataset_head
 from app.features.exports.service import ExportReport, export_dataset, require_possible
 from app.features.jobs.queries import EXPORT, Job
-from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.export_formats import missing_for_use
 from app.formats.file_tree import Root
@@ -271,7 +271,7 @@ def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: Jo
             request,
             dataset_id=progress.dataset_id,
             progress=progress,
-            report=counting_progress(progress, "groups written"),
+            report=report_counts_in_words(progress, "groups written"),
             answer=lambda frame: frames.read(*frame),
         )
     # It is done, also where somebody cancels it now.

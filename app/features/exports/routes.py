@@ -21,7 +21,7 @@ from app.features.exports.jobs import KIND, ExportEntry, request_export
 from app.features.exports.service import list_formats_with_problems
 from app.features.jobs.queries import DONE, Job
 from app.features.jobs.routes import Cursor, DatasetFilter, Limit
-from app.features.jobs.schemas import ACCEPTED, JobDocument, job_address
+from app.features.jobs.schemas import ACCEPTED, JobDocument, make_location_header
 from app.features.versions.routes import VersionId
 from app.formats.export_formats import options_used_by
 from app.http.cursor import paged, parse_cursor
@@ -237,7 +237,7 @@ def list_formats(
 
 def _export_job_response(job: Job) -> Response:
     started = ExportJobDocument.of_export(JobDocument.model_validate(job))
-    return document(started, 202, job_address(job))
+    return document(started, 202, make_location_header(job))
 
 
 @router.post(

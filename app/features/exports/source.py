@@ -19,7 +19,11 @@ from app.features.exports.queries import (
 )
 from app.features.groups.state import GroupState, VerdictState, read_states
 from app.features.groups.view_queries import ViewFileFields, list_view_file_fields
-from app.features.versions.membership import policy_settings, version_settings, version_stamp
+from app.features.versions.membership import (
+    describe_policy_settings,
+    describe_version_settings,
+    make_version_stamp,
+)
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups, thaw_outlines
 from app.formats.export_record import ExportRecord
@@ -127,7 +131,10 @@ class LiveSource:
 
     def settings(self) -> dict[str, Any]:
         """Policy, solver, and which groups."""
-        return {**policy_settings(self._found.policy, SOLVER_VERSION), "groups": self._groups}
+        return {
+            **describe_policy_settings(self._found.policy, SOLVER_VERSION),
+            "groups": self._groups,
+        }
 
     def stamp(self) -> dict[str, Json]:
         """Nothing: the records say everything."""
@@ -166,11 +173,11 @@ class VersionSource:
 
     def settings(self) -> dict[str, Any]:
         """Policy and solver as they were frozen, and which groups."""
-        return version_settings(self._version)
+        return describe_version_settings(self._version)
 
     def stamp(self) -> dict[str, Json]:
         """Hash, note, counts and changelog, and who is not in it and why."""
-        return version_stamp(self._session, self._version)
+        return make_version_stamp(self._session, self._version)
 
     def items(self) -> Iterator[Item]:
         """Groups by match and key."""

@@ -29,7 +29,7 @@ from app.db.log import Entry, append
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor_column
 from app.json_text import canonical
 from app.soccer.finding import (
     PICTURE_GEOMETRY,
@@ -267,7 +267,7 @@ def replace_track_findings(
 _TABLE = cast(Table, DismissalModel.__table__)
 SHOWN = (
     *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),
-    shown_actor(_TABLE.c.actor, _TABLE.c.at).label("actor"),
+    shown_actor_column(_TABLE.c.actor, _TABLE.c.at).label("actor"),
 )
 """What ``current_dismissals`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
 

@@ -17,7 +17,7 @@ from app.features.queue.queries import (
     Condition,
     Listing,
     RowOrder,
-    any_of,
+    any_condition,
     compare_condition,
     contains_text,
     has_list_item,
@@ -97,7 +97,7 @@ def iterate_findings_as_json(store: Store, dataset: str) -> Iterator[dict[str, A
 def _finding_conditions(kind: str | None, dismissed: bool | None) -> list[Condition]:
     """What holds of groups with findings that can be read: those of an earlier solver cannot."""
     columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
-    has = any_of(
+    has = any_condition(
         contains_text(column, ",") if kind is None else has_list_item(column, kind)
         for column in columns[dismissed]
     )

@@ -18,7 +18,7 @@ from app.features.match_estimates.queries import (
     NOISE,
     Factors,
     factors_to_json,
-    noise_factor,
+    find_noise_factor,
     read_factors,
     write_factors,
 )
@@ -121,7 +121,7 @@ def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -
         return edit
     view = need_view(group, edit.view)
     return (
-        replace(edit, noise=noise_factor(factors, _static_camera_key(view), actor))
+        replace(edit, noise=find_noise_factor(factors, _static_camera_key(view), actor))
         if factors
         else edit
     )
@@ -136,7 +136,7 @@ def keep_view_noise(group: Group, edit: Edit) -> Edit:
 
 def _noise_by_view(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:
     return {
-        view.key: noise_factor(factors, _static_camera_key(view), placed.get(view.key))
+        view.key: find_noise_factor(factors, _static_camera_key(view), placed.get(view.key))
         for view in group.views
         if view.ball is not None and not view.ball.predicted_by
     }

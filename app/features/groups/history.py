@@ -19,7 +19,10 @@ from app.features.groups.state import GroupState, GroupWithoutSolution, need_gro
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
 from app.features.groups.undo_stacks import undo_entry_body
-from app.features.people.visibility_queries import reads_blind, shown_entries
+from app.features.people.visibility_queries import (
+    hides_groups_from_reader,
+    show_entries_under_aliases,
+)
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 
@@ -67,8 +70,8 @@ def read_history(store: Store, group_id: int) -> list[LogEntry]:
     """
     with store.read() as session:
         stored = need_group(session, group_id)
-        entries = shown_entries(session, _group_entries(session, stored))
-        if not reads_blind():
+        entries = show_entries_under_aliases(session, _group_entries(session, stored))
+        if not hides_groups_from_reader():
             return entries
         return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]
 
@@ -81,7 +84,7 @@ def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChang
     """
     with store.read() as session:
         stored = need_group(session, group_id)
-        if reads_blind():
+        if hides_groups_from_reader():
             place, entries = entry_id - 1, _group_entries(session, stored)
             entry_id = entries[place].id if place < len(entries) else 0
         snapshot = _snapshot_of_static_cameras(stored)
@@ -92,7 +95,7 @@ def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChang
                 before = snapshot.group(group_id) if known else None
             apply_entry(snapshot, entry)
             if entry.id == entry_id and group_id in snapshot.groups:
-                (shown,) = shown_entries(session, [entry])
+                (shown,) = show_entries_under_aliases(session, [entry])
                 return _changes_between(shown, before, snapshot.group(group_id), stored.view_ids)
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
 

@@ -25,7 +25,7 @@ from app.features.datasets.tables import (
 )
 from app.features.groups.view_queries import StoredStation, station_from_row
 from app.features.match_estimates.queries import Factors, factors_from_text
-from app.features.paint.queries import paint_digests, read_readings
+from app.features.paint.queries import read_paint_digests, read_readings
 from app.features.people.visibility_queries import visible_groups_condition
 from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras
@@ -133,7 +133,7 @@ def read_groups(
         views.setdefault(row.id, []).append(view)
         if view.station_id not in stations:
             stations[view.station_id] = station_from_row(_StationRow._make(row[_STATION_START:]))
-    named = {d for row in heads.values() for d in paint_digests(row.paint).values()}
+    named = {d for row in heads.values() for d in read_paint_digests(row.paint).values()}
     readings = read_readings(session, named) if named else {}
     return {
         number: _stored_group(heads[number], views.get(number, []), stations, readings)
@@ -233,7 +233,7 @@ def _view_from_row(row: Any, station: Station) -> View:
 
 def _paint_from_text(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
     with as_written():
-        return {view: readings[digest] for view, digest in paint_digests(text).items()}
+        return {view: readings[digest] for view, digest in read_paint_digests(text).items()}
 
 
 def positions_from_text(text: str | None) -> dict[str, SharedPosition]:

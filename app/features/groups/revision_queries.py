@@ -30,7 +30,7 @@ from app.features.groups.insert_queries import (
 )
 from app.features.groups.queries import StoredGroup, positions_from_text
 from app.features.groups.view_queries import save_station
-from app.features.paint.queries import paint_digests
+from app.features.paint.queries import read_paint_digests
 from app.features.solutions.queries import SolutionModel, is_current
 from app.features.verdicts.tables import VerdictModel
 from app.soccer import codec
@@ -259,7 +259,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
     for key, row in heads.items():
         positions = positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
-        paint = paint_digests(row.paint)
+        paint = read_paint_digests(row.paint)
         digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
         rows.append({"of": key, "inputs_hash": digest})
     if rows:

@@ -41,7 +41,7 @@ from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
 from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
-from app.features.solutions.service import Solve, known_calibrations, solve_encoded
+from app.features.solutions.service import Solve, read_known_calibrations, solve_encoded
 from app.soccer.group import Group, Media
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
@@ -236,7 +236,7 @@ def preview(
                 refuse_edit_of_shared_station(stored, edit)
         for edit in edits:
             group = keep_view_noise(group, edit).apply(group)
-        known = known_calibrations(session, [group], stored.policy)
+        known = read_known_calibrations(session, [group], stored.policy)
     if paint is not None:
         group = paint.update_paint(group, stored.policy.calibration, known)
     return group, solve(group, stored.policy, known)
@@ -270,7 +270,7 @@ def solve_for_state(session: Session, group_id: int) -> GroupState:
     solution = read_solutions(session, [record.solution_key]).get(group_id)
     if solution is None:
         group, policy = record.stored.group, record.stored.policy
-        solution = solve(group, policy, known_calibrations(session, [group], policy))
+        solution = solve(group, policy, read_known_calibrations(session, [group], policy))
     return record.state(solution)
 
 
@@ -284,7 +284,7 @@ def read_solved(
         solution = read_solutions(session, [record.solution_key]).get(group_id)
         if solution is not None or not needed:
             return record, solution
-        known = known_calibrations(session, [stored.group], stored.policy)
+        known = read_known_calibrations(session, [stored.group], stored.policy)
     solution, encoded = solve_encoded(stored.group, stored.policy, known)
     with store.write() as session:
         insert_solutions(session, [(record.solution_key, encoded)])
@@ -335,7 +335,7 @@ def submit_change(
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])
                 return before.state(found.get(before.stored.id))
-            known = known_calibrations(session, [change.group], before.stored.policy)
+            known = read_known_calibrations(session, [change.group], before.stored.policy)
         painted = change.group
         if paint is not None:
             painted = paint.update_paint(painted, before.stored.policy.calibration, known)

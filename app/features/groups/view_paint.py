@@ -16,8 +16,8 @@ from app.features.groups.edit import LineChanges, SetLines
 from app.features.groups.edit_codec import require_point_limits_of_edits
 from app.features.groups.pictures import PaintTask, read_view_paint
 from app.features.groups.queries import StoredGroup, find_group_of_view, read_groups
-from app.features.pitches.queries import groups_of_match
-from app.features.solutions.service import known_calibrations
+from app.features.pitches.queries import list_groups_of_match
+from app.features.solutions.service import read_known_calibrations
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.media.frames import Frames
@@ -112,7 +112,7 @@ def _make_request(session: Session, view_id: int, lines: LineChanges) -> ViewPai
     edit = SetLines(view.key, lines)
     require_point_limits_of_edits(stored.group, [edit])
     group, policy = edit.apply(stored.group), stored.policy
-    known = known_calibrations(session, [group], policy)
+    known = read_known_calibrations(session, [group], policy)
     changed = next(item for item in group.views if item.key == view.key)
     # What the lines alone make: what was read of the paint before has no part in what is read.
     start = known.get(click_calibration_key(group, changed, policy.calibration))
@@ -146,11 +146,11 @@ def list_nearby_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, 
     Those that their lines leave open say nothing of a stand, and lenses of another kind nothing
     that the search could take.
     """
-    ids = groups_of_match(session, stored.dataset_id, stored.group.match)
+    ids = list_groups_of_match(session, stored.dataset_id, stored.group.match)
     near = sorted(ids, key=lambda number: abs(number - stored.id))[:MOST_KNOWN]
     others: Mapping[int, StoredGroup] = read_groups(session, near, extras=False)
     groups = [item.group for item in others.values() if item.id != stored.id]
-    known = known_calibrations(session, groups, stored.policy)
+    known = read_known_calibrations(session, groups, stored.policy)
     policy = stored.policy.calibration
     found = []
     for group in groups:

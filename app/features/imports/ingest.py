@@ -45,9 +45,9 @@ from app.features.imports.body import (
 from app.features.imports.queries import find_newest_imports, list_known_groups
 from app.features.independent_annotations.queries import is_copy_dataset
 from app.features.paint.queries import insert_readings
-from app.features.pitches.queries import edited_pitches, is_pitch_edited
-from app.features.pitches.service import give_pitch
-from app.features.policies.service import first_policy
+from app.features.pitches.queries import is_pitch_edited, read_edited_pitches
+from app.features.pitches.service import set_pitch_of_groups
+from app.features.policies.service import choose_first_policy
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.issia import FramePersons
 from app.formats.report import Report
@@ -131,7 +131,9 @@ def import_groups(
     sound, stations = _storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
-            identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
+            identity = _ensure_dataset(
+                session, dataset, actor, policy or choose_first_policy(batch)
+            )
             origin = ImportOrigin(identity, source, actor, lines_left)
             import_group_batch(session, origin, batch, report, stations)
         done += len(batch)
@@ -293,10 +295,10 @@ def insert_new_groups(
         ids.append(identity)
     rows.insert()
     append(session, entries)
-    pitches = edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
+    pitches = read_edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
     for identity, (group, _) in zip(ids, fresh, strict=True):
         if (pitch := pitches.get(group.match)) is not None:
-            give_pitch(session, origin.dataset_id, [identity], pitch, origin.actor)
+            set_pitch_of_groups(session, origin.dataset_id, [identity], pitch, origin.actor)
     refresh_queue(session, ids)
     return ids
 
@@ -346,7 +348,7 @@ def _update_group(
 def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:
     """The size that a person gave to a group's match, or to the group itself that has none."""
     if incoming.match:
-        pitches = edited_pitches(session, stored.dataset_id, {incoming.match})
+        pitches = read_edited_pitches(session, stored.dataset_id, {incoming.match})
         return pitches.get(incoming.match)
     is_own = not stored.group.match and is_pitch_edited(session, stored.id)
     return stored.group.pitch if is_own else None

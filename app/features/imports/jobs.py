@@ -18,7 +18,7 @@ from app.features.imports.sources import FORMATS, ImportSource, import_source
 from app.features.imports.upload_queries import get_upload, save_upload, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import FailedWithReportError, JobProgress, left_to_next_server
+from app.features.jobs.runner import FailedWithReportError, JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
@@ -140,7 +140,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
     if not request.dry_run and "upload" in request.source:
         # Frames are read where they are, so the file must stay from the first group on.
         save_upload(settings, request.source["upload"])
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         outcome = import_in_worker(
             store,
             request.dataset,

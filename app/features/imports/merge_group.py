@@ -21,8 +21,8 @@ from app.features.imports.body import collect_view_and_station_ids, import_body
 from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, list_verdicts_of_groups
-from app.features.pitches.service import give_pitch
-from app.features.verdicts.queries import StoredVerdict, insert_verdicts, next_verdict_id
+from app.features.pitches.service import set_pitch_of_groups
+from app.features.verdicts.queries import StoredVerdict, find_next_verdict_id, insert_verdicts
 from app.soccer.codec import station_digest, view_digest
 from app.soccer.finding import Dismissal
 from app.soccer.group import Group, View
@@ -101,7 +101,9 @@ def merge_group(
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
     if pitch in (FOLLOW, UPSTREAM):
         # An edit of its own: the size before can be had back here, too.
-        give_pitch(session, origin.dataset_id, [stored.id], exported.group.pitch, origin.actor)
+        set_pitch_of_groups(
+            session, origin.dataset_id, [stored.id], exported.group.pitch, origin.actor
+        )
     report.findings += len(fresh)
     return True
 
@@ -206,7 +208,7 @@ def merge_verdicts(
     fresh = sorted(fresh, key=lambda item: str(item["at"]))
     if known and str(known[-1]["at"]) > str(fresh[-1]["at"]):
         fresh.append(known[-1])
-    first = next_verdict_id(session)
+    first = find_next_verdict_id(session)
     given = [StoredVerdict(first + place, group_id, **item) for place, item in enumerate(fresh)]
     insert_verdicts(session, origin.dataset_id, given, actor=origin.actor, at=now())
     return True

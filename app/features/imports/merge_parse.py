@@ -14,7 +14,7 @@ from app.features.groups.undo_stacks import format_pitch_size, group_of_log_entr
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT
-from app.features.policies.service import CUSTOM, policy_values, policy_with
+from app.features.policies.service import CUSTOM, policy_to_values, policy_with
 from app.features.verdicts.service import STATES
 from app.formats.file_tree import BROKEN, FileTree
 from app.formats.json_reader import read_json
@@ -87,7 +87,7 @@ def read_merge_header(tree: FileTree) -> MergeHeader:
     try:
         policy = policy_from_json(_require_object(value["policy"]))
         # Its values reach the solver: a text in place of a number would break there.
-        policy_with(PAPER, policy_values(policy), name=CUSTOM)
+        policy_with(PAPER, policy_to_values(policy), name=CUSTOM)
         _require_text(policy.name)
         return MergeHeader(_require_text(value["dataset"]), policy)
     except InputError as error:

@@ -30,7 +30,7 @@ from app.features.imports.uploads import (
     list_own_uploads,
 )
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees, Services
 from app.http.documents import no_content, responds
@@ -63,7 +63,7 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
 @imports_router.post(
     "",
     operation_id="startImport",
-    **by_job(404, 413, 415, 503),
+    **openapi_of_job_response(404, 413, 415, 503),
 )
 @may(
     Action.LEAD,
@@ -75,7 +75,7 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
         "options/lines/folder": OwnedKind.FOLDER,
     },
 )
-@responds(job_answer)
+@responds(make_job_response)
 def start_import(
     request: ImportBody, services: AppServices, actor: Actor, dry_run: DryRun = False
 ) -> Job:

@@ -426,10 +426,10 @@ def _report_contradicted(
     folder: IssiaFolder, dataset: str, source: ImportSource, report: Report
 ) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
-    from app.features.solutions.service import contradicted_cameras, contradiction_sentence
+    from app.features.solutions.service import describe_contradiction, find_contradicted_cameras
 
     stations = {station.key: number for number, station in folder.stations.items()}
-    off = contradicted_cameras(((one, Pitch()) for one in folder.stations.values()), PAPER)
+    off = find_contradicted_cameras(((one, Pitch()) for one in folder.stations.values()), PAPER)
     showing = [folder.tracks[stations[key]].balls.keys() for key in off]
     groups = {frame for track in folder.tracks.values() for frame in track.balls}
     if not off:
@@ -441,7 +441,7 @@ def _report_contradicted(
     )
     shown = len(set[int]().union(*showing))
     where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'} and fail at the gate jac"
-    report.remark(contradiction_sentence(off, where, f"`{command}`"))
+    report.remark(describe_contradiction(off, where, f"`{command}`"))
 
 
 def _read_unassigned(folder: IssiaFolder) -> Iterator[UnassignedFrame]:

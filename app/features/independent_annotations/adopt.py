@@ -43,12 +43,12 @@ from app.features.independent_annotations.service import (
 )
 from app.features.independent_annotations.submission_queries import KIND, RETURNED, reopen_copy
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify
+from app.features.notifications.service import notify_person
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.verdicts.queries import (
     StoredVerdict,
+    find_next_verdict_id,
     insert_verdicts,
-    next_verdict_id,
     read_last_verdicts,
 )
 from app.features.webhooks.queries import HANDED_BACK, announce, time_suffix
@@ -222,7 +222,7 @@ def copy_verdict_to_original(
     verdict = StoredVerdict(
         **{
             **vars(given),
-            "id": next_verdict_id(session),
+            "id": find_next_verdict_id(session),
             "group_id": after.id,
             "actor": actor,
             "at": now(),
@@ -299,7 +299,7 @@ def log_return(
     _announce_return(session, group, person, actor=actor, at=at, batch=batch)
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"
-    notify(
+    notify_person(
         session, person, NotificationKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
         actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
     )  # fmt: skip

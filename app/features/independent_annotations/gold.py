@@ -39,7 +39,7 @@ from app.features.independent_annotations.queries import (
     update_gold_start,
 )
 from app.features.independent_annotations.submission_queries import list_submissions
-from app.features.solutions.service import known_calibrations
+from app.features.solutions.service import read_known_calibrations
 from app.formats.camera_json import camera_from_json
 from app.json_text import Moment
 from app.soccer.codec import group_from_json, group_to_json
@@ -339,7 +339,7 @@ def _first_submission(
     if first["inputs_hash"] == stored.inputs_hash:
         return _Submission(first["at"], first["verdict"], state.group, state.solution)
     group = group_from_json(first["submitted"])
-    known = known_calibrations(session, [group], state.policy)
+    known = read_known_calibrations(session, [group], state.policy)
     return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
 
 

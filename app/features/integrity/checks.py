@@ -48,9 +48,9 @@ from app.features.integrity.records import (
 )
 from app.features.integrity.transfer import find_null_characters, list_null_characters
 from app.features.people.provider import Provider
-from app.features.people.sign_on_rules import linked_admins, read_rules
-from app.features.queue.refresh_queries import differing_rows
-from app.features.solutions.service import stale_groups
+from app.features.people.sign_on_rules import count_linked_admins, read_rules
+from app.features.queue.refresh_queries import find_outdated_rows
+from app.features.solutions.service import list_stale_groups
 from app.features.what_if.service import examine_yields
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
@@ -191,7 +191,7 @@ def _check_digests(session: Session) -> Check:
 def _check_queue(session: Session, mend: str) -> Check:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
-        count, apart = differing_rows(session)
+        count, apart = find_outdated_rows(session)
     except StorageError as error:
         return Check("queue", False, error.message, mend)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"
@@ -203,7 +203,7 @@ def _check_solutions(store: Store) -> list[Check]:
     """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
     checks = []
     for item in list_datasets(store):
-        waiting = len(stale_groups(store, item.id))
+        waiting = len(list_stale_groups(store, item.id))
         mend = f'touchline solve --dataset "{item.name}"' if waiting else None
         sentence = f"{waiting:,} of {item.groups:,} groups wait to be solved"
         checks.append(Check(f"solutions of {item.name}", True, sentence, mend))
@@ -349,7 +349,7 @@ def _check_linked_admins(store: Store) -> Check | None:
         return None
     if rules is None or not rules.only:
         return None
-    count = linked_admins(store, rules)
+    count = count_linked_admins(store, rules)
     sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
     mend = (
         None if count else "touchline users reset NAME prints a link with which an admin is linked."

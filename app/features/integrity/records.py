@@ -16,31 +16,31 @@ from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.queries import policy_from_row
 from app.features.groups.queries import read_groups
-from app.features.people.queries import all_dataset_roles, all_people
+from app.features.people.queries import all_people, list_dataset_roles
 from app.features.people.roles import PERSON
-from app.features.people.visibility_queries import given_aliases, shown_entries
-from app.features.solutions.codec import SolutionSummary, summarize
+from app.features.people.visibility_queries import read_aliases, show_entries_under_aliases
+from app.features.solutions.codec import SolutionSummary, summarize_solution
 from app.features.solutions.queries import read_summary
 from app.features.solutions.stored_queries import (
-    calibration_keys,
-    damaged_calibrations,
-    damaged_readings,
+    check_stored_calibrations,
+    check_stored_paint_readings,
     decode_row,
-    solution_batches,
+    iterate_solution_batches,
+    list_calibration_keys_of_row,
 )
 from app.features.versions.frozen_queries import (
     SAID,
     SOLUTION,
-    fitting_key,
-    frozen_batches,
-    known_frozen,
-    lost_calibrations,
-    members_without_content,
-    named_texts,
+    collect_shared_keys,
+    compute_content_key,
+    filter_stored_frozen_keys,
+    iterate_frozen_batches,
+    list_lost_calibrations,
+    list_members_without_content,
     read_json,
 )
-from app.features.versions.queries import VersionRow, all_versions, annotation_rows
-from app.features.versions.service import calibration_names, version_hash
+from app.features.versions.queries import VersionRow, iterate_annotation_rows, list_all_versions
+from app.features.versions.service import collect_calibration_keys, hash_version
 from app.soccer.codec import group_inputs_hash, paint_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -100,9 +100,9 @@ def _present_people(session: Session) -> KnownPeople:
     return KnownPeople(
         accounts={row.name: (row.role, bool(row.disabled)) for row in people},
         roles={
-            (names[row.person_id], row.dataset_id): row.role for row in all_dataset_roles(session)
+            (names[row.person_id], row.dataset_id): row.role for row in list_dataset_roles(session)
         },
-        shown=given_aliases(session),
+        shown=read_aliases(session),
     )
 
 
@@ -192,10 +192,10 @@ def examine_computed(session: Session, restore: str) -> list[Check]:
         session: A read session.
         restore: What to do where one is not as it was written.
     """
-    calibrations, damaged = _count_damaged(damaged_calibrations(session))
-    readings, unread = _count_damaged(damaged_readings(session))
+    calibrations, damaged = _count_damaged(check_stored_calibrations(session))
+    readings, unread = _count_damaged(check_stored_paint_readings(session))
     solutions, apart = 0, list[str]()
-    for rows in solution_batches(session):
+    for rows in iterate_solution_batches(session):
         solutions += len(rows)
         apart += _differing_solutions(session, rows, {*damaged})
     return [
@@ -226,7 +226,7 @@ def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str
     groups = _groups_with_sound_rows(session, [row.group_id for row in rows if row.current])
     for row in rows:
         try:
-            known = damaged.isdisjoint(calibration_keys(row))
+            known = damaged.isdisjoint(list_calibration_keys_of_row(row))
             is_whole = not known or _is_as_written(session, row, groups)
         except StorageError:
             is_whole = False
@@ -258,7 +258,7 @@ def _is_as_written(session: Session, row: Any, groups: Mapping[int, Group]) -> b
         return True
     group = groups[row.group_id]
     is_theirs = _fits_group(group, solution, policy_from_row(row.policy))
-    return is_theirs and _are_equal_values(summary, summarize(group, solution))
+    return is_theirs and _are_equal_values(summary, summarize_solution(group, solution))
 
 
 def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
@@ -287,7 +287,7 @@ def examine_versions(store: Store) -> list[Check]:
     """
     with store.read() as session:
         restore = dialect_in(session).restoring
-        versions = all_versions(session)
+        versions = list_all_versions(session)
         apart = [*_differing_versions(session, versions)]
         count, changed = _check_frozen_contents(session)
         return [
@@ -324,7 +324,7 @@ def _logged_freezes(session: Session) -> dict[int, LogEntry]:
     """What the log says of each version by its id, but for datasets that were deleted."""
     found: dict[int, LogEntry] = {}
     entries = entries_of_kinds(session, ("freeze", "dataset_deleted"))
-    for entry in shown_entries(session, entries):
+    for entry in show_entries_under_aliases(session, entries):
         if entry.kind == "freeze":
             found[entry.body["version"]] = entry
         else:
@@ -347,31 +347,33 @@ def _matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
 
 def _fault_of_version(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
-    rows = [item._asdict() for item in annotation_rows(session, row.id)]
+    rows = [item._asdict() for item in iterate_annotation_rows(session, row.id)]
     try:
         with as_written():
             counts, policy = parse(row.counts), policy_from_json(parse(row.policy))
             members = sum(item["member"] for item in rows)
             left_out = sum(counts["left_out"].values())
             tracks = parse(row.tracks) if row.tracks else {}
-            found = version_hash(policy, row.solver_version, rows, tracks)
+            found = hash_version(policy, row.solver_version, rows, tracks)
     except StorageError:
         return "it cannot be read"
     if (members, len(rows) - members) != (counts["groups"], left_out):
         return f"{len(rows):,} groups of {counts['groups'] + left_out:,} are there"
     if found != row.hash or policy.hash != row.policy_hash:
         return "its hash does not follow from its groups"
-    lost = set(tracks.values()) - known_frozen(session, row.dataset_id, tracks.values())
+    lost = set(tracks.values()) - filter_stored_frozen_keys(
+        session, row.dataset_id, tracks.values()
+    )
     if lost:
         return f"{len(lost):,} of its tracks are missing"
-    without = members_without_content(session, row.id)
+    without = list_members_without_content(session, row.id)
     return f"frozen content is missing, of {without[0]} first" if without else None
 
 
 def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
     """How many frozen contents there are, and which of them are damaged or missing."""
-    count, apart = 0, lost_calibrations(session)
-    for rows in frozen_batches(session):
+    count, apart = 0, list_lost_calibrations(session)
+    for rows in iterate_frozen_batches(session):
         count += len(rows)
         named: dict[int, set[str]] = {}
         for row in rows:
@@ -380,7 +382,7 @@ def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
             except StorageError:
                 apart.append(row.key)
         for dataset_id, keys in named.items():
-            apart += sorted(keys - known_frozen(session, dataset_id, keys))
+            apart += sorted(keys - filter_stored_frozen_keys(session, dataset_id, keys))
     return count, list(dict.fromkeys(apart))
 
 
@@ -395,8 +397,8 @@ def _referenced_keys(key: str, body: bytes | None) -> set[str]:
     with as_written():
         if not key.startswith((SAID, SOLUTION)):
             unpack(body)
-        if fitting_key(key, body) != key:
+        if compute_content_key(key, body) != key:
             raise ValueError(f"the key {key} does not match the content stored under it")
         if key.startswith(SAID):
-            return named_texts(read_json(body))
-        return calibration_names(read_json(body)) if key.startswith(SOLUTION) else set()
+            return collect_shared_keys(read_json(body))
+        return collect_calibration_keys(read_json(body)) if key.startswith(SOLUTION) else set()

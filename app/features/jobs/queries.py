@@ -15,7 +15,11 @@ from app.db.json_columns import Json, parse
 from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import EVERYTHING, Visibility, columns_shown
+from app.features.people.visibility_queries import (
+    EVERYTHING,
+    Visibility,
+    list_columns_with_shown_actor,
+)
 from app.json_text import canonical, finite
 from app.soccer.choices import JobState
 
@@ -189,13 +193,13 @@ def read_jobs(
     return [_job_from_row(row) for row in session.execute(statement)]
 
 
-def job_ids(session: Session, dataset_id: int, kind: str) -> list[int]:
+def list_job_ids_of_kind(session: Session, dataset_id: int, kind: str) -> list[int]:
     """Ids of all jobs of a kind in a dataset."""
     mine = (JobModel.dataset_id == dataset_id, JobModel.kind == kind)
     return list(session.scalars(select(JobModel.id).where(*mine).order_by(JobModel.id)))
 
 
-def job_ids_of_dataset(
+def list_job_ids_of_dataset(
     session: Session, dataset_id: int, kinds: Sequence[str], states: Sequence[str]
 ) -> list[int]:
     """Ids of a dataset's jobs in some states, of some kinds or, without any, of all."""
@@ -267,5 +271,6 @@ _TO_BE = case(
     )
 )
 _SELECT = select(
-    *columns_shown(JobModel), func.coalesce(DatasetModel.name, _TO_BE).label("dataset")
+    *list_columns_with_shown_actor(JobModel),
+    func.coalesce(DatasetModel.name, _TO_BE).label("dataset"),
 ).outerjoin(DatasetModel, DatasetModel.id == JobModel.dataset_id)

@@ -16,7 +16,7 @@ from app.features.jobs.queries import (
     FAILED,
     OPEN,
     delete_job,
-    job_ids,
+    list_job_ids_of_kind,
     read_job,
     read_jobs,
     update_job,
@@ -24,7 +24,7 @@ from app.features.jobs.queries import (
 from app.features.jobs.queries import Job as Job
 from app.features.jobs.runner import JobRun
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify
+from app.features.notifications.service import notify_person
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.soccer.actors import person_of
 
@@ -87,7 +87,7 @@ class JobRecords:
     def all_ids(self, *, dataset_id: int, kind: str) -> list[int]:
         """Ids of all jobs of a kind in a dataset, however many there are."""
         with self._store.read() as session:
-            return job_ids(session, dataset_id, kind)
+            return list_job_ids_of_kind(session, dataset_id, kind)
 
     def forget(self, job_id: int) -> None:
         """Delete the record of a job that is over.
@@ -126,7 +126,7 @@ class JobRecords:
             if job is not None:
                 record_cancellation(session, job, by)
             if job is not None and job.state in _REPORTED:
-                notify(
+                notify_person(
                     session,
                     person_of(job.actor),
                     NotificationKind.JOB,

@@ -61,7 +61,7 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def counting_progress(progress: JobProgress, what: str) -> ReportProgress:
+def report_counts_in_words(progress: JobProgress, what: str) -> ReportProgress:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
 
     Where the work says a sentence, it is that one.
@@ -151,7 +151,7 @@ class JobRun:
             self.progress.require_not_cancelled()
             with structlog.contextvars.bound_contextvars(job=self.job.id):
                 result = self.work(self.progress)
-            sentence = ending_sentence(self.job.kind, result)
+            sentence = describe_result(self.job.kind, result)
             return {
                 "state": DONE,
                 "result": result,
@@ -263,7 +263,7 @@ def run_job_in_worker(
         return run_in_this_thread(store, work, *arguments, progress=report, answer=answer)
     stop = with_grace(progress.check)
     try:
-        with left_to_next_server(progress):
+        with leave_work_to_next_server(progress):
             return run_in_worker(
                 store, kind, work, *arguments, progress=report, stop=stop, answer=answer
             )
@@ -273,7 +273,7 @@ def run_job_in_worker(
 
 
 @contextmanager
-def left_to_next_server(progress: JobProgress) -> Iterator[None]:
+def leave_work_to_next_server(progress: JobProgress) -> Iterator[None]:
     """Let the next server go on where a process ended because this server is about to stop.
 
     A service manager may end the processes of a service first.
@@ -290,7 +290,7 @@ def _is_small_dataset(store: Store, dataset_id: int) -> bool:
         return not has_more_groups(session, dataset_id, SMALL)
 
 
-def ending_sentence(kind: str, result: Json) -> str | None:
+def describe_result(kind: str, result: Json) -> str | None:
     """The sentence of a job that is done; None where its result says nothing that is known here."""
     tell = _ENDINGS.get(kind)
     try:

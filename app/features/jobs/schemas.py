@@ -90,17 +90,17 @@ class JobPage(ListDocument[JobDocument]):
     """Jobs, the newest first; ``next`` is the cursor of the next page."""
 
 
-def job_address(job: Job) -> dict[str, str]:
+def make_location_header(job: Job) -> dict[str, str]:
     """The header that says where a job is looked at."""
     return {"Location": f"/api/v1/jobs/{job.id}"}
 
 
-def job_answer(job: Job) -> Response:
+def make_job_response(job: Job) -> Response:
     """The answer of a job that was started."""
-    return document(JobDocument.model_validate(job), 202, job_address(job))
+    return document(JobDocument.model_validate(job), 202, make_location_header(job))
 
 
-def by_job(*statuses: int) -> dict[str, Any]:
+def openapi_of_job_response(*statuses: int) -> dict[str, Any]:
     """What a route says of itself that answers 202 with a job.
 
     Args:

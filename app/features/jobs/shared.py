@@ -28,7 +28,7 @@ from app.features.jobs.queries import (
     Job,
     NewJob,
     is_asked_to_end,
-    job_ids_of_dataset,
+    list_job_ids_of_dataset,
     read_job,
     read_jobs,
     trim_jobs,
@@ -131,7 +131,7 @@ class SharedJobs(Jobs):
     def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
         """See ``Jobs``; whichever process works on them."""
         with self._store.read_one() as session:
-            return job_ids_of_dataset(session, dataset_id, kinds, OPEN)
+            return list_job_ids_of_dataset(session, dataset_id, kinds, OPEN)
 
     def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """See ``Jobs``."""
@@ -167,7 +167,7 @@ class SharedJobs(Jobs):
 
     def _running_of(self, dataset_id: int) -> list[int]:
         with self._store.read_one() as session:
-            return job_ids_of_dataset(session, dataset_id, (), (RUNNING,))
+            return list_job_ids_of_dataset(session, dataset_id, (), (RUNNING,))
 
     def _request_end(self, session: Session, ids: Collection[int]) -> None:
         """End what waits, and let what runs see that it shall end."""

@@ -84,7 +84,7 @@ def clear_banner(store: Store, *, actor: str) -> bool:
         return True
 
 
-def exposure_warning(settings: Settings) -> str | None:
+def find_exposure_warning(settings: Settings) -> str | None:
     """What makes it unsafe to serve with some settings, as a sentence; None: nothing."""
     secure = (settings.url or "").startswith("https://")
     if not is_local(settings.host) and not settings.team:

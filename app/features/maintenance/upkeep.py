@@ -207,10 +207,12 @@ def read_home(store: Store) -> HomeReport:
         entries, jobs = newest_entry(session), count_jobs(session)
     settings = store.settings
     free = shutil.disk_usage(settings.home).free
-    return HomeReport(groups, unsolved, oldest, entries, jobs, file_sizes(settings), free)
+    return HomeReport(
+        groups, unsolved, oldest, entries, jobs, read_database_file_sizes(settings), free
+    )
 
 
-def file_sizes(settings: Settings) -> dict[str, int]:
+def read_database_file_sizes(settings: Settings) -> dict[str, int]:
     """Bytes of the database and of its write-ahead log, where they are."""
     database, sizes = settings.database_file, {}
     for name, path in {"database": database, "wal": log_file(database)}.items():

@@ -86,11 +86,15 @@ def pitch(
 def _estimate_pitches_of_dataset(
     dataset: str, accept: bool, match: str | None, size: str | None, workers: int | None
 ) -> DatasetPitches:
-    from app.features.pitches.service import change_pitches, estimate_pitches, requested_sizes
+    from app.features.pitches.service import (
+        change_pitches,
+        choose_requested_sizes,
+        estimate_pitches,
+    )
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
-        wanted = requested_sizes(found, match, accept=accept, size=size)
+        wanted = choose_requested_sizes(found, match, accept=accept, size=size)
         if not wanted:
             return found
         with store.write() as session:
@@ -104,10 +108,10 @@ def _print_pitches(found: DatasetPitches, match: str | None, json_: bool) -> Non
 
     items = filter_by_match(found.items, match)
     if json_:
-        print_json([pitch_values(item) for item in items])
+        print_json([pitch_state_to_json(item) for item in items])
         return
     for item in items:
-        values = pitch_values(item)
+        values = pitch_state_to_json(item)
         size = f"{item.pitch.length:g} x {item.pitch.width:g} m"
         shown = f"length {_metres_with_sigma(values, 'length')}, width {_metres_with_sigma(values, 'width')}"
         proposed = item.proposed
@@ -123,7 +127,7 @@ def _metres_with_sigma(values: dict[str, Any], name: str) -> str:
     return f"{found:.2f} m (sigma {values['estimate'][f'{name}_sigma_m']:.2f})"
 
 
-def pitch_values(state: PitchState) -> dict[str, Any]:
+def pitch_state_to_json(state: PitchState) -> dict[str, Any]:
     """A match's pitch as plain values, as the API spells them."""
     from dataclasses import asdict
 
@@ -187,14 +191,14 @@ def _pictures_of_dataset(
     from app.features.datasets.service import need_match
     from app.features.match_estimates.pictures import (
         change_pictures,
+        choose_requested_pictures,
         estimate_pictures,
-        requested_pictures,
     )
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pictures(store, dataset, executor, progress)
         chosen = need_match(found, match, dataset)
-        wanted = requested_pictures(chosen, accept=accept, as_taken=as_taken)
+        wanted = choose_requested_pictures(chosen, accept=accept, as_taken=as_taken)
         changed = 0
         if wanted:
             with store.write() as session:
@@ -375,8 +379,8 @@ def rig(
     """
     from app.features.match_estimates.rig import (
         accept_rig,
-        proposal_values,
         propose_adjustment,
+        rig_proposal_to_json,
         take_back,
     )
 
@@ -389,7 +393,7 @@ def rig(
         proposed = propose_adjustment(store, dataset, lines)
         if accept is not None:
             accept_rig(store, proposed, accept.value, actor=current_actor())
-    values = {**proposal_values(proposed), "accepted": accept and accept.value}
+    values = {**rig_proposal_to_json(proposed), "accepted": accept and accept.value}
     if json_:
         print_json(values)
     else:

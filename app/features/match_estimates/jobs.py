@@ -23,7 +23,7 @@ from app.features.datasets.service import (
 )
 from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
-from app.features.jobs.runner import JobProgress, Work, counting_progress
+from app.features.jobs.runner import JobProgress, Work, report_counts_in_words
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.pictures import estimate_pictures
 from app.features.match_estimates.positions import (
@@ -33,9 +33,9 @@ from app.features.match_estimates.positions import (
 )
 from app.features.match_estimates.rig import (
     accept_rig,
-    proposal_values,
     propose_adjustment,
     require_adjustable,
+    rig_proposal_to_json,
     take_back,
 )
 from app.features.solve.jobs import change_and_solve, request_solve
@@ -194,7 +194,7 @@ class MatchJob:
 
 def _estimate_pictures(call: MatchCall, progress: JobProgress) -> Json:
     with call.jobs.pool() as executor:
-        counter = counting_progress(progress, "matches")
+        counter = report_counts_in_words(progress, "matches")
         found = estimate_pictures(call.store, call.dataset_id, executor, counter, call.matches)
     return {
         "items": [
@@ -224,7 +224,7 @@ def _share_positions(call: MatchCall, progress: JobProgress) -> Json:
                 call.matches,
                 actor=call.job.actor,
                 executor=executor,
-                progress=counting_progress(progress, "matches"),
+                progress=report_counts_in_words(progress, "matches"),
                 require_wanted=progress.require_not_cancelled,
             )
     finally:
@@ -260,7 +260,7 @@ def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
             )
         accept_rig(call.store, proposed, what, actor=call.job.actor)
         call.solve()
-    return {**proposal_values(proposed), "accepted": what}
+    return {**rig_proposal_to_json(proposed), "accepted": what}
 
 
 RIG = MatchJob("rig", "Adjust the cameras of {}", _adjust_rig, require_adjustable, resumes=False)

@@ -20,7 +20,7 @@ from app.features.groups.edit import SetPicture
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.match_estimates.queries import MatchPictures, match_pictures
-from app.features.pitches.queries import groups_of_match, match_pitches
+from app.features.pitches.queries import list_groups_of_match, match_pitches
 from app.progress import ReportProgress
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
@@ -118,7 +118,7 @@ def estimate_pictures(
     return sorted(states, key=lambda state: state.match)
 
 
-def requested_pictures(
+def choose_requested_pictures(
     chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
     """What somebody wants the pictures of matches to be, by match.
@@ -155,7 +155,9 @@ def change_pictures(
     """
     found = require_matches(session, dataset, [*wanted])
     return sum(
-        _give_picture(session, found.id, groups_of_match(session, found.id, match), picture, actor)
+        _give_picture(
+            session, found.id, list_groups_of_match(session, found.id, match), picture, actor
+        )
         for match, picture in wanted.items()
     )
 
@@ -197,7 +199,7 @@ def _make_task(
 
 def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Group, View]]:
     with store.read() as session:
-        ids = groups_of_match(session, dataset_id, match)
+        ids = list_groups_of_match(session, dataset_id, match)
         for start in range(0, len(ids), _BATCH):
             batch = read_groups(session, ids[start : start + _BATCH], extras=False)
             for stored in batch.values():

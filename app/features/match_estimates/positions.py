@@ -26,9 +26,9 @@ from app.features.jobs.queries import Job
 from app.features.match_estimates.queries import (
     POSITION,
     MatchPositions,
-    last_share,
+    find_last_share,
     match_positions,
-    position_inputs,
+    read_position_inputs,
 )
 from app.features.solutions.queries import read_calibrations
 from app.progress import ReportProgress
@@ -149,7 +149,7 @@ def share_positions(
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
-            then = position_inputs(session, found.id, task.match).get(task.match)
+            then = read_position_inputs(session, found.id, task.match).get(task.match)
             body = {"match": task.match, "inputs": task.inputs, "before": then}
             _give_positions(session, found.id, edits, actor, body)
         if progress is not None:
@@ -204,7 +204,7 @@ def take_back_positions(
     match = match or ""
     found = read_dataset_head(session, dataset)
     _matches_with_inputs(session, found, [match])
-    entries = last_share(session, found.id, match)
+    entries = find_last_share(session, found.id, match)
     if stopped and not any(
         job.started and entries and job.started <= entries[0].at for job in stopped
     ):
@@ -247,7 +247,7 @@ def _give_positions(
 
 def _read_positions(session: Session, dataset: str | int) -> DatasetPositions:
     found = read_dataset_head(session, dataset)
-    policy, then = found.policy.calibration, position_inputs(session, found.id)
+    policy, then = found.policy.calibration, read_position_inputs(session, found.id)
     items = tuple(
         _position_state(item, then.get(item.match), policy)
         for item in match_positions(session, found.id)
@@ -310,7 +310,7 @@ def _matches_with_inputs(
             raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
     if matches is not None:
         return [(known[match], _inputs_digest(known[match], policy)) for match in matches]
-    then = position_inputs(session, dataset.id)
+    then = read_position_inputs(session, dataset.id)
     keyed = [(item, _inputs_digest(item, policy)) for item in known.values()]
     return [(item, inputs) for item, inputs in keyed if then.get(item.match) != inputs]
 

@@ -66,7 +66,7 @@ def factors_to_json(factors: Factors) -> Json:
     return [list(item) for item in factors]
 
 
-def noise_factor(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
+def find_noise_factor(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
     """How noisy a ball is beside the dataset's; a camera or person that is not named is any other."""
     known = {(item.camera, item.person): item.ratio for item in factors}
     cameras, people = {item.camera for item in factors}, {item.person for item in factors}
@@ -188,7 +188,7 @@ def read_positions(text: str) -> Mapping[str, SharedPosition]:
         return positions_from_json(parse(text))
 
 
-def position_inputs(
+def read_position_inputs(
     session: Session, dataset_id: int, match: str | None = None
 ) -> dict[str, str | None]:
     """What the positions of each match are estimated from, where any were ever given.
@@ -218,7 +218,7 @@ def position_inputs(
     return found
 
 
-def last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
+def find_last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
     """The entries of a match's newest share that was not taken back; none where there is none."""
     taken_back = set()
     for entries in _shares_by_time(session, dataset_id, match):

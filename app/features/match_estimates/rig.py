@@ -209,7 +209,7 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
     return undo_stations(store, states, actor=actor)
 
 
-def proposal_values(proposed: ProposedRig) -> dict[str, Any]:
+def rig_proposal_to_json(proposed: ProposedRig) -> dict[str, Any]:
     """A proposal for people and scripts: numbers by name, without the cameras themselves."""
     proposal = proposed.proposal
     hidden = {"before", "after", "covariance", "covariance_before"}
@@ -220,13 +220,13 @@ def proposal_values(proposed: ProposedRig) -> dict[str, Any]:
     ]
     values["pairs"] = [dict(vars(change)) for change in proposal.pairs]
     values["left_alone"] = list(proposal.left_alone)
-    values["anchor"] = anchor_sentence(proposal)
-    values["time"] = time_sentence(proposal)
+    values["anchor"] = describe_anchor(proposal)
+    values["time"] = describe_time_difference(proposal)
     values["inputs"] = proposed.inputs
     return values
 
 
-def anchor_sentence(proposal: RigProposal) -> str:
+def describe_anchor(proposal: RigProposal) -> str:
     """What holds the adjusted cameras in their place."""
     weak = "the cameras in use, as far as 10 px in the picture"
     if proposal.line_points:
@@ -234,7 +234,7 @@ def anchor_sentence(proposal: RigProposal) -> str:
     return f"held in place by {weak}; no camera has lines, so these also fix the place of the pitch"
 
 
-def time_sentence(proposal: RigProposal) -> str:
+def describe_time_difference(proposal: RigProposal) -> str:
     """What the balls say about the time of the cameras: the largest difference that is one."""
     known = [
         (pair, pair.offset_frames, pair.offset_sigma_frames)

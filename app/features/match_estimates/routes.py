@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from app.db.session import Session
 from app.features.groups.schemas import PictureEdit
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, take_rig_back
 from app.features.match_estimates.pictures import change_pictures, read_pictures
 from app.features.match_estimates.positions import PositionState, get_positions
@@ -169,9 +169,11 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
     return SharedPositionsDocument.model_validate(get_positions(store, dataset))
 
 
-@positions_router.post("", operation_id="sharePositions", **by_job(404, 409, 413, 415))
+@positions_router.post(
+    "", operation_id="sharePositions", **openapi_of_job_response(404, 409, 413, 415)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def share_positions(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -184,9 +186,9 @@ def share_positions(
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete("", operation_id="revertPositions", **by_job(404, 409))
+@positions_router.delete("", operation_id="revertPositions", **openapi_of_job_response(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def take_back_positions(
     dataset: DatasetPath,
     services: AppServices,
@@ -200,9 +202,13 @@ def take_back_positions(
     return POSITIONS.take_back(services.jobs, services.store, dataset, match, actor=actor)
 
 
-@rig_router.post("/datasets/{dataset}/rig", operation_id="adjustRig", **by_job(404, 409, 413, 415))
+@rig_router.post(
+    "/datasets/{dataset}/rig",
+    operation_id="adjustRig",
+    **openapi_of_job_response(404, 409, 413, 415),
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def adjust_rig(
     dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -247,10 +253,10 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     return services.noises.read(dataset)
 
 
-@noise_router.post("", operation_id="acceptNoise", **by_job(404, 412))
+@noise_router.post("", operation_id="acceptNoise", **openapi_of_job_response(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@responds(job_answer)
+@responds(make_job_response)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
 
@@ -265,10 +271,10 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     return change_and_solve(services.jobs, store, found.dataset_id, change, actor=actor)
 
 
-@noise_router.delete("", operation_id="revertNoise", **by_job(404))
+@noise_router.delete("", operation_id="revertNoise", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@responds(job_answer)
+@responds(make_job_response)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
 
@@ -289,9 +295,11 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
     return MatchPicturesDocument.model_validate({"items": read_pictures(store, dataset)})
 
 
-@pictures_router.post("", operation_id="estimateMatchPictures", **by_job(404, 413, 415))
+@pictures_router.post(
+    "", operation_id="estimateMatchPictures", **openapi_of_job_response(404, 413, 415)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def estimate_match_pictures(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -303,9 +311,9 @@ def estimate_match_pictures(
     return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@pictures_router.patch("", operation_id="setMatchPicture", **by_job(404, 413, 415))
+@pictures_router.patch("", operation_id="setMatchPicture", **openapi_of_job_response(404, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def set_match_picture(
     dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
 ) -> Job:

@@ -18,7 +18,7 @@ from app.features.notifications.queries import (
     select_notifications,
 )
 from app.features.people.logins import Login, read_roles
-from app.features.people.queries import person_by_name
+from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
 from app.soccer.actors import person_of
 
@@ -34,7 +34,7 @@ class NotificationState:
     unread: int
 
 
-def notify(
+def notify_person(
     session: Session,
     person: str,
     kind: NotificationKind,
@@ -64,7 +64,7 @@ def notify(
     """
     if kind is not NotificationKind.JOB and person_of(actor) == person:
         return False
-    row = person_by_name(session, person)
+    row = find_person_by_name(session, person)
     if row is None or row.disabled:
         return False
     roles = read_roles(session, row.id, Role(row.role))

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.runner import JobProgress, counting_progress
+from app.features.jobs.runner import JobProgress, report_counts_in_words
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import MatchCall, MatchJob
 from app.features.paint.proposals import forget_proposals, propose_views
@@ -28,7 +28,7 @@ def _read_paint(call: MatchCall, progress: JobProgress) -> Json:
             call.matches,
             actor=call.job.actor,
             run=call.job.request["run"],
-            progress=counting_progress(progress, "groups looked at"),
+            progress=report_counts_in_words(progress, "groups looked at"),
             require_wanted=progress.require_not_cancelled,
         )
     finally:
@@ -64,7 +64,7 @@ def _propose_lines(call: MatchCall, progress: JobProgress) -> Json:
         call.store,
         call.dataset_id,
         call.matches,
-        progress=counting_progress(progress, "views looked at"),
+        progress=report_counts_in_words(progress, "views looked at"),
         require_wanted=progress.require_not_cancelled,
     )
     return asdict(run)

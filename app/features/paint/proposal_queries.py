@@ -102,7 +102,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     """Whether a view is one to look at: of a static camera that is the first with a picture.
 
     Args:
-        lost: Ids of the views to look at whose lines determine no camera (``lost_views``).
+        lost: Ids of the views to look at whose lines determine no camera (``list_views_without_camera_from_lines``).
     """
     view, station = aliased(ViewModel), aliased(StationModel)
     # One look at all of them: asked view by view, a camera of many views would cost their square.
@@ -117,7 +117,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     return or_(bare, ViewModel.id.in_(numbers_in(sorted(lost))))
 
 
-def lost_views(
+def list_views_without_camera_from_lines(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> set[int]:
     """Ids of views with a picture and lines that determine no camera, as they are solved now.
@@ -150,7 +150,7 @@ def lost_views(
     return set({row.station_id: row.id for row in rows if row.calibration in left_open}.values())
 
 
-def groups_with_open(outcome: str | None = None) -> Select[Any]:
+def select_groups_with_open_proposal(outcome: str | None = None) -> Select[Any]:
     """Ids of the groups with an open proposal, of that outcome where one is named."""
     statement = (
         select(ViewModel.group_id)
@@ -161,7 +161,7 @@ def groups_with_open(outcome: str | None = None) -> Select[Any]:
     return statement if outcome is None else statement.where(ProposalModel.outcome == outcome)
 
 
-def views_to_look_at(
+def list_views_to_propose_for(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[tuple[int, list[int]]]:
     """Groups with the ids of those of their views that have no camera but a picture.
@@ -171,7 +171,7 @@ def views_to_look_at(
         dataset_id: The dataset.
         matches: By name; None: all.
     """
-    lost = lost_views(session, dataset_id, matches)
+    lost = list_views_without_camera_from_lines(session, dataset_id, matches)
     statement = (
         select(ViewModel.group_id, ViewModel.id)
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
@@ -191,7 +191,7 @@ def match_proposals(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[MatchProposals]:
     """How far each match of a dataset is, or each of these, by name."""
-    lost = lost_views(session, dataset_id, matches)
+    lost = list_views_without_camera_from_lines(session, dataset_id, matches)
     is_candidate, outcome = _needs_proposal(lost), ProposalModel.outcome
     # What was said of a view as it was before says nothing of it now.
     looked = and_(is_candidate, _is_open_proposal())

@@ -23,10 +23,10 @@ from app.features.paint.proposal_queries import (
     MatchProposals,
     delete_proposals,
     group_proposals,
+    list_views_to_propose_for,
     match_proposals,
     read_proposals,
     save_proposals,
-    views_to_look_at,
 )
 from app.features.paint.proposal_queries import Proposal as Proposal
 from app.media.frames import VideoIndexer
@@ -143,7 +143,7 @@ def propose_views(
     """
     with store.read() as session:
         found = require_matches(session, dataset, matches)
-        pending = views_to_look_at(session, found.id, matches)
+        pending = list_views_to_propose_for(session, found.id, matches)
     count, total = workers or store.settings.image_workers, sum(len(views) for _, views in pending)
     run = ProposalRun()
     with (

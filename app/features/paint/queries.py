@@ -102,7 +102,7 @@ def reading_from_row(digest: str, body: bytes) -> PaintReading:
     return reading
 
 
-def paint_digests(text: str | None) -> dict[str, str]:
+def read_paint_digests(text: str | None) -> dict[str, str]:
     """Digest of what was read by view, from the column of a group."""
     if text is None:
         return {}
@@ -192,7 +192,7 @@ def _readings_by_reason(session: Session, dataset_id: int) -> dict[str, dict[str
     return found
 
 
-def last_run(session: Session, dataset_id: int) -> list[LogEntry]:
+def find_last_paint_run(session: Session, dataset_id: int) -> list[LogEntry]:
     """The entries of a dataset's newest reading that was not taken back; none where there is none."""
     taken_back: set[str] = set()
     runs: dict[str, list[LogEntry]] = {}

@@ -23,7 +23,12 @@ from app.features.groups.view_paint import (
 )
 from app.features.groups.view_routes import CLIENT_GONE, with_view_in_error
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import ACCEPTED, JobDocument, by_job, job_answer
+from app.features.jobs.schemas import (
+    ACCEPTED,
+    JobDocument,
+    make_job_response,
+    openapi_of_job_response,
+)
 from app.features.match_estimates.routes import MatchRequest
 from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget
 from app.features.paint.proposal_queries import MatchProposals, Proposal
@@ -193,9 +198,11 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     return DatasetPaintDocument.model_validate(get_paint(store, dataset))
 
 
-@paint_router.post("", operation_id="readDatasetPaint", **by_job(404, 409, 413, 415))
+@paint_router.post(
+    "", operation_id="readDatasetPaint", **openapi_of_job_response(404, 409, 413, 415)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def read_paint(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -207,9 +214,9 @@ def read_paint(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete("", operation_id="revertDatasetPaint", **by_job(404, 409))
+@paint_router.delete("", operation_id="revertDatasetPaint", **openapi_of_job_response(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Give all groups what they had before paint was read last; the job solves them.
 
@@ -296,7 +303,7 @@ def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDoc
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def accept_proposed_lines(
     dataset: DatasetPath,
     request: DatasetProposalsRequest,

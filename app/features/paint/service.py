@@ -30,13 +30,13 @@ from app.features.jobs.queries import Job
 from app.features.paint.queries import (
     PAINT,
     MatchPaint,
+    find_last_paint_run,
     insert_readings,
-    last_run,
     match_paint,
     read_readings,
 )
 from app.features.paint.tripod import share_tripods
-from app.features.solutions.service import known_calibrations
+from app.features.solutions.service import read_known_calibrations
 from app.media.frames import VideoIndexer
 from app.progress import ReportProgress
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
@@ -211,7 +211,7 @@ def take_back_paint(
         NotFoundError: There is no such dataset.
     """
     found = require_matches(session, dataset)
-    entries = last_run(session, found.id)
+    entries = find_last_paint_run(session, found.id)
     stopped_runs = {job.request["run"] for job in stopped}
     if stopped and not (entries and entries[0].body["run"] in stopped_runs):
         return
@@ -269,7 +269,7 @@ def _make_tasks(
         stored = read_groups(session, ids)
         of_lines = replace(dataset.policy.calibration, source="lines")
         clicks = replace(dataset.policy, calibration=of_lines)
-        known = known_calibrations(session, [item.group for item in stored.values()], clicks)
+        known = read_known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {
         number: list(_group_tasks(item, dataset.policy.calibration, known))
         for number, item in stored.items()

@@ -19,18 +19,18 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
-from app.features.people.links import token_hash
+from app.features.people.links import hash_token
 from app.features.people.login_queries import (
     TokenRow,
-    access_tokens,
     delete_access_token,
     delete_expired_token,
     find_access_token,
     insert_access_token,
-    touch_access_token,
+    list_access_tokens,
+    update_access_token_last_use,
 )
-from app.features.people.logins import LEADING, Login, TokenUse, roles_with
-from app.features.people.queries import person_by_id, rights_from_row
+from app.features.people.logins import LEADING, Login, TokenUse, dataset_roles_from_rights
+from app.features.people.queries import find_person_by_id, rights_from_row
 from app.features.people.roles import Role, Scope, log_account_event
 
 PREFIX = "tl_"
@@ -73,14 +73,14 @@ class AccessToken:
     expired: bool
 
 
-def new_token_text() -> str:
+def make_access_token_text() -> str:
     """The text of a new token."""
     body = PREFIX + "".join(secrets.choice(_LETTERS) for _ in range(SHOWN + SECRET))
     return body + _checksum(body)
 
 
 def has_valid_checksum(text: str) -> bool:
-    """Whether a text is one that ``new_token_text`` can have made: no letter is missing or mistyped."""
+    """Whether a text is one that ``make_access_token_text`` can have made: no letter is missing or mistyped."""
     return LOOKS.fullmatch(text) is not None and _checksum(text[:-CHECK]) == text[-CHECK:]
 
 
@@ -133,9 +133,9 @@ class AccessTokens:
             raise InputError("a token needs a scope", pointer="/scopes")
         if not 1 <= days <= MOST_DAYS:
             raise InputError(f"a token can last from 1 to {MOST_DAYS} days", pointer="/days")
-        at, text = self._clock(), new_token_text()
+        at, text = self._clock(), make_access_token_text()
         values = {
-            "token_hash": token_hash(text),
+            "token_hash": hash_token(text),
             "person_id": login.person_id,
             "dataset_id": dataset_id,
             "name": name,
@@ -146,15 +146,15 @@ class AccessTokens:
             "used": None,
         }
         with self._store.write() as session:
-            person = person_by_id(session, login.person_id)
+            person = find_person_by_id(session, login.person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError("the account was disabled meanwhile")
             delete_expired_token(session, person.id, name, text_of(at))
-            mine = access_tokens(session, person.id)
+            mine = list_access_tokens(session, person.id)
             _require_free_name_and_count([row.name for row in mine], name)
             token_id = insert_access_token(session, values)
             _log_token_event(session, person.name, person, "token made", values | {"id": token_id})
-            made = next(row for row in access_tokens(session, person.id) if row.id == token_id)
+            made = next(row for row in list_access_tokens(session, person.id) if row.id == token_id)
         return self._token_from_row(made), text
 
     def find(self, text: str) -> Login:
@@ -166,10 +166,10 @@ class AccessTokens:
         if not has_valid_checksum(text):
             raise NotLoggedInError(CUT, hint="Copy the complete token again.")
         with self._store.read_one() as session:
-            row = find_access_token(session, token_hash(text), text_of(self._clock()), LEADING)
+            row = find_access_token(session, hash_token(text), text_of(self._clock()), LEADING)
         if row is None:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
-        roles = roles_with(Role(row.role), rights_from_row(row))
+        roles = dataset_roles_from_rights(Role(row.role), rights_from_row(row))
         if row.dataset_id is not None:
             roles = roles.only(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
@@ -184,12 +184,12 @@ class AccessTokens:
     def touch(self, login: Login) -> None:
         """Write down that a token is used."""
         with self._store.write(lasting=False) as session:
-            touch_access_token(session, login.id, text_of(self._clock()))
+            update_access_token_last_use(session, login.id, text_of(self._clock()))
 
     def of_person(self, person_id: int | None) -> list[AccessToken]:
         """The tokens of a person, or of everybody (None), the newest of each first."""
         with self._store.read() as session:
-            return [self._token_from_row(row) for row in access_tokens(session, person_id)]
+            return [self._token_from_row(row) for row in list_access_tokens(session, person_id)]
 
     def end(self, token_id: int, person_id: int | None, *, actor: str) -> AccessToken:
         """End a token: whoever uses it is refused from now on.
@@ -206,9 +206,9 @@ class AccessTokens:
             NotFoundError: There is none of that id, or it is another person's.
         """
         with self._store.write() as session:
-            rows = access_tokens(session, person_id)
+            rows = list_access_tokens(session, person_id)
             row = next((row for row in rows if row.id == token_id), None)
-            person = None if row is None else person_by_id(session, row.person_id)
+            person = None if row is None else find_person_by_id(session, row.person_id)
             if row is None or person is None:
                 raise NotFoundError(
                     f"there is no token {token_id}",

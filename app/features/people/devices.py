@@ -22,18 +22,18 @@ from cryptography.fernet import Fernet
 from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
 from app.db.session import Session, text_of
 from app.db.store import Store
-from app.features.people.links import token_hash
+from app.features.people.links import hash_token
 from app.features.people.login_queries import (
-    note_attempt,
-    oldest_attempt,
+    find_blocking_attempt,
+    insert_login_attempt,
     store_pending,
     take_pending,
 )
 from app.features.people.queries import (
+    delete_recovery_code,
+    find_person_by_name,
     find_second_factor,
-    person_by_name,
-    use_recovery_code,
-    use_step,
+    save_used_totp_step,
 )
 
 LASTS = timedelta(days=400)
@@ -78,7 +78,7 @@ class Devices:
     def _signature(self, name: str, issued: str, nonce: str) -> str:
         key = installation_key(self._store.settings, DEVICES)
         with self._store.read_one() as session:
-            person = person_by_name(session, name.strip().lower())
+            person = find_person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
         parts = (
             _folded_name(name),
@@ -109,14 +109,14 @@ class AttemptWindow:
 
         Who is refused writes nothing: a flood keeps nobody from writing.
         """
-        at, name = self._clock(), token_hash(whose)
+        at, name = self._clock(), hash_token(whose)
         with self._store.read_one() as session:
-            oldest = oldest_attempt(session, name, at - seconds, most)
+            oldest = find_blocking_attempt(session, name, at - seconds, most)
         if oldest is None:
             with self._store.write(lasting=False) as session:
-                oldest = oldest_attempt(session, name, at - seconds, most)
+                oldest = find_blocking_attempt(session, name, at - seconds, most)
                 if oldest is None:
-                    note_attempt(session, name, at)
+                    insert_login_attempt(session, name, at)
         return None if oldest is None else oldest + seconds - at
 
 
@@ -197,7 +197,7 @@ class StoredPending:
         return None if closed is None else self._encryption_key().decrypt(closed)
 
     def _hashed_name(self, asker: str) -> str:
-        return token_hash(f"{self._kind}/{asker}")
+        return hash_token(f"{self._kind}/{asker}")
 
     def _encryption_key(self) -> Fernet:
         return Fernet(urlsafe_b64encode(installation_key(self._store.settings, BEGUN)))
@@ -235,15 +235,19 @@ CODE_BYTES = 10
 """Random bytes of a recovery code."""
 
 
-def use_code(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+def verify_and_use_code(
+    session: Session, store: Store, person_id: int, code: str, at: datetime
+) -> bool:
     """Whether a code is right at a time, of an authenticator or a recovery code; it is then used."""
     text = normalize_code(code)
     if len(text) == DIGITS:
-        return use_totp(session, store, person_id, text, at)
-    return use_recovery_code(session, person_id, token_hash(text))
+        return verify_and_use_totp(session, store, person_id, text, at)
+    return delete_recovery_code(session, person_id, hash_token(text))
 
 
-def use_totp(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+def verify_and_use_totp(
+    session: Session, store: Store, person_id: int, code: str, at: datetime
+) -> bool:
     """The same of the code of an authenticator, of a second factor that is not confirmed too."""
     found = find_second_factor(session, person_id)
     if found is None:
@@ -255,7 +259,7 @@ def use_totp(session: Session, store: Store, person_id: int, code: str, at: date
         for near in range(step - SKEW, step + SKEW + 1)
         if hmac.compare_digest(totp.generate_otp(near).encode(), given)
     ]
-    return bool(right) and use_step(session, person_id, right[0])
+    return bool(right) and save_used_totp_step(session, person_id, right[0])
 
 
 def make_totp(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
@@ -267,7 +271,7 @@ def make_totp(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
     return pyotp.TOTP(base64.b32encode(digest[:20]).decode(), interval=SECONDS)
 
 
-def new_code() -> str:
+def make_recovery_code() -> str:
     """A new recovery code, as people read it."""
     text = base64.b32encode(secrets.token_bytes(CODE_BYTES)).decode().lower()
     return "-".join(text[at : at + 4] for at in range(0, len(text), 4))

@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 from app.db.store import Store
 from app.errors import InputError, ReviewError
 from app.features.people.links import Link
-from app.features.people.queries import person_by_name
-from app.features.people.roles import Role, checked_name, require_no_token
+from app.features.people.queries import find_person_by_name
+from app.features.people.roles import Role, normalize_user_name, require_no_token
 from app.features.people.service import Person, insert_invited, invite, renew_link
 from app.json_text import Moment, quoted
 from app.mail import Letter, MailServer, checked_address
@@ -167,7 +167,7 @@ def invite_many(
         for one in wanted:
             try:
                 name, role, address = _checked_invitation(one, seen)
-                if person_by_name(session, name) is not None:
+                if find_person_by_name(session, name) is not None:
                     raise InputError(f"there is already a user {name}")
             except ReviewError as error:
                 refused.append(_refused_invitation(one, error.message))
@@ -233,7 +233,7 @@ def _invitation_row(number: int, columns: Sequence[str], values: Sequence[str]) 
 
 
 def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
-    name = checked_name(one.name)
+    name = normalize_user_name(one.name)
     if name in seen:
         raise InputError(f"{name} is already in row {seen[name]}")
     try:

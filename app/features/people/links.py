@@ -21,24 +21,24 @@ from app.features.people.login_queries import delete_logins, find_person_identit
 from app.features.people.queries import (
     count_people_who_can_log_in,
     find_link,
+    find_person_by_id,
+    find_person_by_name,
     forget_links,
     insert_link,
     insert_person,
-    person_by_id,
-    person_by_name,
     update_person,
 )
-from app.features.people.roles import Role, checked_name, log_account_event
+from app.features.people.roles import Role, log_account_event, normalize_user_name
 
 BYTES = 32
 
 
-def new_token() -> str:
+def make_random_token() -> str:
     """A token that nobody guesses."""
     return secrets.token_urlsafe(BYTES)
 
 
-def token_hash(token: str) -> str:
+def hash_token(token: str) -> str:
     """What is kept of a token. It is random and long, so a plain hash suffices."""
     return hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
 
@@ -155,8 +155,8 @@ def insert_new(
     session: Session, person_id: int | None, *, by: str, at: datetime, lasts: timedelta = LASTS
 ) -> Link:
     """Make a link for a person (None: for the first admin), in the caller's transaction."""
-    token, expires = new_token(), text_of(at + lasts)
-    insert_link(session, token_hash(token), person_id, by=by, expires=expires)
+    token, expires = make_random_token(), text_of(at + lasts)
+    insert_link(session, hash_token(token), person_id, by=by, expires=expires)
     return Link(token, expires)
 
 
@@ -170,7 +170,7 @@ def find_link_holder(store: Store, token: str) -> LinkHolder:
         return _find_holder(session, token)[1]
 
 
-def use_link(store: Store, token: str, password: str, name: str | None = None) -> str:
+def set_password_by_link(store: Store, token: str, password: str, name: str | None = None) -> str:
     """Set the password that somebody has chosen; the link, and all their sessions, end with it.
 
     Returns:
@@ -182,12 +182,12 @@ def use_link(store: Store, token: str, password: str, name: str | None = None) -
         ConflictError: The name is taken.
     """
     meant = find_link_holder(store, token)
-    chosen = meant.name or checked_name(name or "")
+    chosen = meant.name or normalize_user_name(name or "")
     # Some tenths of a second: not while the database waits.
     hashed = hash_password(password, chosen)
     with store.write() as session:
         person_id = consume_link(session, token, chosen, password=hashed)
-        person = person_by_id(session, person_id)
+        person = find_person_by_id(session, person_id)
         assert person is not None
         log_account_event(session, person.name, person.name, "password", person.role)
         return str(person.name)
@@ -203,7 +203,7 @@ def consume_link(session: Session, token: str, name: str | None, *, password: st
     """
     person_id, _ = _find_holder(session, token)
     if person_id is None:
-        person_id = _insert_first_admin(session, checked_name(name or ""))
+        person_id = _insert_first_admin(session, normalize_user_name(name or ""))
         forget_links(session, None)
     update_person(session, person_id, password=password)
     delete_logins(session, person_id)
@@ -213,14 +213,14 @@ def consume_link(session: Session, token: str, name: str | None, *, password: st
 
 def _find_holder(session: Session, token: str) -> tuple[int | None, LinkHolder]:
     """Id of the person of a good link (None: the first admin), and who it is."""
-    row = find_link(session, token_hash(token), now())
+    row = find_link(session, hash_token(token), now())
     if row is None:
         raise NotFoundError(GONE, hint=ASK)
     if row.person_id is None:
         if count_people_who_can_log_in(session, Role.ADMIN):
             raise NotFoundError(GONE, hint=ASK)
         return None, LinkHolder(None, False)
-    person = person_by_id(session, row.person_id)
+    person = find_person_by_id(session, row.person_id)
     if person is None or person.disabled:
         raise NotFoundError(GONE, hint=ASK)
     return row.person_id, LinkHolder(person.name, has_joined(session, person))
@@ -232,7 +232,7 @@ def has_joined(session: Session, person: Any) -> bool:
 
 
 def _insert_first_admin(session: Session, name: str) -> int:
-    if person_by_name(session, name) is not None:
+    if find_person_by_name(session, name) is not None:
         raise ConflictError(f"there is already a user {name}", hint="Choose another name.")
     log_account_event(session, name, name, "first admin", Role.ADMIN)
     return insert_person(session, name, Role.ADMIN, by=name)

@@ -63,7 +63,7 @@ KEPT_SECONDS = 3600.0
 _BEGUN = cast(Table, PendingActionModel.__table__)
 
 
-def oldest_attempt(session: Session, whose: str, since: float, most: int) -> float | None:
+def find_blocking_attempt(session: Session, whose: str, since: float, most: int) -> float | None:
     """When the oldest try since a time was (both: seconds since 1970), where there are too many."""
     mine = (AttemptModel.whose == whose, AttemptModel.at > since)
     statement = select(func.count(), func.min(AttemptModel.at)).where(*mine)
@@ -71,7 +71,7 @@ def oldest_attempt(session: Session, whose: str, since: float, most: int) -> flo
     return float(oldest) if count >= most else None
 
 
-def note_attempt(session: Session, whose: str, at: float) -> None:
+def insert_login_attempt(session: Session, whose: str, at: float) -> None:
     """Count a try; those that no limit looks back to are forgotten."""
     session.execute(delete(AttemptModel).where(AttemptModel.at <= at - KEPT_SECONDS))
     session.execute(insert(AttemptModel), [{"whose": whose, "at": at}])
@@ -167,7 +167,7 @@ def list_sessions(
     return session.rows(LoginModel, statement.order_by(LoginModel.seen.desc()))
 
 
-def touch_login(session: Session, login_id: int, at: str) -> None:
+def update_login_last_use(session: Session, login_id: int, at: str) -> None:
     """Note that a session was used."""
     session.execute(update(LoginModel).where(LoginModel.id == login_id).values(seen=at))
 
@@ -217,7 +217,7 @@ def list_passkeys(session: Session, person_id: int) -> Sequence[PasskeyModel]:
     return session.rows(PasskeyModel, mine.order_by(PasskeyModel.id))
 
 
-def use_passkey(session: Session, passkey_id: int, sign_count: int, at: str) -> None:
+def update_passkey_use(session: Session, passkey_id: int, sign_count: int, at: str) -> None:
     """Note that a passkey was used, and how often its device says that it was."""
     statement = update(PasskeyModel).where(PasskeyModel.id == passkey_id)
     session.execute(statement.values(sign_count=sign_count, used=at))
@@ -257,7 +257,7 @@ def put_identity(session: Session, values: dict[str, Any]) -> None:
     session.execute(insert(IdentityModel), values)
 
 
-def use_identity(session: Session, person_id: int, shown: str, at: str) -> None:
+def update_identity_use(session: Session, person_id: int, shown: str, at: str) -> None:
     """Note that a person came by their account, and what it is known by now."""
     statement = update(IdentityModel).where(IdentityModel.person_id == person_id)
     session.execute(statement.values(shown=shown, used=at))
@@ -269,7 +269,7 @@ def delete_identity(session: Session, person_id: int) -> str | None:
     return session.execute(statement.returning(IdentityModel.shown)).scalar_one_or_none()
 
 
-def people_with_identity(session: Session) -> dict[int, str]:
+def read_identity_labels(session: Session) -> dict[int, str]:
     """What the accounts of people are known by, by id of the person."""
     statement = select(IdentityModel.person_id, IdentityModel.shown)
     return {row.person_id: row.shown for row in session.execute(statement)}
@@ -336,7 +336,7 @@ def _access_token_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]
     )
 
 
-def access_tokens(session: Session, person_id: int | None = None) -> Sequence[TokenRow]:
+def list_access_tokens(session: Session, person_id: int | None = None) -> Sequence[TokenRow]:
     """The tokens of a person, or of everybody, expired ones too; the newest of each first."""
     statement = _ALL_TOKENS.order_by(PersonModel.name, AccessTokenModel.id.desc())
     mine = AccessTokenModel.person_id == person_id
@@ -351,7 +351,7 @@ def count_access_tokens(session: Session) -> dict[int, int]:
     return {row[0]: row[1] for row in session.execute(statement)}
 
 
-def touch_access_token(session: Session, token_id: int, at: str) -> None:
+def update_access_token_last_use(session: Session, token_id: int, at: str) -> None:
     """Note that a token was used."""
     session.execute(update(AccessTokenModel).where(AccessTokenModel.id == token_id).values(used=at))
 

@@ -29,7 +29,7 @@ from app.features.people.schemas import (
     TeamSettings,
 )
 from app.features.people.second_factor import Enrolment, FactorState
-from app.features.people.session_routes import Me, session_document
+from app.features.people.session_routes import Me, make_session_document
 from app.http.cursor import paged
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, OwnedKind, may, open_to_all
@@ -141,7 +141,7 @@ def log_in(
         log.warning("a login with a passkey was refused", address=address)
         raise
     response.set_cookie(**team.cookie_values(token))
-    return session_document(team.logins.find(token), store)
+    return make_session_document(team.logins.find(token), store)
 
 
 second_factors_router = APIRouter(tags=["sessions"], route_class=SecretRoute)

@@ -10,8 +10,14 @@ from enum import StrEnum
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, NotLoggedInError
-from app.features.people.devices import use_code
-from app.features.people.links import LONGEST, hash_password, is_password, new_token, token_hash
+from app.features.people.devices import verify_and_use_code
+from app.features.people.links import (
+    LONGEST,
+    hash_password,
+    hash_token,
+    is_password,
+    make_random_token,
+)
 from app.features.people.login_queries import (
     delete_ended,
     delete_login,
@@ -19,15 +25,15 @@ from app.features.people.login_queries import (
     find_login,
     insert_login,
     list_sessions,
-    touch_login,
+    update_login_last_use,
 )
 from app.features.people.queries import (
     Rights,
+    find_person_by_id,
+    find_person_by_name,
     find_rights,
     forget_links,
     has_second_factor,
-    person_by_id,
-    person_by_name,
     rights_from_row,
     update_person,
 )
@@ -187,7 +193,7 @@ class Logins:
         """
         name = name.strip().lower()[:LONGEST]
         with self._store.read() as session:
-            person = person_by_name(session, name)
+            person = find_person_by_name(session, name)
             is_asked = person is not None and has_second_factor(session, person.id)
         able = person is not None and not person.disabled
         if not is_password(password, person.password if person and able else None):
@@ -201,7 +207,7 @@ class Logins:
                 # What was not counted, for the account had no second factor yet, is asked for.
                 if code is None or not is_asked:
                     raise NotLoggedInError(ASK_CODE, hint=LOST, pointer="/code")
-                if not use_code(session, self._store, person.id, code, self._clock()):
+                if not verify_and_use_code(session, self._store, person.id, code, self._clock()):
                     raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer="/code")
 
         return self.begin(
@@ -235,9 +241,9 @@ class Logins:
         Raises:
             NotLoggedInError: The password was changed meanwhile, or the account disabled.
         """
-        token, at = new_token(), self._clock()
+        token, at = make_random_token(), self._clock()
         values = {
-            "token_hash": token_hash(token),
+            "token_hash": hash_token(token),
             "person_id": person_id,
             "created": text_of(at),
             "seen": text_of(at),
@@ -248,7 +254,7 @@ class Logins:
             "vouched": vouched,
         }
         with self._store.write() as session:
-            person = person_by_id(session, person_id)
+            person = find_person_by_id(session, person_id)
             # The password may have been changed, or the account disabled, since it was asked for.
             if person is None or person.disabled or person.password != password:
                 raise NotLoggedInError(WRONG)
@@ -256,7 +262,7 @@ class Logins:
             delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
             if before and (
                 old := find_login(
-                    session, token_hash(before), leading=LEADING, **self._expiry_limits(at)
+                    session, hash_token(before), leading=LEADING, **self._expiry_limits(at)
                 )
             ):
                 delete_login(session, old.id, old.person_id)
@@ -279,10 +285,10 @@ class Logins:
         """
         alive = self._expiry_limits(self._clock())
         with self._store.read_without_waiting() if at_once else self._store.read_one() as session:
-            row = find_login(session, token_hash(token), leading=LEADING, **alive)
+            row = find_login(session, hash_token(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
             return None
-        roles = roles_with(Role(row.role), rights_from_row(row))
+        roles = dataset_roles_from_rights(Role(row.role), rights_from_row(row))
         seen, created = datetime.fromisoformat(row.seen), datetime.fromisoformat(row.created)
         enrol = row.must_enrol and not row.vouched
         way = LoginMethod(row.way)
@@ -297,7 +303,7 @@ class Logins:
     def touch(self, login: Login) -> None:
         """Write down that a session is used."""
         with self._store.write(lasting=False) as session:
-            touch_login(session, login.id, text_of(self._clock()))
+            update_login_last_use(session, login.id, text_of(self._clock()))
 
     def sessions(self, login: Login) -> list[OpenSession]:
         """Every session of a person, the one that was used last first."""
@@ -336,7 +342,7 @@ class Logins:
             InputError: The old one is wrong, or the new one cannot be one.
         """
         with self._store.read() as session:
-            person = person_by_id(session, login.person_id)
+            person = find_person_by_id(session, login.person_id)
         if person is None or not is_password(old, person.password):
             raise InputError("this is not your current password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
@@ -362,10 +368,10 @@ def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRol
     """The rights of a person, who is that everywhere."""
     if everywhere is Role.ADMIN:
         return DatasetRoles(everywhere)
-    return roles_with(everywhere, find_rights(session, person_id, LEADING))
+    return dataset_roles_from_rights(everywhere, find_rights(session, person_id, LEADING))
 
 
-def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
+def dataset_roles_from_rights(everywhere: Role, rights: Rights) -> DatasetRoles:
     """The rights of somebody who is that everywhere; in copies they are what they are in what those
     are of."""
     if everywhere is Role.ADMIN:

@@ -30,23 +30,23 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
 from app.features.people.devices import Challenges, make_pending_actions
-from app.features.people.links import token_hash
+from app.features.people.links import hash_token
 from app.features.people.login_queries import (
     delete_logins,
     delete_passkey,
     find_passkey,
     insert_passkey,
     list_passkeys,
-    use_passkey,
+    update_passkey_use,
 )
 from app.features.people.logins import Login, LoginMethod, Logins
-from app.features.people.queries import count_recovery_codes, person_by_id, put_recovery_codes
+from app.features.people.queries import count_recovery_codes, find_person_by_id, put_recovery_codes
 from app.features.people.roles import log_account_event
 from app.features.people.second_factor import (
     ISSUER,
-    code_hashes,
     end_factor,
-    new_codes,
+    hash_recovery_codes,
+    make_recovery_codes,
     require_password,
 )
 from app.json_text import Moment
@@ -174,9 +174,9 @@ class Passkeys:
             if find_passkey(session, values["credential"]) is not None:
                 raise ConflictError("this passkey is registered already")
             number = insert_passkey(session, values)
-            codes = [] if count_recovery_codes(session, login.person_id) else new_codes()
+            codes = [] if count_recovery_codes(session, login.person_id) else make_recovery_codes()
             if codes:
-                put_recovery_codes(session, login.person_id, code_hashes(codes))
+                put_recovery_codes(session, login.person_id, hash_recovery_codes(codes))
             delete_logins(session, login.person_id, but=login.id)
             log_account_event(session, login.name, login.name, "passkey", login.role, passkey=name)
         return Passkey(number, name, at, None), codes
@@ -234,7 +234,7 @@ class Passkeys:
             raise NotLoggedInError(LATE, hint="Try again.")
         with self._store.read() as session:
             row = find_passkey(session, str(credential.get("id")))
-            person = person_by_id(session, row.person_id) if row else None
+            person = find_person_by_id(session, row.person_id) if row else None
         if row is None or person is None:
             raise NotLoggedInError(REFUSED, hint=AGAIN)
 
@@ -244,7 +244,7 @@ class Passkeys:
             if found is None or found.person_id != row.person_id:
                 raise NotLoggedInError(REFUSED, hint=AGAIN)
             count = _verified_sign_count(found, credential, challenge, site)
-            use_passkey(session, found.id, count, text_of(self._clock()))
+            update_passkey_use(session, found.id, count, text_of(self._clock()))
 
         return self._logins.begin(
             row.person_id, person.password, browser, address, before, require, LoginMethod.PASSKEY
@@ -307,4 +307,4 @@ def _session_challenge_key(login: Login) -> str:
 
 
 def _browser_challenge_key(asker: str) -> str:
-    return f"browser {token_hash(asker)}"
+    return f"browser {hash_token(asker)}"

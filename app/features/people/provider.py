@@ -23,7 +23,7 @@ from joserfc import jwk, jwt
 from joserfc.errors import InvalidKeyIdError
 
 from app.errors import ConflictError, NotLoggedInError
-from app.features.people.sign_on_rules import SignOnRules, url_origin
+from app.features.people.sign_on_rules import SignOnRules, parse_origin
 
 log = structlog.get_logger("touchline.access")
 
@@ -76,7 +76,7 @@ class ProviderClient:
             ConflictError: It is none that the operator has named.
         """
         try:
-            if isinstance(address, str) and url_origin(address) in self._rules.hosts:
+            if isinstance(address, str) and parse_origin(address) in self._rules.hosts:
                 return address
         except ValueError:
             pass

@@ -71,12 +71,12 @@ def all_people(session: Session) -> Sequence[PersonRow]:
     return session.rows(PersonRow, statement)
 
 
-def person_by_name(session: Session, name: str) -> PersonModel | None:
+def find_person_by_name(session: Session, name: str) -> PersonModel | None:
     """The person of a name."""
     return session.row(PersonModel, _PEOPLE.where(PersonModel.name == name))
 
 
-def person_by_id(session: Session, person_id: int) -> PersonModel | None:
+def find_person_by_id(session: Session, person_id: int) -> PersonModel | None:
     """The person of an id."""
     return session.row(PersonModel, _PEOPLE.where(PersonModel.id == person_id))
 
@@ -140,7 +140,7 @@ def forget_links(session: Session, person_id: int | None) -> None:
     session.execute(delete(OneTimeLinkModel).where(whose))
 
 
-def people_with_links(session: Session, at: str) -> set[int]:
+def list_people_with_valid_links(session: Session, at: str) -> set[int]:
     """Ids of the people who have a link that is good at a time."""
     statement = select(OneTimeLinkModel.person_id).where(OneTimeLinkModel.expires > at)
     return {found for found in session.scalars(statement) if found is not None}
@@ -265,7 +265,7 @@ class DatasetRoleRow(NamedTuple):
     role: str
 
 
-def all_dataset_roles(session: Session) -> Sequence[DatasetRoleRow]:
+def list_dataset_roles(session: Session) -> Sequence[DatasetRoleRow]:
     """The roles that people have in single datasets, by name of the dataset."""
     statement = (
         select(
@@ -358,7 +358,7 @@ def delete_recovery_codes(session: Session, person_id: int) -> None:
     session.execute(delete(RecoveryCodeModel).where(RecoveryCodeModel.person_id == person_id))
 
 
-def use_step(session: Session, person_id: int, step: int) -> bool:
+def save_used_totp_step(session: Session, person_id: int, step: int) -> bool:
     """Note that the code of a step of time was used; whether it is later than every one before."""
     statement = (
         update(SecondFactorModel)
@@ -368,7 +368,7 @@ def use_step(session: Session, person_id: int, step: int) -> bool:
     return session.execute(statement.returning(SecondFactorModel.person_id)).first() is not None
 
 
-def use_recovery_code(session: Session, person_id: int, code_hash: str) -> bool:
+def delete_recovery_code(session: Session, person_id: int, code_hash: str) -> bool:
     """Take a recovery code; whether it was there."""
     statement = delete(RecoveryCodeModel).where(
         RecoveryCodeModel.person_id == person_id, RecoveryCodeModel.code_hash == code_hash
@@ -423,7 +423,7 @@ def _has_confirmed_factor(person_id: int | ColumnElement[int]) -> ColumnElement[
     )
 
 
-def people_with_second_factor(session: Session) -> set[int]:
+def list_people_with_second_factor(session: Session) -> set[int]:
     """Ids of the people who have one."""
     confirmed = SecondFactorModel.confirmed.is_(True)
     found = set(session.scalars(select(SecondFactorModel.person_id).where(confirmed)))

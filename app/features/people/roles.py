@@ -14,7 +14,6 @@ from app.features.people.visibility_queries import COPIES
 from app.features.people.visibility_queries import EVERYTHING as EVERYTHING
 from app.features.people.visibility_queries import READER as READER
 from app.features.people.visibility_queries import Visibility as Visibility
-from app.features.people.visibility_queries import reads_blind as reads_blind
 from app.json_text import quoted
 from app.soccer.actors import LOCAL_USER, person_of
 
@@ -199,7 +198,7 @@ _NAME = re.compile(r"[a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?")
 _TAKEN = frozenset({LOCAL_USER, "script", "everybody", "nobody"})
 
 
-def checked_name(text: str) -> str:
+def normalize_user_name(text: str) -> str:
     """The name of a person, as the log will remember them.
 
     Raises:

@@ -15,8 +15,13 @@ import segno
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.people.devices import make_totp, new_code, normalize_code, use_totp
-from app.features.people.links import is_password, token_hash
+from app.features.people.devices import (
+    make_recovery_code,
+    make_totp,
+    normalize_code,
+    verify_and_use_totp,
+)
+from app.features.people.links import hash_token, is_password
 from app.features.people.login_queries import delete_logins, delete_passkeys
 from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import (
@@ -24,10 +29,10 @@ from app.features.people.queries import (
     count_recovery_codes,
     delete_recovery_codes,
     delete_second_factor,
+    find_person_by_id,
     find_second_factor,
     has_second_factor,
     is_second_factor_required,
-    person_by_id,
     put_second_factor,
     set_second_factor_required,
 )
@@ -123,18 +128,18 @@ class SecondFactors:
             NotFoundError: Nothing was begun.
             InputError: That is not the code of this moment.
         """
-        codes = new_codes()
+        codes = make_recovery_codes()
         with self._store.write() as session:
             found = find_second_factor(session, login.person_id)
             if found is None or found.confirmed:
                 raise NotFoundError("there is no second factor to confirm")
-            if not use_totp(session, self._store, login.person_id, code, self._clock()):
+            if not verify_and_use_totp(session, self._store, login.person_id, code, self._clock()):
                 raise InputError(
                     "this code is wrong or has expired",
                     hint="Check the clock of the device, and type the current code.",
                     pointer="/code",
                 )
-            confirm_second_factor(session, login.person_id, code_hashes(codes))
+            confirm_second_factor(session, login.person_id, hash_recovery_codes(codes))
             delete_logins(session, login.person_id, but=login.id)
             log_account_event(session, login.name, login.name, "second factor", login.role)
         return codes
@@ -161,7 +166,7 @@ class SecondFactors:
         """
         require_no_token(actor)
         with self._store.write() as session:
-            person = person_by_id(session, person_id)
+            person = find_person_by_id(session, person_id)
             if person is None:
                 raise NotFoundError.person(person_id)
             if person.name == actor:
@@ -192,14 +197,14 @@ class SecondFactors:
                 log_account_event(session, actor, "everybody", f"second factor {word}", "")
 
 
-def new_codes() -> list[str]:
+def make_recovery_codes() -> list[str]:
     """Recovery codes for somebody who has none."""
-    return [new_code() for _ in range(CODES)]
+    return [make_recovery_code() for _ in range(CODES)]
 
 
-def code_hashes(codes: list[str]) -> list[str]:
+def hash_recovery_codes(codes: list[str]) -> list[str]:
     """What is kept of recovery codes."""
-    return [token_hash(normalize_code(one)) for one in codes]
+    return [hash_token(normalize_code(one)) for one in codes]
 
 
 def end_factor(session: Session, login: Login) -> None:
@@ -232,6 +237,6 @@ def require_password(store: Store, login: Login, password: str | None, at: datet
             pointer="/password",
         )
     with store.read() as session:
-        person = person_by_id(session, login.person_id)
+        person = find_person_by_id(session, login.person_id)
     if person is None or not is_password(password, person.password):
         raise InputError("the password is wrong", pointer="/password")

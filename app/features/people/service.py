@@ -17,20 +17,20 @@ from app.features.people.login_queries import (
     count_access_tokens,
     delete_access_tokens,
     delete_logins,
-    people_with_identity,
+    read_identity_labels,
 )
 from app.features.people.logins import read_roles
 from app.features.people.queries import (
-    all_dataset_roles,
     all_people,
     count_people,
     count_people_who_can_log_in,
+    find_person_by_id,
+    find_person_by_name,
     forget_links,
     insert_person,
-    people_with_links,
-    people_with_second_factor,
-    person_by_id,
-    person_by_name,
+    list_dataset_roles,
+    list_people_with_second_factor,
+    list_people_with_valid_links,
     read_members,
     set_dataset_role,
     update_person,
@@ -38,8 +38,8 @@ from app.features.people.queries import (
 from app.features.people.roles import (
     DatasetRoles,
     Role,
-    checked_name,
     log_account_event,
+    normalize_user_name,
     require_no_token,
 )
 from app.features.people.visibility_queries import COPIES
@@ -90,9 +90,12 @@ class Person:
 def list_people(store: Store) -> list[Person]:
     """Everybody, by name."""
     with store.read() as session:
-        waiting, single = people_with_links(session, now()), single_roles(session)
-        tokens, factors = count_access_tokens(session), people_with_second_factor(session)
-        ways = people_with_identity(session)
+        waiting, single = (
+            list_people_with_valid_links(session, now()),
+            read_roles_in_single_datasets(session),
+        )
+        tokens, factors = count_access_tokens(session), list_people_with_second_factor(session)
+        ways = read_identity_labels(session)
         people = [
             _person_from_row(row, waiting, tokens, factors, ways) for row in all_people(session)
         ]
@@ -127,9 +130,9 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
         ConflictError: It is taken.
     """
     require_no_token(actor)
-    name = checked_name(name)
+    name = normalize_user_name(name)
     with store.write() as session:
-        if person_by_name(session, name) is not None:
+        if find_person_by_name(session, name) is not None:
             raise ConflictError(
                 f"there is already a user {name}",
                 hint="To make a new link for this user, reset their password.",
@@ -231,11 +234,11 @@ def find_person(store: Store, name: str) -> Person:
 
 
 def _read_person(session: Session, person_id: int) -> Person:
-    row = person_by_id(session, person_id)
+    row = find_person_by_id(session, person_id)
     if row is None:
         raise NotFoundError.person(person_id)
-    waiting, tokens = people_with_links(session, now()), count_access_tokens(session)
-    factors, ways = people_with_second_factor(session), people_with_identity(session)
+    waiting, tokens = list_people_with_valid_links(session, now()), count_access_tokens(session)
+    factors, ways = list_people_with_second_factor(session), read_identity_labels(session)
     return _person_from_row(row, waiting, tokens, factors, ways)
 
 
@@ -309,10 +312,10 @@ def list_members(store: Store, dataset: str | int) -> list[Member]:
         return _read_members(session, _require_dataset(session, dataset))
 
 
-def single_roles(session: Session) -> dict[int, list[SingleRole]]:
+def read_roles_in_single_datasets(session: Session) -> dict[int, list[SingleRole]]:
     """The roles in single datasets of everybody, by the id of the person; none of their practice."""
     found: dict[int, list[SingleRole]] = {}
-    for row in all_dataset_roles(session):
+    for row in list_dataset_roles(session):
         if row.dataset_id > COPIES:
             continue
         one = SingleRole(row.dataset_id, row.dataset, Role(row.role))
@@ -352,7 +355,7 @@ def give_role(
         )
     with store.write() as session:
         dataset_id = _require_dataset(session, dataset)
-        person = person_by_id(session, person_id)
+        person = find_person_by_id(session, person_id)
         if person is None:
             raise NotFoundError.person(person_id)
         if person.name == person_of(actor):

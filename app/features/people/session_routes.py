@@ -70,7 +70,7 @@ async def get_login(request: Request) -> Login:
 Me = Annotated[Login, Depends(get_login)]
 
 
-def session_document(login: Login | None, store: Store) -> SessionDocument:
+def make_session_document(login: Login | None, store: Store) -> SessionDocument:
     """What a server of a team says of who asks."""
     if login is None:
         return SessionDocument(team=True, name=None, role=None, may=[])
@@ -108,7 +108,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
         )
     bearer = bearer_token(request.scope)
     login = team.login(request) if bearer is None else team.login_with(bearer, request)
-    found = session_document(login, services.store)
+    found = make_session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
@@ -162,7 +162,7 @@ def _begin_session(
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
     response.set_cookie(**team.device_values(login.name))
-    return session_document(login, store)
+    return make_session_document(login, store)
 
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
@@ -176,7 +176,7 @@ def log_out(
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookie_values(None))
-    return session_document(None, store)
+    return make_session_document(None, store)
 
 
 @router.put(
@@ -199,7 +199,7 @@ def change_password(
     team.count_try(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
     response.set_cookie(**team.cookie_values(token))
-    return session_document(me, store)
+    return make_session_document(me, store)
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
@@ -258,7 +258,7 @@ def use_link(
     """
     team.require_passwords()
     team.count_try(request)
-    name = links.use_link(store, chosen.token, chosen.password, chosen.name)
+    name = links.set_password_by_link(store, chosen.token, chosen.password, chosen.name)
     return _begin_session(team, store, request, response, name, chosen.password)
 
 
@@ -316,10 +316,10 @@ def finish(
         raise
     response.set_cookie(**team.sign_on_cookie_values(None))
     if entered.token is None:
-        return SignOnEnd(session=session_document(team.login(request), store), to=entered.to)
+        return SignOnEnd(session=make_session_document(team.login(request), store), to=entered.to)
     response.set_cookie(**team.cookie_values(entered.token))
     return SignOnEnd(
-        session=session_document(team.logins.find(entered.token), store), to=entered.to
+        session=make_session_document(team.logins.find(entered.token), store), to=entered.to
     )
 
 

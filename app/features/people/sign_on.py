@@ -18,25 +18,25 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
-from app.features.people.devices import make_pending_actions, use_code
-from app.features.people.links import consume_link, find_link_holder, new_token, token_hash
+from app.features.people.devices import make_pending_actions, verify_and_use_code
+from app.features.people.links import consume_link, find_link_holder, hash_token, make_random_token
 from app.features.people.login_queries import (
     delete_logins,
     find_identity,
     put_identity,
-    use_identity,
+    update_identity_use,
 )
 from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, LoginMethod, Logins
 from app.features.people.provider import LoginRequest, Provider
 from app.features.people.queries import (
+    find_person_by_id,
+    find_person_by_name,
     has_second_factor,
     insert_person,
-    person_by_id,
-    person_by_name,
 )
-from app.features.people.roles import checked_name, log_account_event
+from app.features.people.roles import log_account_event, normalize_user_name
 from app.features.people.second_factor import require_password
-from app.features.people.sign_on_rules import SignOnRules, identity_label, require_no_identity
+from app.features.people.sign_on_rules import SignOnRules, make_identity_label, require_no_identity
 from app.json_text import json_text
 
 LASTS = timedelta(minutes=10)
@@ -136,7 +136,7 @@ class SignOn:
         if not _OWN.fullmatch(to) or len(to) > _LONGEST:
             raise InputError("this is not a page of this server", pointer="/to")
         if link is not None and find_link_holder(self._store, link).name is None:
-            name = checked_name(name or "")
+            name = normalize_user_name(name or "")
         return self._begin_login(asker, redirect, to, link=link, name=name)
 
     def begin_link(self, asker: str, login: Login, password: str | None, *, redirect: str) -> str:
@@ -187,9 +187,9 @@ class SignOn:
             NotFoundError: The link is no longer valid.
             ConflictError: The account is another person's, a name is taken, or the provider does not answer.
         """
-        found = self._begun.take(token_hash(state))
+        found = self._begun.take(hash_token(state))
         begun = None if found is None else _PendingLogin.read(found)
-        if begun is None or not compare_digest(begun.browser, token_hash(asker)):
+        if begun is None or not compare_digest(begun.browser, hash_token(asker)):
             raise NotLoggedInError(LATE, hint="Begin again.")
         if issuer is not None and issuer != self.rules.issuer:
             raise NotLoggedInError("the response comes from another provider", hint="Begin again.")
@@ -210,7 +210,9 @@ class SignOn:
                 )
             if not vouched and has_second_factor(session, person_id):
                 self._require_second_factor(session, person_id, factor)
-            use_identity(session, person_id, identity_label(claims), text_of(self._clock()))
+            update_identity_use(
+                session, person_id, make_identity_label(claims), text_of(self._clock())
+            )
 
         try:
             token = self._logins.begin(
@@ -227,15 +229,17 @@ class SignOn:
             if error.pointer == FACTOR:
                 # Whoever followed a link has come by it; what is missing is asked for again.
                 waits = replace(begun, claims=claims, link=None)
-                self._begun.put(token_hash(state), waits.text())
+                self._begun.put(hash_token(state), waits.text())
             raise
         return SignOnResult(token, begun.to)
 
     def _begin_login(self, asker: str, redirect: str, to: str, **more: Any) -> str:
-        request = LoginRequest(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
+        request = LoginRequest(
+            redirect, make_random_token(), make_random_token(), secrets.token_urlsafe(48)
+        )
         address = self._provider.address(request)
         self._begun.put(
-            token_hash(request.state), _PendingLogin(token_hash(asker), request, to, **more).text()
+            hash_token(request.state), _PendingLogin(hash_token(asker), request, to, **more).text()
         )
         return address
 
@@ -262,7 +266,7 @@ class SignOn:
                 person_id = found.person_id
             else:
                 person_id = self._make_person(session, claims)
-            person = person_by_id(session, person_id)
+            person = find_person_by_id(session, person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError(
                     "your account on this server is disabled", hint="Ask an admin of this server."
@@ -291,13 +295,13 @@ class SignOn:
                 self._unknown_account_sentence(), hint=self._unknown_account_hint()
             )
         try:
-            name = checked_name(self.rules.name_for(claims))
+            name = normalize_user_name(self.rules.name_for(claims))
         except InputError:
             raise NotLoggedInError(
                 f"{self.rules.label} sent a user name for you that Touchline does not allow",
                 hint=self._unknown_account_hint(),
             ) from None
-        if person_by_name(session, name) is not None:
+        if find_person_by_name(session, name) is not None:
             # It may be the same person, and it may not: a name shows nothing.
             raise NotLoggedInError(
                 f"there is already a user {name} who is not linked with this account",
@@ -329,7 +333,7 @@ class SignOn:
         return SignOnResult(None, begun.to)
 
     def _save_identity(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
-        shown, person = identity_label(claims), person_by_id(session, person_id)
+        shown, person = make_identity_label(claims), find_person_by_id(session, person_id)
         assert person is not None
         values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
         put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
@@ -339,14 +343,14 @@ class SignOn:
 
     def _person_name(self, person_id: int) -> str:
         with self._store.read() as session:
-            person = person_by_id(session, person_id)
+            person = find_person_by_id(session, person_id)
         assert person is not None
         return str(person.name)
 
     def _require_second_factor(self, session: Session, person_id: int, factor: str | None) -> None:
         if factor is None:
             raise NotLoggedInError(ASK_CODE, hint=LOST, pointer=FACTOR)
-        if not use_code(session, self._store, person_id, factor, self._clock()):
+        if not verify_and_use_code(session, self._store, person_id, factor, self._clock()):
             raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
 
     def _unknown_account_sentence(self) -> str:

@@ -21,7 +21,7 @@ from app.features.people.login_queries import (
     find_person_identity,
 )
 from app.features.people.logins import Login, LoginMethod
-from app.features.people.queries import all_people, count_people_who_can_log_in, person_by_id
+from app.features.people.queries import all_people, count_people_who_can_log_in, find_person_by_id
 from app.features.people.roles import Role, log_account_event, require_no_token
 from app.features.people.second_factor import require_password
 from app.json_text import Moment
@@ -92,13 +92,13 @@ class SignOnRules:
         return not self.trusted.isdisjoint(methods)
 
 
-def identity_label(claims: Mapping[str, Any]) -> str:
+def make_identity_label(claims: Mapping[str, Any]) -> str:
     """By what people know an account of the provider."""
     names = (claims.get(name) for name in ("email", "preferred_username", "name", "sub"))
     return next(str(one) for one in names if one)[:100]
 
 
-def url_origin(address: str) -> str:
+def parse_origin(address: str) -> str:
     """Scheme, host and port of an address.
 
     Raises:
@@ -188,7 +188,7 @@ def _role_of_new_people(settings: Settings) -> Role | None:
 
 def _allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
     try:
-        found = [(urlsplit(one), url_origin(one)) for one in addresses]
+        found = [(urlsplit(one), parse_origin(one)) for one in addresses]
     except ValueError as error:
         raise _incomplete_error(
             f"{error}, which TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS require"
@@ -257,7 +257,10 @@ class OwnWays:
 def read_login_ways(store: Store, person_id: int) -> OwnWays:
     """How a person can come in."""
     with store.read() as session:
-        person, row = person_by_id(session, person_id), find_person_identity(session, person_id)
+        person, row = (
+            find_person_by_id(session, person_id),
+            find_person_identity(session, person_id),
+        )
     found = None if row is None else Identity(row.issuer, row.shown, row.created, row.used)
     return OwnWays(person is not None and person.password is not None, found)
 
@@ -282,7 +285,7 @@ def unlink_identity(store: Store, login: Login, password: str | None, at: dateti
     """
     require_password(store, login, password, at)
     with store.write() as session:
-        person = person_by_id(session, login.person_id)
+        person = find_person_by_id(session, login.person_id)
         if person is not None and person.password is None:
             raise ConflictError(
                 "you have no password: you could not log in any more",
@@ -304,7 +307,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
     """
     require_no_token(actor)
     with store.write() as session:
-        person = person_by_id(session, person_id)
+        person = find_person_by_id(session, person_id)
         if person is not None and person.name == actor:
             raise ForbiddenError(
                 "you cannot unlink your own account here", hint="Do it under Account."
@@ -320,7 +323,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
         log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)
 
 
-def linked_admins(store: Store, rules: SignOnRules) -> int:
+def count_linked_admins(store: Store, rules: SignOnRules) -> int:
     """How many admins can come by the provider."""
     with store.read() as session:
         admins = [

@@ -71,7 +71,7 @@ def is_blind(dataset_id: int) -> bool:
     return reader is not None and dataset_id in reader.batches
 
 
-def reads_blind() -> bool:
+def hides_groups_from_reader() -> bool:
     """Whether groups of any dataset are hidden from whoever asks.
 
     How much is written to the log between two of their steps tells them of what a submission leads
@@ -95,7 +95,7 @@ def visible_groups_condition(dataset_id: int, group: Any) -> list[ColumnElement[
     return [not_(reader.hides(dataset_id, group))]
 
 
-def seen_anywhere(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
+def visible_in_all_datasets_condition(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
     """The same of groups of several datasets, by the columns of both ids; also where there is no group."""
     reader = READER.get()
     if reader is None:
@@ -181,7 +181,7 @@ EVERYTHING = Visibility()
 """Of an admin, and of whoever runs a server alone."""
 
 
-def shown_actor(actor: Any, at: Any) -> ColumnElement[str]:
+def shown_actor_column(actor: Any, at: Any) -> ColumnElement[str]:
     """Under which name it is shown what an actor did at a time; both are columns."""
     alias = (
         select(PersonModel.name)
@@ -192,14 +192,14 @@ def shown_actor(actor: Any, at: Any) -> ColumnElement[str]:
     return func.coalesce(alias, actor)
 
 
-def columns_shown(model: Any) -> list[ColumnElement[Any]]:
+def list_columns_with_shown_actor(model: Any) -> list[ColumnElement[Any]]:
     """The columns of a table with ``actor`` and ``created``, the actor under the name that is shown."""
     table = model.__table__
     rest = [column for column in table.columns if column.name != "actor"]
-    return [*rest, shown_actor(table.c.actor, table.c.created).label("actor")]
+    return [*rest, shown_actor_column(table.c.actor, table.c.created).label("actor")]
 
 
-def shown_entries(session: Session, entries: Iterable[LogEntry]) -> list[LogEntry]:
+def show_entries_under_aliases(session: Session, entries: Iterable[LogEntry]) -> list[LogEntry]:
     """Entries of the log under the names that are shown."""
     aliases = {row.actor: row for row in session.execute(_ALIASES)}
     shown = []
@@ -211,14 +211,14 @@ def shown_entries(session: Session, entries: Iterable[LogEntry]) -> list[LogEntr
     return shown
 
 
-def given_aliases(session: Session) -> dict[str, str]:
+def read_aliases(session: Session) -> dict[str, str]:
     """As whose the work of each actor is shown that was given to somebody."""
     return {row.actor: row.shown for row in session.execute(_ALIASES)}
 
 
 def find_alias(session: Session, actor: str) -> str | None:
     """As whose the work of an actor is shown; None where it was given to nobody."""
-    return given_aliases(session).get(actor)
+    return read_aliases(session).get(actor)
 
 
 def insert_alias(session: Session, actor: str, person_id: int, name: str, at: str, by: str) -> None:

@@ -86,14 +86,14 @@ def match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
     ]
 
 
-def groups_of_match(session: Session, dataset_id: int, match: str) -> list[int]:
+def list_groups_of_match(session: Session, dataset_id: int, match: str) -> list[int]:
     """Ids of the groups of a match."""
     model = GroupModel
     where = (model.dataset_id == dataset_id, model.match == match)
     return list(session.scalars(select(model.id).where(*where).order_by(model.id)))
 
 
-def lines_digests(session: Session, dataset_id: int) -> dict[str, str]:
+def digest_lines_of_matches(session: Session, dataset_id: int) -> dict[str, str]:
     """Digest of the lines of each match's cameras."""
     rows = session.execute(_cameras_statement(StationModel.digest, dataset_id=dataset_id))
     digests: dict[str, list[str]] = {}
@@ -102,7 +102,9 @@ def lines_digests(session: Session, dataset_id: int) -> dict[str, str]:
     return {match: digest(sorted(values)) for match, values in digests.items()}
 
 
-def lines_of_match(session: Session, dataset_id: int, match: str) -> list[tuple[Lines, ImageSize]]:
+def read_lines_of_match(
+    session: Session, dataset_id: int, match: str
+) -> list[tuple[Lines, ImageSize]]:
     """Lines and size of every camera that shows the pitch of a match, as its picture was taken."""
     columns = (
         StationModel.id,
@@ -150,7 +152,9 @@ def save_estimate(session: Session, dataset_id: int, match: str, **values: Any) 
     session.execute(statement, [{"dataset_id": dataset_id, "match": match, **values}])
 
 
-def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) -> dict[str, Pitch]:
+def read_edited_pitches(
+    session: Session, dataset_id: int, matches: Iterable[str]
+) -> dict[str, Pitch]:
     """The size that a person gave to matches last, where one did.
 
     Groups without a match have none in common: nobody knows whether others come from that pitch.
@@ -170,7 +174,7 @@ def is_pitch_edited(session: Session, group_id: int) -> bool:
     return session.scalar(statement.limit(1)) is not None
 
 
-def last_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
+def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
     """The newest log entry that said how large the pitch of each match is, where one did.
 
     Of groups without a match only where it was said of all that there are, and all had one size.
@@ -189,7 +193,7 @@ def last_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
 
 def _concerns_all_without_match(session: Session, dataset_id: int, newest: LogEntry) -> bool:
     """Whether all groups without a match were given another size with an entry, and had one."""
-    groups = set(groups_of_match(session, dataset_id, ""))
+    groups = set(list_groups_of_match(session, dataset_id, ""))
     nameless = select(GroupModel.id).where(
         GroupModel.dataset_id == dataset_id, GroupModel.match == ""
     )

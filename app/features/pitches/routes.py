@@ -10,7 +10,12 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from app.features.datasets.service import get_dataset_head
 from app.features.groups.schemas import PitchSize
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import JobDocument, by_job, job_address, job_answer
+from app.features.jobs.schemas import (
+    JobDocument,
+    make_job_response,
+    make_location_header,
+    openapi_of_job_response,
+)
 from app.features.pitches.service import DatasetPitches, read_pitches
 from app.features.solve.jobs import PitchJob, request_pitches, request_solve
 from app.http.cursor import paged
@@ -144,9 +149,9 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     return PitchesDocument.model_validate(state)
 
 
-@pitches_router.post("", operation_id="estimatePitches", **by_job(404))
+@pitches_router.post("", operation_id="estimatePitches", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
 
@@ -161,7 +166,7 @@ def _sized_response(sized: PitchJob) -> Response:
     pitches = PitchesDocument.model_validate(sized.state)
     job = JobDocument.model_validate(sized.job)
     job.result = {"pitches": pitches.model_dump(mode="json")}
-    return document(job, 202, {**_etag_headers(sized.state), **job_address(sized.job)})
+    return document(job, 202, {**_etag_headers(sized.state), **make_location_header(sized.job)})
 
 
 @pitches_router.patch(

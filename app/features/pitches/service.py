@@ -24,12 +24,12 @@ from app.features.groups.state import require_etag
 from app.features.pitches.queries import (
     PITCH,
     MatchPitch,
-    groups_of_match,
-    last_changes,
-    lines_digests,
-    lines_of_match,
+    digest_lines_of_matches,
+    find_last_pitch_changes,
+    list_groups_of_match,
     match_pitches,
     read_estimates,
+    read_lines_of_match,
     replace_pitch_findings,
     save_estimate,
 )
@@ -152,11 +152,11 @@ def estimate_pitches(
         if progress is not None:
             progress(done, len(stale))
     with store.write() as session:
-        note_proposals(session, found.id)
+        update_pitch_findings(session, found.id)
     return read_pitches(store, found.id)
 
 
-def stale_matches(store: Store, dataset: str | int) -> list[str]:
+def list_matches_to_estimate(store: Store, dataset: str | int) -> list[str]:
     """The matches that ``estimate_pitches`` would estimate."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
@@ -194,8 +194,8 @@ def change_pitches(
         require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')
     for match, pitch in wanted.items():
         need_match(state.items, match, state.dataset)
-        ids = groups_of_match(session, state.dataset_id, match)
-        give_pitch(session, state.dataset_id, ids, pitch, actor)
+        ids = list_groups_of_match(session, state.dataset_id, match)
+        set_pitch_of_groups(session, state.dataset_id, ids, pitch, actor)
     # What the lines show is not asked again: it does not depend on the size in use.
     shown = {item.match: (item.estimate, item.problem) for item in state.items}
     changed = _read_pitches(session, state.dataset_id, shown)
@@ -203,7 +203,7 @@ def change_pitches(
     return changed
 
 
-def requested_sizes(
+def choose_requested_sizes(
     found: DatasetPitches, match: str | None, *, accept: bool = False, size: str | None = None
 ) -> dict[str, Pitch]:
     """What somebody wants the pitches of matches to be, by match.
@@ -249,7 +249,7 @@ def parse_pitch(text: str) -> Pitch:
     return Pitch(length, width)
 
 
-def note_proposals(session: Session, dataset_id: int) -> None:
+def update_pitch_findings(session: Session, dataset_id: int) -> None:
     """Bring the findings of a dataset's matches in step with what is proposed now."""
     _save_proposal_findings(session, _read_pitches(session, dataset_id))
 
@@ -259,7 +259,7 @@ def _save_proposal_findings(session: Session, state: DatasetPitches) -> None:
     refresh_queue(session, replace_pitch_findings(session, state.dataset_id, found))
 
 
-def give_pitch(
+def set_pitch_of_groups(
     session: Session, dataset_id: int, ids: Sequence[int], pitch: Pitch, actor: str
 ) -> None:
     """Give groups another pitch, each with an entry of the log; one that has it stays as it is."""
@@ -279,7 +279,7 @@ def _read_pitches(
     found = read_dataset_head(session, dataset)
     if shown is None:
         shown = _current_estimates(session, found.id, found.policy.calibration)
-    changes = last_changes(session, found.id)
+    changes = find_last_pitch_changes(session, found.id)
     items = tuple(
         _pitch_state(item, shown.get(item.match, (None, None)), changes.get(item.match))
         for item in match_pitches(session, found.id)
@@ -310,7 +310,7 @@ def _stale_matches_with_inputs(
     present = read_estimates(session, dataset_id)
     return [
         (match, inputs)
-        for match, value in lines_digests(session, dataset_id).items()
+        for match, value in digest_lines_of_matches(session, dataset_id).items()
         if (inputs := _inputs_digest(value, policy))
         != (present[match].inputs if match in present else "")
     ]
@@ -356,7 +356,7 @@ def _make_task(
     store: Store, dataset_id: int, match: str, inputs: str, policy: CalibrationPolicy
 ) -> _PitchTask:
     with store.read() as session:
-        lines = lines_of_match(session, dataset_id, match)
+        lines = read_lines_of_match(session, dataset_id, match)
     return _PitchTask(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
 
 

@@ -55,7 +55,7 @@ def set_(
     A server computes it by itself.
     """
     from app.features.policies.service import change_policy
-    from app.features.solutions.service import stale_groups
+    from app.features.solutions.service import list_stale_groups
 
     chosen = read_policy_option(policy)
     server = current_server()
@@ -68,7 +68,7 @@ def set_(
         return
     with opened_store() as store:
         state = change_policy(store, dataset, chosen, if_match=None, actor=current_actor())
-        stale = len(stale_groups(store, state.dataset_id))
+        stale = len(list_stale_groups(store, state.dataset_id))
     values = {
         **_policy_header(state.dataset, state.policy),
         "version": state.version,
@@ -79,7 +79,7 @@ def set_(
 
 def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset in a home, as YAML and as values."""
-    from app.features.policies.service import policy_to_yaml, policy_values, read_policy
+    from app.features.policies.service import policy_to_values, policy_to_yaml, read_policy
 
     with opened_store() as store:
         state = read_policy(store, dataset)
@@ -88,7 +88,7 @@ def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
         | {"at": item.at, "actor": item.actor}
         for item in state.history
     ]
-    values = {"values": policy_values(state.policy), "history": history}
+    values = {"values": policy_to_values(state.policy), "history": history}
     head = {**_policy_header(state.dataset, state.policy), "version": state.version}
     return policy_to_yaml(state.policy), {**head, **values}
 
@@ -101,14 +101,14 @@ def read_policy_option(text: str) -> Policy:
         InputError: The file holds no policy.
     """
     from app.errors import InputError
-    from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml, unknown_policy
+    from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml, unknown_policy_error
     from app.soccer.policy import POLICIES
 
     if text in POLICIES:
         return POLICIES[text]
     path = Path(text)
     if not path.is_file():
-        raise typer.BadParameter(unknown_policy(text, "it is no YAML file").message)
+        raise typer.BadParameter(unknown_policy_error(text, "it is no YAML file").message)
     yaml = read_text(path, MAX_CHARACTERS)
     try:
         return policy_from_yaml(yaml)

@@ -20,7 +20,7 @@ from app.features.datasets.service import need_dataset, read_dataset_head, save_
 from app.features.groups.group_edits import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy_dataset
-from app.features.match_estimates.queries import Factor, Factors, noise_factor, read_factors
+from app.features.match_estimates.queries import Factor, Factors, find_noise_factor, read_factors
 from app.features.policies.service import (
     CUSTOM,
     PolicyState,
@@ -28,7 +28,7 @@ from app.features.policies.service import (
     policy_with,
     read_policy,
 )
-from app.features.solutions.queries import list_solved_groups, newest_solution
+from app.features.solutions.queries import find_newest_solution_id, list_solved_groups
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, RayResidual, Sigma
 from app.solving.dataset_noise import (
@@ -166,7 +166,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     )
 
 
-def noise_sample(ids: Sequence[int]) -> Sequence[int]:
+def choose_noise_sample(ids: Sequence[int]) -> Sequence[int]:
     """The groups of a dataset that its noise is estimated from, in its order."""
     return ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
 
@@ -300,7 +300,7 @@ def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
 def _differ_noticeably(wanted: Factors, used: Factors) -> bool:
     """Whether factors differ by more than their estimate wanders with every new ball."""
     places = {item[:2] for item in (*wanted, *used)}
-    ratios = [(noise_factor(wanted, *at), noise_factor(used, *at)) for at in places]
+    ratios = [(find_noise_factor(wanted, *at), find_noise_factor(used, *at)) for at in places]
     return any(abs(new / old - 1) > WANDER for new, old in ratios)
 
 
@@ -310,7 +310,7 @@ def _estimate_noise(
     """How many groups were asked, the sources of the balls of each, and what all of them say."""
     seen: list[NoiseGroup] = []
     sources: list[Mapping[str, Sequence[BallSource]]] = []
-    for state, placed in _groups_with_ball_actors(store, noise_sample(ids)):
+    for state, placed in _groups_with_ball_actors(store, choose_noise_sample(ids)):
         if state.solution is not None:
             seen.append(NoiseGroup.of(state.group, state.solution, state.policy))
             sources.append(_noise_sources(state, placed))
@@ -401,7 +401,7 @@ class NoiseStore:
         """
         # The mark is older than what is read: at worst a new answer is computed once too often.
         with self._store.read() as session:
-            entry, solution = newest_entry(session), newest_solution(session)
+            entry, solution = newest_entry(session), find_newest_solution_id(session)
         state = read_policy(self._store, dataset)
         mark = entry, solution, state.policy.hash, state.dataset
         with self._lock:

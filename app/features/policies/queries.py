@@ -9,7 +9,7 @@ from sqlalchemy import select, text
 from app.db.json_columns import unpack
 from app.db.log import LogModel
 from app.db.session import Session
-from app.features.people.visibility_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor_column
 from app.soccer.codec import policy_from_json
 from app.soccer.policy import Policy
 
@@ -28,10 +28,14 @@ class PolicyVersion:
 _JUDGED = text("kind IN ('dataset', 'policy')")
 
 
-def policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
+def read_policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
     """The policies of a dataset, oldest first."""
     statement = (
-        select(LogModel.at, shown_actor(LogModel.actor, LogModel.at).label("actor"), LogModel.body)
+        select(
+            LogModel.at,
+            shown_actor_column(LogModel.actor, LogModel.at).label("actor"),
+            LogModel.body,
+        )
         .where(LogModel.dataset_id == dataset_id, _JUDGED)
         .order_by(LogModel.id)
     )
@@ -41,7 +45,7 @@ def policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ..
     )
 
 
-def judged_since(session: Session, dataset_id: int) -> str | None:
+def find_policy_change_time(session: Session, dataset_id: int) -> str | None:
     """When the policy of a dataset became what it is; None where the log does not say."""
     statement = (
         select(LogModel.at)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.errors import InputError
-from app.features.jobs.schemas import JobDocument, job_address
+from app.features.jobs.schemas import JobDocument, make_location_header
 from app.features.policies.schemas import (
     PolicyCatalogue,
     PolicyChange,
@@ -17,7 +17,7 @@ from app.features.policies.service import (
     policy_from_yaml,
     policy_with,
     read_policy,
-    unknown_policy,
+    unknown_policy_error,
 )
 from app.features.solve.jobs import PolicyJob, request_policy
 from app.http.cursor import paged
@@ -68,7 +68,7 @@ def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> Pol
 def _judged_response(judged: PolicyJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
-    return document(job, 202, {**_tagged_response(policy), **job_address(judged.job)})
+    return document(job, 202, {**_tagged_response(policy), **make_location_header(judged.job)})
 
 
 @router.put(
@@ -94,14 +94,14 @@ def put_policy(
     """
     store = services.store
     present = read_policy(store, dataset)
-    policy = wanted(change, present.policy)
+    policy = policy_of_request(change, present.policy)
     with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
         return request_policy(
             services.jobs, store, present.dataset_id, policy, if_match=if_match, actor=actor
         )
 
 
-def wanted(change: PolicyChange, present: Policy) -> Policy:
+def policy_of_request(change: PolicyChange, present: Policy) -> Policy:
     """The policy that a request asks for.
 
     Raises:
@@ -121,7 +121,7 @@ def wanted(change: PolicyChange, present: Policy) -> Policy:
     if not change.values and change.name in POLICIES:
         return POLICIES[change.name]
     if not change.values and change.name != present.name:
-        raise unknown_policy(change.name or "", "it brings no values", pointer="/name")
+        raise unknown_policy_error(change.name or "", "it brings no values", pointer="/name")
     # A shipped policy with another threshold is no longer the one of that name.
     name = change.name or (CUSTOM if present.name in POLICIES else present.name)
     return policy_with(present, change.values or {}, name=name, pointer="/values")

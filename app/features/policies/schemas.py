@@ -7,7 +7,12 @@ from typing import Any
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
 
-from app.features.policies.service import MAX_CHARACTERS, PolicyState, policy_to_yaml, policy_values
+from app.features.policies.service import (
+    MAX_CHARACTERS,
+    PolicyState,
+    policy_to_values,
+    policy_to_yaml,
+)
 from app.http.documents import Document, ListDocument
 from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
 
@@ -147,6 +152,6 @@ def _policy_fields(policy: Policy) -> dict[str, Any]:
     return {
         "name": policy.name,
         "hash": policy.hash,
-        "values": policy_values(policy),
+        "values": policy_to_values(policy),
         "yaml": policy_to_yaml(policy),
     }

@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import read_dataset_head, save_policy
 from app.features.groups.state import require_etag
-from app.features.policies.queries import PolicyVersion, policy_history
+from app.features.policies.queries import PolicyVersion, read_policy_history
 from app.soccer.codec import digest
 from app.soccer.group import Group
 from app.soccer.policy import (
@@ -117,10 +117,10 @@ def apply_policy(
 
 def _read_policy_state(session: Session, dataset: str | int) -> PolicyState:
     found = read_dataset_head(session, dataset)
-    return PolicyState(found.id, found.name, found.policy, policy_history(session, found.id))
+    return PolicyState(found.id, found.name, found.policy, read_policy_history(session, found.id))
 
 
-def first_policy(groups: Iterable[Group]) -> Policy:
+def choose_first_policy(groups: Iterable[Group]) -> Policy:
     """``touchline`` where most cameras can be drawn onto the paint of their pictures, else ``paper``.
 
     Args:
@@ -154,7 +154,7 @@ def policy_from_yaml(text: str) -> Policy:
     return policy_with(POLICIES.get(str(name), PAPER), value, name=name)
 
 
-def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
+def unknown_policy_error(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
     """What to say of a name that no shipped policy has; ``otherwise``: what else it is not."""
     nearest = get_close_matches(name.lower(), POLICIES, n=1)
     meant = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(POLICIES)}"
@@ -179,7 +179,7 @@ def policy_to_yaml(policy: Policy) -> str:
     return "\n".join([*lines, "", f"{CALIBRATION}:", *inner[1:], ""])
 
 
-def policy_values(policy: Policy) -> dict[str, Json]:
+def policy_to_values(policy: Policy) -> dict[str, Json]:
     """Every threshold by name; those of the calibration's part in a mapping of their own."""
     values: dict[str, Json] = {CALIBRATION: {}}
     for threshold in THRESHOLDS:

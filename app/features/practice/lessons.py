@@ -73,11 +73,11 @@ LESSONS = (
 
 def make_practice() -> list[Scene]:
     """The scenes of all lessons, in their order."""
-    stage = practice_stage()
+    stage = make_practice_stage()
     return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
 
 
-def practice_stage() -> MatchStage:
+def make_practice_stage() -> MatchStage:
     """The match that all lessons are from."""
     return make_stage(0, MATCH_GROUPS, SEED)
 
@@ -238,7 +238,7 @@ class Feedback:
     best: str | None = None
 
 
-def lesson_kind(truth: SceneTruth) -> str:
+def find_lesson_kind(truth: SceneTruth) -> str:
     """The kind of a lesson: that of its fault, or ``clean``."""
     return truth.faults[0].kind if truth.faults else CLEAN
 
@@ -262,7 +262,7 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
 
 
 def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
-    kind = lesson_kind(truth)
+    kind = find_lesson_kind(truth)
     if kind == CLEAN:
         return Feedback(OPEN)
     if _is_corrected(truth, group):
@@ -278,7 +278,7 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
 
 
 def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
-    kind = lesson_kind(truth)
+    kind = find_lesson_kind(truth)
     if kind == CLEAN:
         if _is_sound(truth, group):
             return words.say(RIGHT, "")
@@ -295,7 +295,7 @@ def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
 
 
 def _judge_rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
-    kind = lesson_kind(truth)
+    kind = find_lesson_kind(truth)
     if kind == CLEAN:
         return words.say(WRONG, "You rejected a good group.")
     if kind not in _REASONS:
@@ -309,7 +309,7 @@ class _LessonTexts:
     """The sentences of a lesson, with letters and numbers put in."""
 
     def __init__(self, truth: SceneTruth, group: Group):
-        self._words = WORDS[lesson_kind(truth)]
+        self._words = WORDS[find_lesson_kind(truth)]
         self._values = _fault_values(truth.faults, group)
 
     @property
@@ -354,14 +354,14 @@ def _view_index(group: Group, view: str) -> int:
 
 def _is_corrected(truth: SceneTruth, group: Group) -> bool:
     """Whether the fault is gone and nothing else was spoilt."""
-    if lesson_kind(truth) in _REASONS or not _is_sound(truth, group):
+    if find_lesson_kind(truth) in _REASONS or not _is_sound(truth, group):
         return False
     view = group.view(truth.faults[0].view)
     if view is None or not view.included:
         return False
-    if lesson_kind(truth) == "missing_ball":
+    if find_lesson_kind(truth) == "missing_ball":
         return view.ball is not None and view.ball.center is not None
-    if lesson_kind(truth) == "undrawn_line":
+    if find_lesson_kind(truth) == "undrawn_line":
         # One line of two is enough for the gate, and the card then says that the group passes.
         return any(fault.marking in view.station.lines for fault in truth.faults)
     return True
@@ -382,12 +382,12 @@ def _is_sound(truth: SceneTruth, group: Group) -> bool:
         known = truth.view(view.key)
         if not view.included or known is None:
             continue
-        if lines_off(known, view, group) or _is_ball_off(known, view):
+        if list_misplaced_lines(known, view, group) or _is_ball_off(known, view):
             return False
     return True
 
 
-def lines_off(truth: ViewTruth, view: View, group: Group) -> tuple[str, ...]:
+def list_misplaced_lines(truth: ViewTruth, view: View, group: Group) -> tuple[str, ...]:
     """Markings of a view with a point that does not lie where the marking really is."""
     off = []
     for marking, points in view.station.lines.items():
@@ -410,7 +410,7 @@ def _views_turned(truth: SceneTruth, group: Group) -> list[str]:
         known = truth.view(view.key)
         if known is None or view.key in faulty or not view.station.lines:
             continue
-        if len(lines_off(known, view, group)) > 0.5 * len(view.station.lines):
+        if len(list_misplaced_lines(known, view, group)) > 0.5 * len(view.station.lines):
             turned.append(view.key)
     return turned
 

@@ -17,8 +17,8 @@ from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import delete_dataset, insert_dataset
 from app.features.imports.queries import list_known_groups
-from app.features.jobs.runner import JobProgress, left_to_next_server
-from app.features.people.queries import person_by_name, set_dataset_role
+from app.features.jobs.runner import JobProgress, leave_work_to_next_server
+from app.features.people.queries import find_person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
 from app.features.practice.recording_lessons import (
@@ -70,7 +70,7 @@ class RecordingPractice:
     lessons: tuple[RecordingLesson, ...]
 
 
-def recording_practice_name(person: str | None) -> str:
+def make_recording_practice_name(person: str | None) -> str:
     """Name of the dataset in which a person practises on a recording; None: where nobody logs in."""
     return DATASET if person is None else f"{DATASET} {person}"
 
@@ -78,7 +78,7 @@ def recording_practice_name(person: str | None) -> str:
 def recording_practice_work(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result names the dataset and the recording."""
     asked = progress.job.request
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         return make_recording_practice(
             store,
             progress,
@@ -106,7 +106,7 @@ def make_recording_practice(
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
     """
-    settings, name = store.settings, recording_practice_name(person)
+    settings, name = store.settings, make_recording_practice_name(person)
     film = settings.home / FILM
     with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
         require_own_recording(store, person)
@@ -190,11 +190,11 @@ def _plant_faults(
 def _open_dataset(store: Store, person: str | None, actor: str) -> None:
     """Make the practice dataset, empty, where it is missing; a person leads in their own."""
     with store.write() as session:
-        name = recording_practice_name(person)
+        name = make_recording_practice_name(person)
         if find_dataset(session, name) is not None:
             return
         made = insert_dataset(session, name, TOUCHLINE, actor, hidden=person is not None)
-        row = None if person is None else person_by_name(session, person)
+        row = None if person is None else find_person_by_name(session, person)
         if row is not None and person is not None:
             set_dataset_role(session, row.id, made, Role.LEAD, by=actor)
             log_account_event(session, actor, person, "role in dataset", Role.LEAD, dataset_id=made)
@@ -204,7 +204,7 @@ def read_recording_practice(
     store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
 ) -> RecordingPractice:
     """What is right of the practice recording; no lessons where it is not made yet, or not seen."""
-    name, truth = recording_practice_name(person), _read_truth(settings)
+    name, truth = make_recording_practice_name(person), _read_truth(settings)
     recording = _find_recording(store, person)
     if recording is None or truth is None or not recording.indexed:
         return RecordingPractice(name, None, ())
@@ -223,7 +223,7 @@ def read_recording_practice(
 def _find_recording(store: Store, person: str | None) -> Recording | None:
     """The practice recording of a person, if it is there."""
     with store.read() as session:
-        row = find_dataset(session, recording_practice_name(person))
+        row = find_dataset(session, make_recording_practice_name(person))
     if row is None or _is_ordinary(row, person):
         return None
     found = list_recordings(store, int(row.id))
@@ -238,7 +238,7 @@ def _is_ordinary(row: Any, person: str | None) -> bool:
 
 def require_own_recording(store: Store, person: str | None) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
-    name = recording_practice_name(person)
+    name = make_recording_practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         groups = 0 if row is None else len(list_known_groups(session, row.id))

@@ -135,7 +135,7 @@ def judge_cameras(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Record
     shot = truth.shots[truth.live]
     numbers = range(shot.first, shot.last + 1)
     off = {
-        number: grass_off_px(truth.cameras[number], frame.camera, truth.size)
+        number: median_grass_error_px(truth.cameras[number], frame.camera, truth.size)
         for number in numbers
         if (frame := frames.get(number)) is not None and frame.camera is not None
     }
@@ -253,7 +253,7 @@ def _apart_m(one: Camera, other: Camera) -> float:
     return float(np.linalg.norm(one.position - other.position))
 
 
-def grass_off_px(truth: Camera, found: Camera, size: ImageSize) -> float:
+def median_grass_error_px(truth: Camera, found: Camera, size: ImageSize) -> float:
     """Median distance of the visible grass from where a camera puts it, pixels; infinite where it puts none in view."""
     xs, ys = np.linspace(0, size.width - 1, 9), np.linspace(0, size.height - 1, 7)
     pixels: FloatArray = np.stack(np.meshgrid(xs, ys), -1).reshape(-1, 2)

@@ -9,7 +9,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.features.groups.submit import load
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.practice.recording import RecordingPractice, read_recording_practice
 from app.features.practice.recording_lessons import LessonName, RecordingLesson
 from app.features.practice.service import (
@@ -127,10 +127,10 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
 @router.post(
     "/practice",
     operation_id="startPractice",
-    **by_job(409, 413, 415, 503),
+    **openapi_of_job_response(409, 413, 415, 503),
 )
 @may(Action.ANNOTATE, where=Where.OWN)
-@responds(job_answer)
+@responds(make_job_response)
 def start_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
 ) -> Job:
@@ -168,10 +168,10 @@ def get_recording_practice(
 @router.post(
     "/practice/recording",
     operation_id="startRecordingPractice",
-    **by_job(409, 413, 415, 503),
+    **openapi_of_job_response(409, 413, 415, 503),
 )
 @may(Action.ANNOTATE, where=Where.OWN)
-@responds(job_answer)
+@responds(make_job_response)
 def start_recording_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
 ) -> Job:

@@ -21,15 +21,15 @@ from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
-from app.features.people.queries import person_by_name, set_dataset_role
+from app.features.people.queries import find_person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
 from app.features.practice.lessons import (
     LESSONS,
     WORDS,
     Feedback,
+    find_lesson_kind,
     judge_lesson,
-    lesson_kind,
     write_practice,
 )
 from app.features.practice.recording import recording_practice_work, require_own_recording
@@ -46,7 +46,7 @@ DATASET = "practice"
 """Name of the dataset where nobody logs in, and of the folder of the lessons in the home."""
 
 
-def practice_name(person: str | None) -> str:
+def make_practice_name(person: str | None) -> str:
     """Name of the dataset in which a person practises; None: where nobody logs in."""
     return DATASET if person is None else f"{DATASET} {person}"
 
@@ -96,7 +96,7 @@ def request_practice(
 ) -> Job:
     """Make the practice dataset soon; what is there already stays, unless it shall begin again.
 
-    ``person`` is whose practice it is (``practice_name``); ``recording``: the practice on a recording instead.
+    ``person`` is whose practice it is (``make_practice_name``); ``recording``: the practice on a recording instead.
 
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
@@ -170,7 +170,7 @@ def make_practice_dataset(
         ConflictError: There is a dataset of that name that is not the practice.
     """
     with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
-        name = practice_name(person)
+        name = make_practice_name(person)
         _require_own(store, settings, person)
         ids = _group_ids(store, name)
         if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
@@ -188,7 +188,7 @@ def _make_lessons(
     person: str | None,
 ) -> list[int]:
     """Ids of the lessons, once they are drawn, imported and solved."""
-    folder, name = settings.home / DATASET, practice_name(person)
+    folder, name = settings.home / DATASET, make_practice_name(person)
     if not _is_drawn(settings):
         write_practice(folder, partial_progress(progress, "Drawing the pictures."))
     if again:
@@ -206,8 +206,8 @@ def _make_lessons(
 def _open_dataset(store: Store, person: str, actor: str) -> None:
     """Make a person's practice dataset, empty, where it is missing: they judge in it."""
     with store.write() as session:
-        row = person_by_name(session, person)
-        name = practice_name(person)
+        row = find_person_by_name(session, person)
+        name = make_practice_name(person)
         if row is None or find_dataset(session, name) is not None:
             return
         made = insert_dataset(session, name, PAPER, actor, hidden=True)
@@ -219,7 +219,7 @@ def read_practice(
     store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
 ) -> Practice:
     """Every lesson with what has come of it; none where the dataset is not made yet, or not seen."""
-    truths, name = _read_truths(settings), practice_name(person)
+    truths, name = _read_truths(settings), make_practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         # An ordinary dataset that is called so is nobody's practice.
@@ -249,7 +249,7 @@ def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
 
 def _make_lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
     truth = truths[state.key]
-    words = WORDS[lesson_kind(truth)]
+    words = WORDS[find_lesson_kind(truth)]
     return PracticeLesson(
         group=state.id,
         number=list(truths).index(state.key) + 1,
@@ -277,7 +277,7 @@ def _is_ordinary(row: Any, person: str | None) -> bool:
 
 def _require_own(store: Store, settings: Settings, person: str | None) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
-    name = practice_name(person)
+    name = make_practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         if row is None:

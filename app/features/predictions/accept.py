@@ -218,7 +218,7 @@ def accept_box(
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
-    edit = set_ball(view.key, accepted_ball(box, name))
+    edit = set_ball(view.key, annotation_from_prediction(box, name))
     if not replace:
         _require_free(load(store, view.group_id), edit, if_match)
     return submit(store, view.group_id, edit, if_match=if_match, actor=actor)
@@ -239,7 +239,7 @@ def _require_free(state: GroupState, edit: SetBalls, if_match: str) -> None:
     )
 
 
-def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
+def annotation_from_prediction(box: PredictedBox, name: str) -> BallAnnotation:
     """The annotation that a prediction becomes."""
     place = Box(box.x, box.y, box.width, box.height)
     return BallAnnotation(box=place, predicted_by=name)
@@ -260,7 +260,7 @@ def _judge_box(
         why = "below_score"
     elif _box_problem(best, row) is not None:
         why = "not_a_ball"
-    elif balls == [accepted_ball(best, name)]:
+    elif balls == [annotation_from_prediction(best, name)]:
         why = "the_same"
     elif balls and not request.replace:
         why = "annotated"
@@ -297,7 +297,7 @@ def _accept_edit(
         if report is not None:
             session.respond(report)
 
-    edit = set_ball(item.view, accepted_ball(item.box, name))
+    edit = set_ball(item.view, annotation_from_prediction(item.box, name))
     for _ in range(TRIES):
         try:
             state = load(store, item.group_id)

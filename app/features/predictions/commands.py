@@ -412,14 +412,14 @@ def _evaluate_here(
     dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
-    from app.features.predictions.evaluation import evaluation_values, write_evaluation
+    from app.features.predictions.evaluation import evaluation_to_values, write_evaluation
     from app.features.predictions.evaluation_run import evaluate_sources
 
     with opened_store() as store:
         done = evaluate_sources(store, dataset, request, actor=current_actor(), progress=progress)
         if out is not None:
             write_evaluation(store, done.evaluation, out)
-    return evaluation_values(done.evaluation), [vars(item) for item in done.sets]
+    return evaluation_to_values(done.evaluation), [vars(item) for item in done.sets]
 
 
 def _evaluate_at(

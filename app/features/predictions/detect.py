@@ -26,7 +26,12 @@ from app.evaluation.frame import Detection
 from app.features.datasets.service import read_dataset_head, require_name
 from app.features.groups.view_queries import StoredView, list_dataset_views
 from app.features.predictions.queries import PredictionSet
-from app.features.predictions.service import LISTED, frame_names, require_free, save_predictions
+from app.features.predictions.service import (
+    LISTED,
+    read_frame_names,
+    require_free,
+    save_predictions,
+)
 from app.features.queue.query import parse_query
 from app.formats.ball_names import is_ball
 from app.geometry.arrays import FloatArray
@@ -130,7 +135,7 @@ def suppress_overlapping(corners: FloatArray, limit: float, most: int) -> list[i
     return kept
 
 
-def ball_category(names: Sequence[str]) -> int | None:
+def find_ball_category(names: Sequence[str]) -> int | None:
     """The class that is a ball, by the names in a model; None where none or several could be.
 
     Example:
@@ -206,7 +211,7 @@ class OnnxModel:
         (first, *_) = session.get_inputs()
         meta = dict(session.get_modelmeta().custom_metadata_map)
         names = _parse_class_names(meta.get("names", ""))
-        chosen = ball_category(names) if category is None else category
+        chosen = find_ball_category(names) if category is None else category
         if chosen is None and names:
             raise InputError(
                 f"it is not clear from their names which of the {len(names)} classes of"
@@ -363,7 +368,7 @@ def run_detector(
         request.name,
         {view: boxes for view, boxes in detections.items() if boxes},
         {},
-        names=frame_names(store, found.id),
+        names=read_frame_names(store, found.id),
         format="detect",
         source=model.path.name,
         report={

@@ -34,18 +34,18 @@ from app.evaluation.track_scores import TrueTrack, evaluate_tracks
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.predictions import queries as frame_rows
-from app.features.predictions.frames import truth_pins
+from app.features.predictions.frames import make_truth_pins
 from app.features.predictions.queries import (
     FrameCondition,
     PredictionSet,
-    dataset_evaluations,
     delete_evaluation,
     find_evaluation,
+    list_evaluations_of_dataset,
     read_figure,
     read_predicted_tracks,
 )
 from app.features.predictions.queries import StoredEvaluation as StoredEvaluation
-from app.features.solutions.codec import dumps, from_json, to_json
+from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.features.tracks.codec import track_from_json
 from app.features.tracks.service import accepted_tracks
 from app.features.versions.frozen_queries import read_frozen, read_json
@@ -113,7 +113,7 @@ def list_evaluations(store: Store, dataset: str | int) -> list[StoredEvaluation]
     """The runs of a dataset, the newest first."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return dataset_evaluations(session, found.id)
+        return list_evaluations_of_dataset(session, found.id)
 
 
 def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
@@ -280,7 +280,7 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
         file.write_bytes(_figure_content(figure(title), ending))
 
     frames = (vars(frame) for frame in _read_frames(store, evaluation.id))
-    write_parts(out, evaluation_values(evaluation), frames, fetch)
+    write_parts(out, evaluation_to_values(evaluation), frames, fetch)
 
 
 def write_parts(
@@ -290,7 +290,7 @@ def write_parts(
 
     Args:
         out: The folder; made where it is missing.
-        values: As ``evaluation_values`` has them.
+        values: As ``evaluation_to_values`` has them.
         frames: What came of each frame.
         fetch: Writes a table or figure.
 
@@ -318,11 +318,11 @@ def _figure_content(figure: Figure, ending: str) -> bytes:
     """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
     if ending == "png":
         return figure_png(figure)
-    text = figure_csv(figure) if ending == "csv" else dumps(to_json(figure)) + "\n"
+    text = figure_csv(figure) if ending == "csv" else solution_json_text(to_json(figure)) + "\n"
     return text.encode()
 
 
-def evaluation_values(evaluation: StoredEvaluation) -> dict[str, Any]:
+def evaluation_to_values(evaluation: StoredEvaluation) -> dict[str, Any]:
     """An evaluation as plain values."""
     return {**vars(evaluation), "figures": list(evaluation.figures)}
 
@@ -351,11 +351,11 @@ def track_evaluation(
     """
     if version is None:
         values = accepted_tracks(session, dataset)
-        pins = truth_pins(dataset.policy, SOLVER_VERSION, digest(values), "accepted")
+        pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest(values), "accepted")
     else:
         bodies = read_frozen(session, version.dataset_id, version.tracks.values())
         values = {key: read_json(bodies[name]) for key, name in version.tracks.items()}
-        pins = truth_pins(
+        pins = make_truth_pins(
             version.policy, version.solver_version, version.hash, version.groups, version
         )
     if not values:

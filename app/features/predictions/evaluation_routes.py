@@ -24,7 +24,7 @@ from app.evaluation.result import (
     table_csv,
 )
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.predictions import evaluation as review
 from app.features.predictions.evaluation import RunComparison, read_tables
 from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
@@ -239,14 +239,14 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
 @router.post(
     "/datasets/{dataset}/evaluations",
     operation_id="startEvaluation",
-    **by_job(404, 409, 413, 415),
+    **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(
     Action.LEAD,
     dataset=OwnedKind.DATASET,
     body={"predictions": OwnedKind.PREDICTIONS, "careful": OwnedKind.PREDICTIONS},
 )
-@responds(job_answer)
+@responds(make_job_response)
 def start_evaluation(
     dataset: DatasetPath, request: EvaluationBody, services: AppServices, actor: Actor
 ) -> Job:

@@ -19,9 +19,9 @@ from app.features.predictions.evaluation import read_evaluation, track_evaluatio
 from app.features.predictions.frames import (
     LIVE_RULES,
     EvaluationTruth,
-    live_truth,
-    unknown_rule,
-    version_truth,
+    read_live_truth,
+    read_version_truth,
+    unknown_rule_error,
 )
 from app.features.predictions.queries import (
     PredictionSet,
@@ -43,7 +43,7 @@ LISTED = 5
 """Frames that a refusal names; all are counted."""
 
 
-def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
+def read_reference_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
     """The reference box of each view, by its id.
 
     Raises:
@@ -256,12 +256,12 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
             if (identity := getattr(request, name)) is not None:
                 own = sets[name] = _own_set(session, found, identity, name)
                 if name == "careful":
-                    careful_boxes(session, own)
+                    read_reference_boxes(session, own)
         _find_track_set(request, sets)
         if request.version is not None:
             _own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
-            raise unknown_rule(request.groups)
+            raise unknown_rule_error(request.groups)
 
 
 def _find_track_set(
@@ -291,9 +291,9 @@ def _read_truth(
     session: Session, dataset: DatasetHead, request: EvaluationRequest
 ) -> EvaluationTruth:
     if request.version is None:
-        return live_truth(session, dataset, request.groups, request.split)
+        return read_live_truth(session, dataset, request.groups, request.split)
     version = _own_version(session, dataset, request.version)
-    return version_truth(session, version, request.split)
+    return read_version_truth(session, version, request.split)
 
 
 def _own_version(session: Session, dataset: DatasetHead, version_id: int) -> Version:
@@ -324,7 +324,7 @@ def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Evaluat
         if predictions.cameras:
             cameras = read_predicted_cameras(session, predictions.id)
     if careful is not None:
-        boxes = careful_boxes(session, careful)
+        boxes = read_reference_boxes(session, careful)
     return EvaluationInputs(detections, boxes, cameras)
 
 
@@ -436,7 +436,9 @@ def evaluate_sources(
     wanted.check()
     pinned = None if wanted.version is None else find_version(store, dataset, wanted.version).id
     found, drawn = (
-        None if source.is_empty else prediction_set(store, dataset, source, actor=actor)
+        None
+        if source.is_empty
+        else read_or_find_prediction_set(store, dataset, source, actor=actor)
         for source in (wanted.predictions, wanted.careful)
     )
     request = replace(
@@ -449,7 +451,7 @@ def evaluate_sources(
     return EvaluatedSources(evaluation, tuple(item for item in (found, drawn) if item is not None))
 
 
-def prediction_set(
+def read_or_find_prediction_set(
     store: Store, dataset: str | int, source: PredictionFiles, *, actor: str
 ) -> PredictionSet:
     """The set of a source: read from its files now, or found under its name.

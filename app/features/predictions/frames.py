@@ -45,7 +45,7 @@ class EvaluationTruth:
     pins: Json
 
 
-def version_truth(session: Session, version: Version, split: str | None) -> EvaluationTruth:
+def read_version_truth(session: Session, version: Version, split: str | None) -> EvaluationTruth:
     """The frames of a frozen version, with the ids that its views have today."""
     rows = list(read_rows(session, version.id, members=True))
     frames: list[Frame] = []
@@ -60,11 +60,13 @@ def version_truth(session: Session, version: Version, split: str | None) -> Eval
                 if split is None or frame.split == split:
                     frames.append(frame)
                     gone += frame.id < 0
-    pins = truth_pins(version.policy, version.solver_version, version.hash, version.groups, version)
+    pins = make_truth_pins(
+        version.policy, version.solver_version, version.hash, version.groups, version
+    )
     return EvaluationTruth(tuple(frames), version.policy, gone, pins)
 
 
-def live_truth(
+def read_live_truth(
     session: Session, dataset: DatasetHead, rule: str, split: str | None
 ) -> EvaluationTruth:
     """The frames of a dataset as it is now; the pin is a digest of all that they follow from.
@@ -74,7 +76,7 @@ def live_truth(
         ConflictError: Groups that might take part have no solution.
     """
     if rule not in LIVE_RULES:
-        raise unknown_rule(rule)
+        raise unknown_rule_error(rule)
     candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
     require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
@@ -92,7 +94,7 @@ def live_truth(
                 for frame in group_frames(state.group, state.solution, state.id, state.view_ids)
                 if split is None or frame.split == split
             ]
-    pins = truth_pins(dataset.policy, SOLVER_VERSION, digest(sorted(hashes)), rule)
+    pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest(sorted(hashes)), rule)
     return EvaluationTruth(tuple(frames), dataset.policy, 0, pins)
 
 
@@ -143,7 +145,7 @@ def _frozen_frames(
     yield from group_frames(item.group, item.solution, group_id, ids, splits)
 
 
-def truth_pins(
+def make_truth_pins(
     policy: Policy, solver_version: str, state: str, groups: str, version: Version | None = None
 ) -> dict[str, Json]:
     """What makes a truth the one that it is.
@@ -168,7 +170,7 @@ def truth_pins(
     }
 
 
-def unknown_rule(rule: str) -> InputError:
+def unknown_rule_error(rule: str) -> InputError:
     """The error where somebody wants groups by a rule that is none of ``LIVE_RULES``."""
     known = ", ".join(LIVE_RULES)
     return InputError(f"groups must be one of {known}, not {quoted(rule)}", pointer="/groups")

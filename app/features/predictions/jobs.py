@@ -78,7 +78,7 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
     def evaluating(progress: JobProgress) -> Json:
         # The server may have stopped between the result and the record of its job.
         done = _evaluated_since(store, progress.job)
-        return evaluation_work(store, progress) if done is None else evaluation_result(done)
+        return evaluation_work(store, progress) if done is None else make_evaluation_result(done)
 
     jobs.register_resume(EVALUATE, evaluating)
     jobs.register_work(ACCEPT, partial(accept_work, store))
@@ -115,7 +115,7 @@ def _in_worker(
 def _run_evaluation(
     store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: ReportProgress
 ) -> Json:
-    return evaluation_result(
+    return make_evaluation_result(
         run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
     )
 
@@ -128,7 +128,7 @@ def _run_accept(
     )
 
 
-def evaluation_result(found: StoredEvaluation) -> dict[str, Any]:
+def make_evaluation_result(found: StoredEvaluation) -> dict[str, Any]:
     """What the job of an evaluation leaves."""
     return {"evaluation": found.id, "name": found.name, "counts": found.counts}
 

@@ -14,7 +14,7 @@ from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import DatasetModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import columns_shown
+from app.features.people.visibility_queries import list_columns_with_shown_actor
 from app.features.predictions.tables import (
     EvaluationFrameModel,
     EvaluationModel,
@@ -37,9 +37,9 @@ Tracks = Mapping[str, PredictedTrack]
 _FRAME_BATCH = 2000
 _MOST = 500
 """Runs of a dataset that are listed."""
-_EVALUATIONS = select(*columns_shown(EvaluationModel), DatasetModel.name.label("dataset")).join(
-    DatasetModel, DatasetModel.id == EvaluationModel.dataset_id
-)
+_EVALUATIONS = select(
+    *list_columns_with_shown_actor(EvaluationModel), DatasetModel.name.label("dataset")
+).join(DatasetModel, DatasetModel.id == EvaluationModel.dataset_id)
 FrameCondition = ColumnElement[bool]
 """Whether a frame is meant; made by the functions here."""
 _KEEPING = ("evaluation_id", "position")
@@ -88,7 +88,7 @@ class PredictedBox:
     score: float
 
 
-def predictions_digest(
+def digest_predictions(
     keys: Mapping[int, str],
     boxes: Boxes,
     cameras: Mapping[int, Camera],
@@ -157,7 +157,7 @@ def delete_prediction_set(session: Session, set_id: int) -> None:
     session.execute(delete(PredictionSetModel).where(PredictionSetModel.id == set_id))
 
 
-def dataset_prediction_sets(session: Session, dataset_id: int) -> list[PredictionSet]:
+def list_prediction_sets_of_dataset(session: Session, dataset_id: int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
     return _read_sets(session, PredictionSetModel.dataset_id == dataset_id)
 
@@ -227,7 +227,7 @@ def read_predicted_tracks(session: Session, set_id: int) -> dict[str, PredictedT
 
 def _read_sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
     statement = (
-        select(*columns_shown(PredictionSetModel))
+        select(*list_columns_with_shown_actor(PredictionSetModel))
         .where(where)
         .order_by(PredictionSetModel.id.desc())
     )
@@ -295,7 +295,7 @@ def delete_evaluation(session: Session, evaluation_id: int) -> None:
     session.execute(delete(EvaluationModel).where(EvaluationModel.id == evaluation_id))
 
 
-def dataset_evaluations(session: Session, dataset_id: int) -> list[StoredEvaluation]:
+def list_evaluations_of_dataset(session: Session, dataset_id: int) -> list[StoredEvaluation]:
     """The runs of a dataset, the newest first."""
     statement = _EVALUATIONS.where(EvaluationModel.dataset_id == dataset_id)
     rows = session.execute(statement.order_by(EvaluationModel.id.desc()).limit(_MOST))

@@ -99,7 +99,7 @@ class PredictionFiles:
             raise InputError("--cameras-size needs predicted cameras, but no --cameras is given")
 
 
-def uploaded_files(
+def resolve_uploaded_files(
     settings: Settings,
     how: PredictionFiles,
     path: str | None,

@@ -12,7 +12,7 @@ from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
 from app.features.groups.submit import find_view
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import ACCEPTED, JobDocument, job_answer
+from app.features.jobs.schemas import ACCEPTED, JobDocument, make_job_response
 from app.features.predictions import service as review
 from app.features.predictions.accept import (
     AcceptReport,
@@ -22,7 +22,7 @@ from app.features.predictions.accept import (
     plan_accept,
 )
 from app.features.predictions.jobs import request_accept
-from app.features.predictions.reader import PredictionFiles, uploaded_files
+from app.features.predictions.reader import PredictionFiles, resolve_uploaded_files
 from app.features.predictions.schemas import (
     AcceptBody,
     AcceptOutcome,
@@ -32,7 +32,7 @@ from app.features.predictions.schemas import (
     PredictionSetList,
     ViewPrediction,
     ViewPredictions,
-    image_size,
+    parse_image_size,
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
@@ -103,7 +103,9 @@ def add_predictions(
 
 
 def _accepted_response(found: AcceptReport | Job) -> Response:
-    return job_answer(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
+    return (
+        make_job_response(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
+    )
 
 
 @router.post(
@@ -170,7 +172,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
     find_view(store, view)
-    found = review.view_predictions(store, view)
+    found = review.read_predictions_of_view(store, view)
     return ViewPredictions(
         items=[ViewPrediction.of(item, box) for item, boxes in found for box in boxes]
     )
@@ -214,8 +216,8 @@ def _prediction_files(settings: Settings, request: PredictionRequest) -> Predict
         None,
         format=request.format,
         category=request.category,
-        size=image_size(request.size),
-        cameras_size=image_size(request.cameras_size),
+        size=parse_image_size(request.size),
+        cameras_size=parse_image_size(request.cameras_size),
     )
     uploads = (request.upload, request.images_upload, request.cameras_upload)
-    return uploaded_files(settings, how, *uploads)
+    return resolve_uploaded_files(settings, how, *uploads)

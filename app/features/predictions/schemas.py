@@ -291,6 +291,6 @@ class AcceptOutcome(Document):
         )
 
 
-def image_size(size: Size | None) -> ImageSize | None:
+def parse_image_size(size: Size | None) -> ImageSize | None:
     """A size as a value."""
     return None if size is None else ImageSize(*size)

@@ -26,11 +26,11 @@ from app.features.predictions.queries import PredictedBox as PredictedBox
 from app.features.predictions.queries import PredictionSet as PredictionSet
 from app.features.predictions.queries import (
     Tracks,
-    dataset_prediction_sets,
     delete_prediction_set,
+    digest_predictions,
     has_prediction_set,
     insert_prediction_set,
-    predictions_digest,
+    list_prediction_sets_of_dataset,
     read_prediction_sets,
     read_view_boxes,
 )
@@ -75,7 +75,7 @@ def add_predictions(
     if name is not None:
         require_name(name, "a set of predictions", digits=True)
     first = files.first
-    names = frame_names(store, dataset)
+    names = read_frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
     nothing = not boxes.detections and not cameras.cameras and not boxes.tracks
     if nothing and (boxes.unknown or cameras.unknown or boxes.report.problems):
@@ -85,7 +85,7 @@ def add_predictions(
     return save_predictions(
         store,
         dataset,
-        prediction_set_name(first) if name is None else name,
+        make_prediction_set_name(first) if name is None else name,
         boxes.detections,
         cameras.cameras,
         tracks=boxes.tracks,
@@ -134,7 +134,7 @@ def save_predictions(
         "source": source[:300],
         "created": now(),
         "actor": actor,
-        "digest": predictions_digest(keys, boxes, cameras, tracks),
+        "digest": digest_predictions(keys, boxes, cameras, tracks),
         "frames": len(boxes),
         "boxes": sum(map(len, boxes.values())),
         "cameras": len(cameras),
@@ -145,7 +145,7 @@ def save_predictions(
     with store.write() as session:
         found = read_dataset_head(session, dataset)
         if reuse:
-            own = dataset_prediction_sets(session, found.id)
+            own = list_prediction_sets_of_dataset(session, found.id)
             known = next((item for item in own if _same_reading(item, values)), None)
             if known is not None:
                 session.respond(known)
@@ -166,7 +166,7 @@ def save_predictions(
         return made
 
 
-def frame_names(store: Store, dataset: str | int) -> FrameNames:
+def read_frame_names(store: Store, dataset: str | int) -> FrameNames:
     """The frames of a dataset by every name that a file may give them."""
     with store.read() as session:
         rows = list_dataset_views(session, read_dataset_head(session, dataset).id)
@@ -188,7 +188,7 @@ def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return dataset_prediction_sets(session, found.id)
+        return list_prediction_sets_of_dataset(session, found.id)
 
 
 def get_predictions(store: Store, set_id: int) -> PredictionSet:
@@ -231,7 +231,9 @@ def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
         session.respond(None)
 
 
-def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:
+def read_predictions_of_view(
+    store: Store, view_id: int
+) -> list[tuple[PredictionSet, list[PredictedBox]]]:
     """What was predicted for a view, by set, the newest set first."""
     with store.read() as session:
         boxes = read_view_boxes(session, view_id)
@@ -247,7 +249,7 @@ def read_set(session: Session, set_id: int) -> PredictionSet:
     return found[0]
 
 
-def prediction_set_name(path: Path) -> str:
+def make_prediction_set_name(path: Path) -> str:
     """A file's name as the name of a set: ASCII letters and digits, else ``-``.
 
     Example:

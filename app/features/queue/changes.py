@@ -16,7 +16,7 @@ from app.features.groups.revision_queries import (
     list_groups_solved_after,
 )
 from app.features.groups.state import read_etags
-from app.features.solutions.queries import newest_solution
+from app.features.solutions.queries import find_newest_solution_id
 
 MANY = 200
 """So many groups of one dataset at once are told as one change of the dataset."""
@@ -74,16 +74,16 @@ def read_position(store: Store) -> int:
         return newest_entry(session)
 
 
-def newest_entry_and_solution(store: Store) -> tuple[int, int]:
+def find_newest_entry_and_solution(store: Store) -> tuple[int, int]:
     """Ids of the log's last entry and of the last solution; 0 where there is none."""
     with store.read() as session:
-        return newest_entry(session), newest_solution(session)
+        return newest_entry(session), find_newest_solution_id(session)
 
 
 def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
     """Groups that got a solution after another one; datasets as a whole where they are many."""
     with store.read() as session:
-        behind = newest_solution(session) - solution
+        behind = find_newest_solution_id(session) - solution
         if behind > FAR:
             names = read_dataset_names(session)
             return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
@@ -93,7 +93,7 @@ def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
 def read_news(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
     """What has changed since some entries of the log, and since a solution (None: none is told)."""
     with store.read() as session:
-        entry, newest = newest_entry(session), newest_solution(session)
+        entry, newest = newest_entry(session), find_newest_solution_id(session)
         changes = {place: read_changes(session, place) for place in places if place < entry}
         solved: list[LoggedChange] = []
         if solution is not None and newest > solution:

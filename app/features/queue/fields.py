@@ -188,7 +188,7 @@ BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)
 """Fields by every name that is understood."""
 
 
-def reads_hidden_work(query: str) -> bool:
+def query_reveals_hidden_work(query: str) -> bool:
     """Whether a query asks what others made of groups; also within quotes: rather once too often.
 
     Example:

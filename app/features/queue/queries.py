@@ -29,9 +29,12 @@ from app.features.agreement.queries import select_groups_in_state
 from app.features.batches.queries import select_groups_in_batches
 from app.features.comments.queries import select_groups_with_mentions, select_groups_with_threads
 from app.features.independent_annotations.queries import select_groups_with_annotations
-from app.features.paint.proposal_queries import groups_with_open
-from app.features.people.visibility_queries import seen_anywhere, visible_groups_condition
-from app.features.policies.queries import judged_since
+from app.features.paint.proposal_queries import select_groups_with_open_proposal
+from app.features.people.visibility_queries import (
+    visible_groups_condition,
+    visible_in_all_datasets_condition,
+)
+from app.features.policies.queries import find_policy_change_time
 from app.features.queue.tables import QUEUE_NUMBERS, QUEUE_SCANNED, QueueModel
 from app.features.solutions.queries import is_solved
 from app.soccer.solution import GATES
@@ -103,7 +106,7 @@ def has_group_id(ids: Iterable[int]) -> Condition:
 
 def has_open_proposal(outcome: str | None = None) -> Condition:
     """A view without a camera was looked at; with that outcome, where one is named."""
-    return QueueModel.group_id.in_(groups_with_open(outcome))
+    return QueueModel.group_id.in_(select_groups_with_open_proposal(outcome))
 
 
 def is_in_batch(ids: Iterable[int]) -> Condition:
@@ -134,12 +137,12 @@ def has_outcome(state: str) -> Condition:
     return QueueModel.group_id.in_(select_groups_in_state(state))
 
 
-def any_of(conditions: Iterable[Condition]) -> Condition:
+def any_condition(conditions: Iterable[Condition]) -> Condition:
     """At least one of them holds."""
     return or_(*conditions)
 
 
-def negate(condition: Condition) -> Condition:
+def negate_condition(condition: Condition) -> Condition:
     """It does not hold."""
     return not_(condition)
 
@@ -413,7 +416,7 @@ def read_columns(
     return session.execute(statement.order_by(QueueModel.number)).all()
 
 
-def columns_from(
+def read_columns_after(
     session: Session, dataset_id: int, names: Iterable[str], after: int, limit: int
 ) -> Sequence[Any]:
     """Some columns of the groups of a dataset by id, from the one after an id on."""
@@ -449,7 +452,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[State
         )
         .where(
             QueueModel.dataset_id.in_(dataset_ids),
-            *seen_anywhere(QueueModel.dataset_id, QueueModel.group_id),
+            *visible_in_all_datasets_condition(QueueModel.dataset_id, QueueModel.group_id),
         )
         .group_by(QueueModel.dataset_id, QueueModel.status)
     )
@@ -467,7 +470,10 @@ def count_unsolved(session: Session) -> tuple[int, int, str | None]:
         .group_by(QueueModel.dataset_id)
     )
     rows = session.execute(statement).all()
-    since = [max(changed, judged_since(session, dataset) or "") for dataset, _, changed in rows]
+    since = [
+        max(changed, find_policy_change_time(session, dataset) or "")
+        for dataset, _, changed in rows
+    ]
     return total, sum(count for _, count, _ in rows), min(since, default=None)
 
 

@@ -109,7 +109,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
             condition = _condition_of_term(term)
             if term.field == "batch" and not negative and "," not in term.value:
                 batch = int(term.value)
-            found.append(conditions.negate(condition) if negative else condition)
+            found.append(conditions.negate_condition(condition) if negative else condition)
     return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
 
 
@@ -185,7 +185,7 @@ def _condition_of_term(term: _QueryTerm) -> Condition:
     test = _TESTS[term.field]
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
-    return conditions.any_of(test(term, value) for value in values)
+    return conditions.any_condition(test(term, value) for value in values)
 
 
 def _parse_id(term: _QueryTerm, text: str) -> int:
@@ -237,7 +237,7 @@ def _require_choice(term: _QueryTerm, value: str) -> str:
 
 def _any_or_none_condition(value: str, some: Condition) -> Condition:
     """``some``; the opposite for ``none``."""
-    return conditions.negate(some) if value == "none" else some
+    return conditions.negate_condition(some) if value == "none" else some
 
 
 def _status_condition(term: _QueryTerm, value: str) -> Condition:
@@ -311,7 +311,7 @@ def _match_condition(_term: _QueryTerm, value: str) -> Condition:
 
 
 def _text_condition(_term: _QueryTerm, value: str) -> Condition:
-    return conditions.any_of(
+    return conditions.any_condition(
         (conditions.contains_text("label", value), conditions.contains_text("key", value))
     )
 
@@ -319,7 +319,7 @@ def _text_condition(_term: _QueryTerm, value: str) -> Condition:
 def _exact_text_condition(term: _QueryTerm, value: str) -> Condition:
     if value in ("any", "none"):
         missing = conditions.is_empty(term.field)
-        return missing if value == "none" else conditions.negate(missing)
+        return missing if value == "none" else conditions.negate_condition(missing)
     return conditions.is_text(term.field, value)
 
 

@@ -32,15 +32,15 @@ from app.features.findings.queries import (
     split_open_and_dismissed_kinds,
 )
 from app.features.groups.queries import StoredGroup
-from app.features.people.visibility_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor_column
 from app.features.queue.tables import QueueModel
 from app.features.solutions.codec import SolutionSummary
 from app.features.solutions.queries import (
     SolutionKey,
     SolutionModel,
-    current_solution_id,
     read_solutions,
     read_summary,
+    select_current_solution_id,
 )
 from app.features.verdicts.queries import StoredVerdict, is_fixed
 from app.features.verdicts.tables import VerdictModel
@@ -66,7 +66,7 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
     for start in range(0, len(group_ids), _BATCH):
         ids = group_ids[start : start + _BATCH]
         verdicts = _newest_verdicts_by_group(session, ids)
-        edited = edited_groups(session, ids)
+        edited = filter_edited_groups(session, ids)
         heads = session.execute(
             select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
             .join(QueueModel, QueueModel.group_id == GroupModel.id)
@@ -117,7 +117,7 @@ def update_verdict(
     session.execute(_ROW, {"row": stored.id, **_verdict_columns(stored, verdict, edited, passes)})
 
 
-def differing_rows(session: Session) -> tuple[int, list[int]]:
+def find_outdated_rows(session: Session) -> tuple[int, list[int]]:
     """How many groups there are, and ids of those whose row ``refresh_queue`` would write otherwise.
 
     Raises:
@@ -146,7 +146,10 @@ def _replace_rows(session: Session, ids: Sequence[int]) -> None:
 def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
     views, verdicts = _views_by_group(session, ids), _newest_verdicts_by_group(session, ids)
-    (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
+    (findings, dismissals), edited = (
+        read_import_findings(session, ids),
+        filter_edited_groups(session, ids),
+    )
     heads = _groups_with_summaries(session, ids)
     own = {head.id: findings_from_rows(findings[head.id], head.inputs_hash) for head, _ in heads}
     checked = _findings_by_dismissal(session, dismissals, own)
@@ -177,7 +180,7 @@ def _findings_by_dismissal(
             SolutionModel.solver_version,
         )
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .join(SolutionModel, SolutionModel.id == current_solution_id())
+        .join(SolutionModel, SolutionModel.id == select_current_solution_id())
         .where(GroupModel.id.in_(list(dismissals)))
     )
     solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
@@ -203,7 +206,7 @@ def _groups_with_summaries(
     statement = (
         select(*GroupModel.__table__.columns, SolutionModel.summary)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, SolutionModel.id == current_solution_id())
+        .outerjoin(SolutionModel, SolutionModel.id == select_current_solution_id())
         .where(GroupModel.id.in_(ids))
     )
     return [
@@ -231,7 +234,7 @@ def _newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int,
         .group_by(VerdictModel.group_id)
     )
     plain = [column for column in VerdictModel.__table__.columns if column.name != "actor"]
-    actor = shown_actor(VerdictModel.actor, VerdictModel.at).label("actor")
+    actor = shown_actor_column(VerdictModel.actor, VerdictModel.at).label("actor")
     rows = session.execute(select(*plain, actor).where(VerdictModel.id.in_(newest)))
     return {row.group_id: row for row in rows}
 
@@ -249,7 +252,7 @@ def _group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     }
 
 
-def edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
+def filter_edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
     """Those of the groups that are not what their dataset brought.
 
     A shared station is not the group's: what is drawn there counts for no group.

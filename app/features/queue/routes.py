@@ -70,7 +70,7 @@ KINDS_WITH_BODY = frozenset(STATION_EDITS) | frozenset(
 )
 
 
-def thumbnail_address(view_id: int | None) -> str | None:
+def url_of_thumbnail(view_id: int | None) -> str | None:
     """Where the small picture of a group's main view is served."""
     if view_id is None:
         return None
@@ -155,7 +155,7 @@ class GroupRow(Document):
             first_failing=failing,
             findings=list(row.findings),
             dismissed=list(row.dismissed),
-            thumbnail=thumbnail_address(row.main_view),
+            thumbnail=url_of_thumbnail(row.main_view),
         )
 
 

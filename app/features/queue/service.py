@@ -24,13 +24,13 @@ from app.geometry.arrays import FloatArray, IntArray
 from app.json_text import MAX_ID, json_text
 
 
-def encode(query: Query, keys: Sequence[Key]) -> str:
+def encode_cursor(query: Query, keys: Sequence[Key]) -> str:
     """The cursor that continues after the row with these keys."""
     text = json_text([_cursor_name(query), *keys], ascii_=True, compact=True)
     return base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
 
 
-def decode(query: Query, cursor: str) -> list[Key]:
+def decode_cursor(query: Query, cursor: str) -> list[Key]:
     """The keys of a cursor; raises InputError when it is none of this query's."""
     try:
         padded = cursor + "=" * (-len(cursor) % 4)
@@ -193,7 +193,7 @@ def list_groups(
     if cursor is not None and start is not None:
         raise InputError("give a cursor or a position, not both", pointer="/from")
     order = parsed.order
-    keys = None if cursor is None else decode(parsed, cursor)
+    keys = None if cursor is None else decode_cursor(parsed, cursor)
     with store.read() as session:
         listing = Listing(session, dataset_id, parsed.conditions)
         total = listing.count()
@@ -207,7 +207,7 @@ def list_groups(
         comments, annotations = count_open_threads(session, ids), count_submitted(session, ids)
         states = read_group_states(session, list(annotations)) if annotations else {}
     rows = rows[:limit]
-    following = encode(parsed, order.keys_of(rows[-1])) if more else None
+    following = encode_cursor(parsed, order.keys_of(rows[-1])) if more else None
     found = [
         replace(
             _group_row(row, comments),
@@ -280,12 +280,12 @@ def _split_kinds(text: str) -> tuple[str, ...]:
     return tuple(text.strip(",").split(",")) if text else ()
 
 
-def even_bins(low: float, high: float, bins: int) -> tuple[float, ...]:
+def make_even_bins(low: float, high: float, bins: int) -> tuple[float, ...]:
     """Edges of bins of equal width, shape (bins + 1,)."""
     return tuple(np.round(np.linspace(low, high, bins + 1), 6).tolist())
 
 
-def logarithmic_bins(first: int, last: int, per_decade: int) -> tuple[float, ...]:
+def make_logarithmic_bins(first: int, last: int, per_decade: int) -> tuple[float, ...]:
     """Edges of logarithmic bins from ``10**first`` to ``10**last``, after one that begins at 0.
 
     Numbers that spread over decades (errors of given and of drawn cameras, say) would fall into
@@ -305,13 +305,13 @@ def logarithmic_bins(first: int, last: int, per_decade: int) -> tuple[float, ...
     return (0.0, *(float(f"{10 ** (step / per_decade):.3g}") for step in steps))
 
 
-SIGMA_M = logarithmic_bins(-2, 2, 5)
+SIGMA_M = make_logarithmic_bins(-2, 2, 5)
 """Of the ball's uncertainty, metres: from a centimetre to a hundred metres."""
-ERROR_PERCENT = logarithmic_bins(-2, 1, 6)
+ERROR_PERCENT = make_logarithmic_bins(-2, 1, 6)
 """Of the reprojection error, per cent of the diagonal: from 0.2 px in HD to 220 px."""
 
 
-def bin_indices(
+def find_bin_indices(
     edges: Sequence[float], values: FloatArray, *, open_low: bool, open_high: bool
 ) -> IntArray:
     """The bin of each value, -1 for one in no bin (NaN, or beyond an end that is closed).
@@ -344,12 +344,12 @@ class HistogramColumn:
 
 
 COLUMNS = {
-    "jac": HistogramColumn(even_bins(0, 1, 20), open_high=False),
+    "jac": HistogramColumn(make_even_bins(0, 1, 20), open_high=False),
     "error_percent": HistogramColumn(ERROR_PERCENT, log=True),
     "sigma": HistogramColumn(SIGMA_M, log=True),
-    "parallax": HistogramColumn(even_bins(0, 180, 20), open_high=False),
-    "size_ratio": HistogramColumn(even_bins(0, 2, 20)),
-    "agreement": HistogramColumn(even_bins(0, 1, 20), open_high=False),
+    "parallax": HistogramColumn(make_even_bins(0, 180, 20), open_high=False),
+    "size_ratio": HistogramColumn(make_even_bins(0, 2, 20)),
+    "agreement": HistogramColumn(make_even_bins(0, 1, 20), open_high=False),
 }
 """The bins are fixed, so that they stay put while one filters."""
 
@@ -406,6 +406,6 @@ def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
 
 def _make_histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
-    place = bin_indices(column.edges, numbers, open_low=True, open_high=column.open_high)
+    place = find_bin_indices(column.edges, numbers, open_low=True, open_high=column.open_high)
     counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)
     return Histogram(column, tuple(counts.tolist()), int(np.isnan(numbers).sum()))

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.features.people.visibility_queries import is_blind as is_blind
 from app.features.queue.queries import Listing, compare_condition
 from app.features.queue.query import NUMBERS, parse_query
-from app.features.queue.service import ERROR_PERCENT, SIGMA_M, bin_indices, even_bins
+from app.features.queue.service import ERROR_PERCENT, SIGMA_M, find_bin_indices, make_even_bins
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
@@ -101,30 +101,30 @@ class Statistics:
 
 
 MEASURES = (
-    Measure("distance", "Camera to ball", "m", "distance", even_bins(0, 120, 24)),
-    Measure("parallax", "Parallax", "°", "parallax", even_bins(0, 180, 36), open_high=False),
+    Measure("distance", "Camera to ball", "m", "distance", make_even_bins(0, 120, 24)),
+    Measure("parallax", "Parallax", "°", "parallax", make_even_bins(0, 180, 36), open_high=False),
     Measure("sigma", "Uncertainty", "m", "sigma", SIGMA_M, log=True),
-    Measure("box", "Ball diameter in the image", "px", "box", even_bins(0, 40, 20)),
-    Measure("size_ratio", "Annotated over expected size", "", "ratio", even_bins(0, 3, 30)),
+    Measure("box", "Ball diameter in the image", "px", "box", make_even_bins(0, 40, 20)),
+    Measure("size_ratio", "Annotated over expected size", "", "ratio", make_even_bins(0, 3, 30)),
     Measure(
-        "height", "Height above the grass", "m", "height", even_bins(-1, 11, 24), open_low=True
+        "height", "Height above the grass", "m", "height", make_even_bins(-1, 11, 24), open_low=True
     ),
     Measure(
         "error", "Reprojection error", "% of the diagonal", "error_percent", ERROR_PERCENT, log=True
     ),
-    Measure("jac", "Lowest JaC of the views", "", "jac", even_bins(0, 1, 20), open_high=False),
+    Measure("jac", "Lowest JaC of the views", "", "jac", make_even_bins(0, 1, 20), open_high=False),
     Measure(
         "agreement",
         "Lowest agreement with the paint",
         "",
         "agreement",
-        even_bins(0, 1, 20),
+        make_even_bins(0, 1, 20),
         open_high=False,
     ),
 )
 
-X_EDGES = even_bins(-60, 60, 24)
-Y_EDGES = even_bins(-40, 40, 16)
+X_EDGES = make_even_bins(-60, 60, 24)
+Y_EDGES = make_even_bins(-40, 40, 16)
 """Cells of 5 m, with a rim around the pitch."""
 
 
@@ -220,7 +220,7 @@ def make_statistics(found: Counted) -> Statistics:
     )
 
 
-def bin_query(measure: Measure, place: int) -> str:
+def make_bin_query(measure: Measure, place: int) -> str:
     """The query that finds the groups of one bar."""
     low, high = measure.edges[place], measure.edges[place + 1]
     last = place == len(measure.edges) - 2
@@ -235,7 +235,7 @@ def bin_query(measure: Measure, place: int) -> str:
 
 
 def _bin_values(measure: Measure, values: FloatArray) -> IntArray:
-    place = bin_indices(
+    place = find_bin_indices(
         measure.edges, values, open_low=measure.open_low, open_high=measure.open_high
     )
     return np.where(np.isnan(values), UNKNOWN, np.where(place < 0, NOWHERE, place))
@@ -243,7 +243,7 @@ def _bin_values(measure: Measure, values: FloatArray) -> IntArray:
 
 def _pitch_cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     column, row = (
-        bin_indices(edges, values, open_low=False, open_high=False)
+        find_bin_indices(edges, values, open_low=False, open_high=False)
         for edges, values in ((X_EDGES, x), (Y_EDGES, y))
     )
     cell = row * (len(X_EDGES) - 1) + column
@@ -264,7 +264,7 @@ def _make_histogram(
         for split, row in sorted(zip(found.splits, counts, strict=True), key=_pair_name)
         if row.any()
     )
-    queries = tuple(bin_query(measure, number) for number in range(bins))
+    queries = tuple(make_bin_query(measure, number) for number in range(bins))
     return MeasureHistogram(measure, queries, series)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.camera_tracking import (
     require_stretch,
@@ -92,7 +92,7 @@ def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
         rest = "; what was lost is followed backwards" if done == total else ""
         progress(done, total, f"{plural(done, 'frame')} of {recording.name} followed{rest}.")
 
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         if "turned" in asked:
             found, given = turn_cameras(store, recording.id, first, asked["turned"], actor=actor)
         else:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.errors import NotFoundError
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.recordings.camera_jobs import request_cameras, request_turn
 from app.features.recordings.camera_schemas import (
     CameraFormat,
@@ -65,9 +65,13 @@ def get_stretches(recording: Id, store: AppStore) -> CamerasList:
     return CamerasList(items=[CamerasDocument.model_validate(one) for one in found])
 
 
-@router.post("/{recording}/cameras", operation_id="trackCameras", **by_job(404, 409, 413, 415))
+@router.post(
+    "/{recording}/cameras",
+    operation_id="trackCameras",
+    **openapi_of_job_response(404, 409, 413, 415),
+)
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(job_answer)
+@responds(make_job_response)
 def track_cameras(
     recording: Id, wanted: CamerasRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -108,10 +112,12 @@ def get_stretch(
 
 
 @router.patch(
-    "/{recording}/cameras/{frame}", operation_id="turnCameras", **by_job(404, 409, 413, 415)
+    "/{recording}/cameras/{frame}",
+    operation_id="turnCameras",
+    **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(job_answer)
+@responds(make_job_response)
 def turn_stretch(
     recording: Id, frame: Frame, wanted: CamerasChange, services: AppServices, actor: Actor
 ) -> Job:

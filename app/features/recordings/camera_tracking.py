@@ -18,7 +18,7 @@ from app.errors import ConflictError, InputError, StorageError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import get_dataset_head
 from app.features.file_tools.track import count_outcomes, pitch_to_row
-from app.features.pitches.queries import edited_pitches
+from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.cameras import (
     CameraSummary,
     ShotCameras,
@@ -128,7 +128,7 @@ def track_now(
     lines: dict[int, Lines] = {}
     with store.read() as session:
         drawn = views_of_stretch(session, recording, first, last, with_lines=True)
-        pitch = edited_pitches(session, recording.dataset_id, [recording.name])
+        pitch = read_edited_pitches(session, recording.dataset_id, [recording.name])
     for number, stored, key in drawn:
         station = stored.stations[key].station
         if not (station.flipped or station.picture):

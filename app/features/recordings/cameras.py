@@ -24,7 +24,7 @@ from app.features.file_tools.track import frame_to_row, write_cameras
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.cameras import GivenCamera, NamedStation, attach_cameras
 from app.features.imports.ingest import IngestReport
-from app.features.pitches.queries import edited_pitches
+from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.queries import (
     list_cameras_rows,
     views_of_video,
@@ -122,7 +122,7 @@ def pitch_of(store: Store, recording_id: int) -> Pitch:
     """The pitch of the match that a recording is of: as a person gave it, or as the Laws plan it."""
     with store.read() as session:
         row = need_recording(session, recording_id)
-        return edited_pitches(session, row.dataset_id, [row.name]).get(row.name) or Pitch()
+        return read_edited_pitches(session, row.dataset_id, [row.name]).get(row.name) or Pitch()
 
 
 def read_cameras(settings: Settings, digest: str) -> list[FrameCamera]:

@@ -16,7 +16,7 @@ from app.errors import TooLargeError
 from app.features.imports.upload_queries import get_upload, save_upload, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
 from app.features.recordings.index import has_index, index_now
@@ -106,7 +106,7 @@ def index_work(store: Store, progress: JobProgress) -> Json:
     def step(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         if progress.job.request["shots"] and has_index(store, recording):
             actor = progress.job.actor
             detect_shots_again(store, recording_id, actor=actor, progress=step, stop=progress.check)
@@ -178,7 +178,7 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     def step(done: int, total: int | None = None, _: str = "") -> None:
         progress(done, total, f"{plural(done, 'instant')} of {recording.name} taken.")
 
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         taken = take_in_worker(
             store,
             recording,

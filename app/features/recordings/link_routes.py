@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.recordings.link_frames import LinkedFrames, linked_frames
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
@@ -163,13 +163,15 @@ def put_instants(
         )
 
 
-@router.post("/links/{link}/ball", operation_id="linkByBall", **by_job(404, 413, 415))
+@router.post(
+    "/links/{link}/ball", operation_id="linkByBall", **openapi_of_job_response(404, 413, 415)
+)
 @may(
     Action.LEAD,
     recording=OwnedKind.RECORDING,
     body={"live_upload": OwnedKind.UPLOAD, "replay_upload": OwnedKind.UPLOAD},
 )
-@responds(job_answer)
+@responds(make_job_response)
 def link_by_ball(
     recording: Id, link: LinkId, wanted: BallLinkRequest, services: AppServices, actor: Actor
 ) -> Job:

@@ -12,7 +12,7 @@ from sqlalchemy.orm import aliased
 from app.db.session import Session, now
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import columns_shown, shown_actor
+from app.features.people.visibility_queries import list_columns_with_shown_actor, shown_actor_column
 from app.features.predictions.tables import PredictionModel
 from app.features.recordings.tables import (
     BallRunModel,
@@ -45,7 +45,7 @@ def _rows() -> Select[Any]:
     columns = (
         column for column in RecordingModel.__table__.columns if column.name not in ("actor",)
     )
-    actor = shown_actor(RecordingModel.actor, RecordingModel.created).label("actor")
+    actor = shown_actor_column(RecordingModel.actor, RecordingModel.created).label("actor")
     # Keys of groups that were taken from it begin with its name.
     taken = (
         select(func.count())
@@ -143,7 +143,7 @@ def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
     """The stretches of a recording that have cameras, in their order."""
     model = ShotCamerasModel
     columns = [column for column in model.__table__.columns if column.name != "actor"]
-    actor = shown_actor(model.actor, model.created).label("actor")
+    actor = shown_actor_column(model.actor, model.created).label("actor")
     statement = select(*columns, actor).where(model.recording_id == recording_id)
     return session.execute(statement.order_by(model.first)).all()
 
@@ -190,13 +190,17 @@ def digests_of(session: Session) -> set[str]:
 def list_run_rows(session: Session, recording_id: int) -> Sequence[Any]:
     """The runs of a recording by their first frames."""
     model = BallRunModel
-    statement = select(*columns_shown(model)).where(model.recording_id == recording_id)
+    statement = select(*list_columns_with_shown_actor(model)).where(
+        model.recording_id == recording_id
+    )
     return session.execute(statement.order_by(model.first, model.id)).all()
 
 
 def find_run(session: Session, run_id: int) -> Any | None:
     """A run by its id."""
-    statement = select(*columns_shown(BallRunModel)).where(BallRunModel.id == run_id)
+    statement = select(*list_columns_with_shown_actor(BallRunModel)).where(
+        BallRunModel.id == run_id
+    )
     return session.execute(statement).one_or_none()
 
 
@@ -243,7 +247,7 @@ _LIVE, _REPLAY = aliased(RecordingModel), aliased(RecordingModel)
 
 def _links() -> Select[Any]:
     columns = (column for column in ShotLinkModel.__table__.columns if column.name != "actor")
-    actor = shown_actor(ShotLinkModel.actor, ShotLinkModel.created).label("actor")
+    actor = shown_actor_column(ShotLinkModel.actor, ShotLinkModel.created).label("actor")
     sides = (
         column.label(f"{side}_{word}")
         for side, table in (("live", _LIVE), ("replay", _REPLAY))

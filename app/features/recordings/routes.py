@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from app.features.datasets.service import dataset_id
 from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.recordings.jobs import (
     InstantOptions,
     request_index,
@@ -69,7 +69,7 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
     return RecordingList(items=[one for one in found if sight.sees(one.dataset_id)])
 
 
-@router.post("", operation_id="addRecording", **by_job(404, 413, 415, 503))
+@router.post("", operation_id="addRecording", **openapi_of_job_response(404, 413, 415, 503))
 @may(
     Action.LEAD,
     body={
@@ -78,7 +78,7 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
         "source/folder": OwnedKind.FOLDER,
     },
 )
-@responds(job_answer)
+@responds(make_job_response)
 def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> Job:
     """Bring a video file into a dataset; the job indexes it, and finds its shots.
 
@@ -216,9 +216,9 @@ def set_shots(
         return put_shots(store, recording, wanted.values(), if_match, actor=actor)
 
 
-@router.post("/{recording}/shots", operation_id="findShots", **by_job(404))
+@router.post("/{recording}/shots", operation_id="findShots", **openapi_of_job_response(404))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(job_answer)
+@responds(make_job_response)
 def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     """Find the shots of a recording anew, in place of the list that it has.
 
@@ -229,9 +229,13 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     return request_index(services.jobs, services.store, found, shots=True, actor=actor)
 
 
-@router.post("/{recording}/groups", operation_id="takeInstants", **by_job(404, 409, 413, 415))
+@router.post(
+    "/{recording}/groups",
+    operation_id="takeInstants",
+    **openapi_of_job_response(404, 409, 413, 415),
+)
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(job_answer)
+@responds(make_job_response)
 def take_instants(
     recording: Id,
     wanted: InstantsRequest,

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session, now
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor_column
 
 
 class SavedViewModel(Base):
@@ -28,11 +28,11 @@ class SavedViewModel(Base):
 
 _SAVED = select(
     *(column for column in SavedViewModel.__table__.columns if column.name != "actor"),
-    shown_actor(SavedViewModel.actor, SavedViewModel.created).label("actor"),
+    shown_actor_column(SavedViewModel.actor, SavedViewModel.created).label("actor"),
 )
 
 
-def dataset_saved_views(session: Session, dataset_id: int) -> Sequence[SavedViewModel]:
+def list_saved_views_of_dataset(session: Session, dataset_id: int) -> Sequence[SavedViewModel]:
     """The saved views of a dataset, by name."""
     statement = _SAVED.where(SavedViewModel.dataset_id == dataset_id)
     return session.rows(SavedViewModel, statement.order_by(SavedViewModel.name))

@@ -9,15 +9,15 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import strip_and_check_title
 from app.features.people.visibility_queries import sees_all_work
-from app.features.queue.fields import reads_hidden_work
+from app.features.queue.fields import query_reveals_hidden_work
 from app.features.queue.queries import Listing
 from app.features.queue.query import parse_query
 from app.features.saved_views.queries import (
     SavedViewModel,
-    dataset_saved_views,
     delete_saved_view,
     find_saved_view,
     insert_saved_view,
+    list_saved_views_of_dataset,
 )
 from app.json_text import Moment
 from app.soccer.actors import LOCAL_USER, person_of
@@ -49,7 +49,7 @@ class SavedView:
 def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
     """The saved views of a dataset, by name, each with the number of groups that match."""
     with store.read() as session:
-        rows = dataset_saved_views(session, dataset_id)
+        rows = list_saved_views_of_dataset(session, dataset_id)
         return [
             _saved_view(row, _count_matching_groups(session, row))
             for row in rows
@@ -67,7 +67,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
     name = strip_and_check_title(name, "a saved view")
     parse_query(q)
     with store.write() as session:
-        rows = dataset_saved_views(session, dataset_id)
+        rows = list_saved_views_of_dataset(session, dataset_id)
         names = [row.name for row in rows]
         if name in names:
             raise ConflictError(
@@ -117,7 +117,7 @@ def _read_visible_view(session: Session, view_id: int) -> SavedView:
 
 def _is_visible(row: SavedViewModel) -> bool:
     """Whether whoever asks may know of a view: its number of groups answers its query."""
-    return sees_all_work(row.dataset_id) or not reads_hidden_work(row.query)
+    return sees_all_work(row.dataset_id) or not query_reveals_hidden_work(row.query)
 
 
 def _count_matching_groups(session: Session, row: SavedViewModel) -> int:

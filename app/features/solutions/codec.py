@@ -53,7 +53,7 @@ def from_json(kind: type[T], value: Any) -> T:
     return result
 
 
-def dumps(value: Any) -> str:
+def solution_json_text(value: Any) -> str:
     """JSON text of a value of ``to_json``; a number that is not finite becomes its name."""
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False)
@@ -209,7 +209,7 @@ class SolutionSummary:
     agreement: float | None = None
 
 
-def summarize(group: Group, solution: Solution) -> SolutionSummary:
+def summarize_solution(group: Group, solution: Solution) -> SolutionSummary:
     """The summary of a group's solution."""
     ball = solution.ball
     error_px, error_percent = _reprojection_error(group, solution)

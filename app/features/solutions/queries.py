@@ -30,7 +30,7 @@ from app.errors import ConflictError
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions import codec as value_codec
-from app.features.solutions.codec import SolutionSummary, summarize
+from app.features.solutions.codec import SolutionSummary, summarize_solution
 from app.json_text import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
@@ -117,7 +117,7 @@ def is_solved() -> ColumnElement[bool]:
     )
 
 
-def current_solution_id() -> ScalarSelect[int]:
+def select_current_solution_id() -> ScalarSelect[int]:
     """Id of the solution of a group's present state under its dataset's policy: of this solver, else of
     the newest one that solved it.
 
@@ -173,7 +173,7 @@ def encode_solution(
     return EncodedSolution(
         calibrations=calibrations,
         calibration_keys=tuple(view.calibration_key for view in solution.views),
-        summary=summarize(group, solution),
+        summary=summarize_solution(group, solution),
         body=compress_json(value_codec.to_json(replace(solution, views=bare))),
         facts=facts,
     )
@@ -204,7 +204,7 @@ def decode_camera(body: bytes) -> Calibration:
 
 def compress_json(value: object) -> bytes:
     """A value of ``value_codec.to_json`` as it is stored."""
-    return zlib_ng.compress(value_codec.dumps(value).encode())
+    return zlib_ng.compress(value_codec.solution_json_text(value).encode())
 
 
 def insert_solutions(
@@ -250,7 +250,7 @@ def _solution_columns(key: SolutionKey, encoded: EncodedSolution) -> dict[str, o
         "policy_hash": key.policy_hash,
         "solver_version": key.solver_version,
         "calibrations": json_text(encoded.calibration_keys, ascii_=True),
-        "summary": value_codec.dumps(value_codec.to_json(encoded.summary)),
+        "summary": value_codec.solution_json_text(value_codec.to_json(encoded.summary)),
         "body": encoded.body,
         "facts": encoded.facts,
     }
@@ -343,12 +343,14 @@ def _is_undetermined(body: bytes) -> bool:
     return b'"camera":null' in text or b'"unobservable":[]' not in text
 
 
-def stored_calibration_keys(session: Session, keys: Iterable[str]) -> set[str]:
+def filter_stored_calibration_keys(session: Session, keys: Iterable[str]) -> set[str]:
     """Those of the keys under which a calibration is kept."""
     return set(session.scalars(_KEPT, {"keys": list(keys)}))
 
 
-def present_keys(session: Session, group_ids: Sequence[int]) -> dict[int, SolutionKey]:
+def read_current_solution_keys(
+    session: Session, group_ids: Sequence[int]
+) -> dict[int, SolutionKey]:
     """Key of the solution that fits each group as it is, whether there is one or not."""
     statement = (
         select(GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash)
@@ -358,7 +360,9 @@ def present_keys(session: Session, group_ids: Sequence[int]) -> dict[int, Soluti
     return {row.id: SolutionKey(*row) for row in session.execute(statement)}
 
 
-def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> dict[int, bytes]:
+def read_current_solution_bodies(
+    session: Session, ids: Sequence[int], policy_hash: str
+) -> dict[int, bytes]:
     """Encoded solutions that fit the groups as they are, by the group's id."""
     statement = (
         select(SolutionModel.group_id, SolutionModel.body)
@@ -373,7 +377,7 @@ def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> di
     return {row.group_id: row.body for row in session.execute(statement)}
 
 
-def newest_solution(session: Session) -> int:
+def find_newest_solution_id(session: Session) -> int:
     """Id of the last solution; 0 where there is none."""
     return session.scalar(select(func.max(SolutionModel.id))) or 0
 
@@ -387,7 +391,7 @@ class StoredFacts(NamedTuple):
     facts: bytes | None
 
 
-def solution_facts(session: Session, ids: Sequence[int]) -> Sequence[StoredFacts]:
+def read_solution_facts(session: Session, ids: Sequence[int]) -> Sequence[StoredFacts]:
     """The facts of solutions."""
     model = SolutionModel
     statement = select(model.group_id, model.inputs_hash, model.calibrations, model.facts)
@@ -406,7 +410,7 @@ def list_solved_groups(session: Session, dataset_id: int) -> list[int]:
     return list(session.scalars(statement))
 
 
-def unsolved_groups(
+def list_unsolved_groups(
     session: Session, dataset_id: int, among: Collection[int] | None = None
 ) -> list[int]:
     """Ids of a dataset's groups, or of those among some of them, without a solution of this solver

@@ -21,7 +21,7 @@ from app.features.datasets.service import (
 )
 from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import list_station_pitches, read_stations
-from app.features.policies.queries import policy_history
+from app.features.policies.queries import read_policy_history
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import (
     EncodedSolution,
@@ -31,11 +31,11 @@ from app.features.solutions.queries import (
     encode_solution,
     insert_calibrations,
     insert_solutions,
+    list_unsolved_groups,
     read_calibration_bodies,
     read_calibrations,
-    unsolved_groups,
 )
-from app.features.solutions.stored_queries import KeptSolution, kept_solutions
+from app.features.solutions.stored_queries import KeptSolution, list_reusable_solutions
 from app.progress import ReportProgress
 from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.group import Group, Station
@@ -54,7 +54,7 @@ from app.wording import plural
 from app.workers.executors import fan_out
 
 
-def contradicted_cameras(
+def find_contradicted_cameras(
     stations: Iterable[tuple[Station, Pitch]], policy: Policy
 ) -> dict[str, float]:
     """JaC of the static cameras whose lines do not fit the camera that was given, by their keys.
@@ -74,8 +74,8 @@ def contradicted_cameras(
     return found
 
 
-def contradiction_sentence(off: Mapping[str, float], where: str, how: str) -> str:
-    """What ``contradicted_cameras`` found, and what to do.
+def describe_contradiction(off: Mapping[str, float], where: str, how: str) -> str:
+    """What ``find_contradicted_cameras`` found, and what to do.
 
     Args:
         off: What it found.
@@ -97,7 +97,7 @@ def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
     return {key for group in groups for view in group.views for key in view_keys(group, view, part)}
 
 
-def known_calibrations(
+def read_known_calibrations(
     session: Session, groups: Iterable[Group], policy: Policy
 ) -> dict[str, Calibration]:
     """Those of the calibrations that groups need which are kept already."""
@@ -140,12 +140,12 @@ class RethresholdTask:
     policy: Policy
 
 
-def rethreshold_tasks(
+def make_rethreshold_tasks(
     store: Store, dataset: DatasetHead, ids: Sequence[int]
 ) -> Iterator[RethresholdTask]:
     """What can be retold of groups that have no solution under the policy of their dataset."""
     with store.read() as session:
-        history = policy_history(session, dataset.id)
+        history = read_policy_history(session, dataset.id)
     policy = dataset.policy
     before = {
         item.policy.hash: item.policy
@@ -154,12 +154,14 @@ def rethreshold_tasks(
     }
     for start in range(0, len(ids) if before else 0, RETHRESHOLDED_AT_ONCE):
         with store.read() as session:
-            kept = kept_solutions(session, ids[start : start + RETHRESHOLDED_AT_ONCE], before)
+            kept = list_reusable_solutions(
+                session, ids[start : start + RETHRESHOLDED_AT_ONCE], before
+            )
         if kept:
             yield RethresholdTask(tuple(kept), before, policy)
 
 
-def rethreshold_task(task: RethresholdTask) -> list[SolveResult]:
+def run_rethreshold_task(task: RethresholdTask) -> list[SolveResult]:
     """The solutions of those groups of which tau decides nothing new; runs in a worker.
 
     What is damaged is left out, like all others: it is solved.
@@ -235,11 +237,11 @@ class SolveReport:
     @property
     def sentence(self) -> str:
         """How many groups pass, how many do not and why, and how many could not be solved."""
-        outcome = outcome_sentence(self.solved, self.passed, len(self.failed), self.failing)
+        outcome = describe_outcome(self.solved, self.passed, len(self.failed), self.failing)
         return f"{outcome}. {self.advice}" if self.advice else outcome
 
 
-def outcome_sentence(
+def describe_outcome(
     solved: int, passed: int, errors: int, failing: Mapping[str, int] | None = None
 ) -> str:
     """How many groups pass, how many do not and at which gates, and how many could not be solved.
@@ -263,10 +265,10 @@ class SolveTask:
     calibrations: Mapping[str, bytes]
 
 
-def stale_groups(store: Store, dataset: str | int) -> list[int]:
+def list_stale_groups(store: Store, dataset: str | int) -> list[int]:
     """Ids of groups without a solution for their present state, policy and solver, in order."""
     with store.read() as session:
-        return unsolved_groups(session, need_dataset(session, dataset))
+        return list_unsolved_groups(session, need_dataset(session, dataset))
 
 
 def solve_dataset(
@@ -288,7 +290,7 @@ def solve_dataset(
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
         chosen: Of the ids of stale groups those that are solved.
     """
-    found, ids = get_dataset_head(store, dataset), chosen(stale_groups(store, dataset))
+    found, ids = get_dataset_head(store, dataset), chosen(list_stale_groups(store, dataset))
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[SolveResult]) -> None:
@@ -297,10 +299,12 @@ def solve_dataset(
             progress(report.solved + len(report.failed), report.total)
 
     keep([])
-    for results in fan_out(rethreshold_task, rethreshold_tasks(store, found, ids), executor, stop):
+    for results in fan_out(
+        run_rethreshold_task, make_rethreshold_tasks(store, found, ids), executor, stop
+    ):
         keep(results)
     if report.solved:
-        left = set(stale_groups(store, dataset))
+        left = set(list_stale_groups(store, dataset))
         ids = [number for number in ids if number in left]
     _calibrate_static_cameras(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
@@ -309,11 +313,11 @@ def solve_dataset(
         keep(results)
     if report.failing["jac"]:
         with store.read() as session:
-            off = contradicted_cameras(
+            off = find_contradicted_cameras(
                 _static_cameras_with_pitches(session, found.id), found.policy
             )
         where = f"{report.failing['jac']:,} of {report.solved:,} groups fail first at the gate jac"
-        report.advice = contradiction_sentence(off, where, _AGAIN) if off else ""
+        report.advice = describe_contradiction(off, where, _AGAIN) if off else ""
     return report
 
 

@@ -89,7 +89,7 @@ def _json_of_changed(
     ]
 
 
-def kept_solutions(
+def list_reusable_solutions(
     session: Session, group_ids: Sequence[int], policies: Collection[str]
 ) -> list[KeptSolution]:
     """One solution of each group under one of the policies, of those that have facts beside them.
@@ -136,7 +136,7 @@ _SOLUTIONS = (
 )
 
 
-def solution_batches(session: Session) -> Iterator[Sequence[Any]]:
+def iterate_solution_batches(session: Session) -> Iterator[Sequence[Any]]:
     """Rows of every solution of this solver, each with its dataset's policy and whether it is the
     one that fits its group as it is (``current``)."""
     after = 0
@@ -145,7 +145,7 @@ def solution_batches(session: Session) -> Iterator[Sequence[Any]]:
         after = rows[-1].id
 
 
-def calibration_keys(row: Any) -> list[str]:
+def list_calibration_keys_of_row(row: Any) -> list[str]:
     """Keys of the calibrations that such a row names.
 
     Raises:
@@ -161,7 +161,7 @@ def decode_row(session: Session, row: Any) -> Solution:
     Raises:
         DamagedError: Its body, or a calibration, is not what was written, or is not there.
     """
-    named = calibration_keys(row)
+    named = list_calibration_keys_of_row(row)
     calibrations = read_calibrations(session, named)
     with as_written():
         solution = decode_solution(unpack(row.body), calibrations)
@@ -173,14 +173,14 @@ def decode_row(session: Session, row: Any) -> Solution:
     return solution
 
 
-def damaged_calibrations(session: Session) -> Iterator[tuple[str, bool]]:
+def check_stored_calibrations(session: Session) -> Iterator[tuple[str, bool]]:
     """The key of every calibration, and whether it is no longer what was written."""
     statement = select(CalibrationModel.key, CalibrationModel.body)
     for row in _stream_rows(session, statement):
         yield row.key, not _is_readable(unpack, row.body)
 
 
-def damaged_readings(session: Session) -> Iterator[tuple[str, bool]]:
+def check_stored_paint_readings(session: Session) -> Iterator[tuple[str, bool]]:
     """The digest of everything that was read of paint, and whether it is that of its content no
     longer."""
     statement = select(PaintEvidenceModel.digest, PaintEvidenceModel.body)

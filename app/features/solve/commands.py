@@ -58,7 +58,7 @@ def solve(
         _print_solved(*_solve_at(server, dataset, chosen), json_=json_)
         return
     from app.features.policies.service import change_policy
-    from app.features.solve.jobs import count_yield, pending_work, solve_fully
+    from app.features.solve.jobs import count_yield, describe_pending_work, solve_fully
 
     chosen = None if policy is None else read_policy_option(policy)
     with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
@@ -68,7 +68,7 @@ def solve(
             report = solve_fully(
                 store, dataset, executor, progress, interrupted, actor=current_actor()
             )
-            left = pending_work(store, dataset) if interrupted() else None
+            left = describe_pending_work(store, dataset) if interrupted() else None
             if left is not None:
                 print_error(
                     f"stopped; {plural(report.solved, 'solved group is', 'solved groups are')} stored,"

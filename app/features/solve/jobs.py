@@ -16,18 +16,18 @@ from app.features.datasets.queries import group_ids, read_dataset_name
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
-from app.features.jobs.runner import JobProgress, counting_progress
+from app.features.jobs.runner import JobProgress, report_counts_in_words
 from app.features.jobs.service import Jobs, Pool
 from app.features.pitches.service import (
     DatasetPitches,
     change_pitches,
     estimate_pitches,
-    stale_matches,
+    list_matches_to_estimate,
 )
-from app.features.policies.noise import follow_noise, is_followed, noise_sample
+from app.features.policies.noise import choose_noise_sample, follow_noise, is_followed
 from app.features.policies.service import PolicyState, apply_policy
-from app.features.solutions.queries import unsolved_groups
-from app.features.solutions.service import SolveReport, solve_dataset, stale_groups
+from app.features.solutions.queries import list_unsolved_groups
+from app.features.solutions.service import SolveReport, list_stale_groups, solve_dataset
 from app.features.what_if.service import AT_ONCE, YieldStore
 from app.progress import ReportProgress
 from app.soccer.actors import LOCAL_USER
@@ -63,7 +63,7 @@ def solve_fully(
     """
     ahead = SolveReport()
     if follow and is_followed(store, dataset):
-        ahead = solve_dataset(store, dataset, executor, progress, stop, noise_sample)
+        ahead = solve_dataset(store, dataset, executor, progress, stop, choose_noise_sample)
         if not stop() and follow_noise(store, dataset, actor):
             ahead = SolveReport()
     report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
@@ -80,9 +80,12 @@ def solve_fully(
     return report
 
 
-def pending_work(store: Store, dataset: str | int) -> str | None:
+def describe_pending_work(store: Store, dataset: str | int) -> str | None:
     """What ``solve_fully`` would do now, as a sentence; None: nothing."""
-    groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
+    groups, matches = (
+        len(list_stale_groups(store, dataset)),
+        len(list_matches_to_estimate(store, dataset)),
+    )
     if groups:
         return f"{groups} are left to do"
     many = plural(matches, "match", "matches")
@@ -217,7 +220,7 @@ def request_policy(
 
     def change(session: Session, job: Job) -> PolicyJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
-        return PolicyJob(state, job, len(unsolved_groups(session, dataset_id)))
+        return PolicyJob(state, job, len(list_unsolved_groups(session, dataset_id)))
 
     return solve_after(jobs, store, dataset_id, change, actor=actor)
 
@@ -253,7 +256,7 @@ def resume_solving(jobs: Jobs, store: Store) -> None:
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
     """Solve whatever an earlier run, of the server or of a command, left undone."""
     for dataset in list_datasets(store):
-        if stale_groups(store, dataset.id):
+        if list_stale_groups(store, dataset.id):
             request_solve(jobs, store, dataset.id, actor=actor)
 
 
@@ -262,12 +265,15 @@ def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
     actor, edited = progress.job.actor, bool((progress.job.request or {}).get(EDITED))
     found = get_dataset_head(store, progress.dataset_id)
     progress(0, None, f"Solving {found.name}.")
-    stale, whole = len(stale_groups(store, found.id)), _count_groups(store, found.id)
+    stale, whole = len(list_stale_groups(store, found.id)), _count_groups(store, found.id)
     # A change of the policy may have met an edit's job that waited.
     follow = not edited or stale > MOSTLY * whole
-    large = stale >= WORTH_A_POOL or len(stale_matches(store, found.id)) >= MATCHES_WORTH_A_POOL
+    large = (
+        stale >= WORTH_A_POOL
+        or len(list_matches_to_estimate(store, found.id)) >= MATCHES_WORTH_A_POOL
+    )
     with pool() if large else nullcontext() as executor:
-        counter = counting_progress(progress, "groups solved")
+        counter = report_counts_in_words(progress, "groups solved")
         report = solve_fully(store, found.id, executor, counter, actor=actor, follow=follow)
     count_yield(store, found.id, report, progress)
     progress(report.total, report.total, report.sentence)

@@ -36,7 +36,7 @@ from app.features.groups.view_queries import (
 )
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
-from app.features.solutions.service import known_calibrations, solve_encoded
+from app.features.solutions.service import read_known_calibrations, solve_encoded
 from app.soccer.codec import group_inputs_hash
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
@@ -224,7 +224,7 @@ def _trial_group(session: Session, group_id: int, station: Station) -> _Trial:
     stored = read_record(session, group_id).stored
     view = next(view for view in stored.group.views if view.station.key == station.key)
     group = with_station(stored.group, view, station)
-    return stored, group, known_calibrations(session, [group], stored.policy)
+    return stored, group, read_known_calibrations(session, [group], stored.policy)
 
 
 def _solve_encoded(

@@ -9,7 +9,7 @@ from typing import Any
 from app.db.database_worker import CallingServer
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.match_estimates.jobs import MatchCall, MatchJob
 from app.features.tracks.service import make_tracks
 
@@ -37,7 +37,7 @@ def _track(call: MatchCall, progress: JobProgress) -> Json:
         call.job.actor,
         dataset_id=call.dataset_id,
         progress=progress,
-        report=counting_progress(progress, "groups read"),
+        report=report_counts_in_words(progress, "groups read"),
     )
 
 

@@ -22,7 +22,7 @@ from app.features.file_tools.shots import read_ball
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.cameras import cameras_at
 from app.features.recordings.link_values import (
@@ -123,7 +123,7 @@ def ball_link_work(store: Store, progress: JobProgress) -> Json:
     asked, settings = progress.job.request, store.settings
     limits = WorkerLimits(settings.import_memory, settings.import_seconds, SILENCE)
     progress(0, None, "Looking for the times under which the rays of the ball meet.")
-    with left_to_next_server(progress):
+    with leave_work_to_next_server(progress):
         try:
             found = run_in_worker(
                 store,

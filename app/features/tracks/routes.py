@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import by_job, job_answer
+from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.match_estimates.routes import MatchRequest
 from app.features.tracks import service as tracks
 from app.features.tracks.around import track_around, tracks_of_group
@@ -71,9 +71,13 @@ def list_tracks(
     return TrackList.of(choose_tracks(store, dataset, choice))
 
 
-@router.post("/datasets/{dataset}/tracks", operation_id="makeTracks", **by_job(404, 409, 413, 415))
+@router.post(
+    "/datasets/{dataset}/tracks",
+    operation_id="makeTracks",
+    **openapi_of_job_response(404, 409, 413, 415),
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def make_tracks(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:

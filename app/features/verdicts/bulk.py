@@ -19,20 +19,20 @@ from app.db.store import Store
 from app.errors import ConflictError
 from app.features.independent_annotations.queries import list_closed_copies
 from app.features.people.visibility_queries import COPIES, sees_all_work
-from app.features.queue.fields import reads_hidden_work
+from app.features.queue.fields import query_reveals_hidden_work
 from app.features.queue.queries import Listing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
-from app.features.queue.refresh_queries import edited_groups, refresh_verdicts
-from app.features.solutions.queries import present_keys, unsolved_groups
+from app.features.queue.refresh_queries import filter_edited_groups, refresh_verdicts
+from app.features.solutions.queries import list_unsolved_groups, read_current_solution_keys
 from app.features.verdicts.queries import (
     Spans,
     StoredBulkVerdict,
     StoredVerdict,
     append_span,
     find_batch,
+    find_next_verdict_id,
     insert_batch,
     insert_verdicts,
-    next_verdict_id,
     read_batches,
     split_spans,
     update_batch,
@@ -237,7 +237,9 @@ def list_batches(
     with store.read() as session:
         while some := read_batches(session, dataset_id, limit, before):
             found += [
-                one for one in some if sees_all_work(dataset_id) or not reads_hidden_work(one.query)
+                one
+                for one in some
+                if sees_all_work(dataset_id) or not query_reveals_hidden_work(one.query)
             ]
             if len(some) < limit or len(found) >= limit:
                 break
@@ -283,7 +285,7 @@ def select_groups(
 def _unsolved_groups(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
     """Groups that this solver has not solved as they are: their rows may tell of an earlier one."""
     few = [row.group_id for row in rows] if len(rows) <= CHUNK else None
-    return set(unsolved_groups(session, dataset_id, few))
+    return set(list_unsolved_groups(session, dataset_id, few))
 
 
 def _is_unusable(row: Any) -> bool:
@@ -402,8 +404,8 @@ def _make_verdicts(
     session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
 ) -> list[StoredVerdict]:
     ids = [row.group_id for row in rows]
-    keys, edited = present_keys(session, ids), edited_groups(session, ids)
-    number = next_verdict_id(session)
+    keys, edited = read_current_solution_keys(session, ids), filter_edited_groups(session, ids)
+    number = find_next_verdict_id(session)
     accepts = verdict.state == "accepted"
     return [
         StoredVerdict(

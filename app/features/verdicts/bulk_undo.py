@@ -11,7 +11,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.queue.queries import read_columns
-from app.features.solutions.queries import present_keys
+from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.bulk import (
     ASKED,
     BatchRun,
@@ -26,10 +26,10 @@ from app.features.verdicts.queries import (
     StoredVerdict,
     append_span,
     find_batch,
-    inputs_judged,
-    judged_between,
-    newest_between,
-    next_verdict_id,
+    find_next_verdict_id,
+    list_groups_judged_between,
+    list_groups_with_newest_verdict_between,
+    read_judged_inputs,
     read_verdicts,
     update_batch,
 )
@@ -86,7 +86,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
 
 def _count_groups(session: Session, spans: Spans) -> int:
     """Of how many groups these verdicts are."""
-    return len({group for span in spans for group in judged_between(session, *span)})
+    return len({group for span in spans for group in list_groups_judged_between(session, *span)})
 
 
 def _read_verdicts(spans: Spans) -> int:
@@ -132,9 +132,11 @@ def _restore_chunk(
     session: Session, batch: StoredBulkVerdict, first: int, last: int, actor: str
 ) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
-    at, number = now(), next_verdict_id(session)
+    at, number = now(), find_next_verdict_id(session)
     again: list[StoredVerdict] = []
-    for verdicts in read_verdicts(session, judged_between(session, first, last)).values():
+    for verdicts in read_verdicts(
+        session, list_groups_judged_between(session, first, last)
+    ).values():
         if first <= verdicts[0].id <= last:
             again += _earlier_verdicts(verdicts, batch.actor, at)
     numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
@@ -256,9 +258,9 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
 
 def _groups_unchanged_since(session: Session, given: Spans, first: int, last: int) -> list[int]:
     """Groups of one chunk that nobody has judged since it was taken back, or edited."""
-    ids = newest_between(session, first, last)
+    ids = list_groups_with_newest_verdict_between(session, first, last)
     judged: dict[int, str] = {}
     for start, end in given:
-        judged |= inputs_judged(session, start, end, ids)
-    keys = present_keys(session, ids)
+        judged |= read_judged_inputs(session, start, end, ids)
+    keys = read_current_solution_keys(session, ids)
     return [group for group in ids if judged.get(group) == keys[group].inputs_hash]

@@ -18,7 +18,11 @@ from app.features.batches.completion_queries import complete_judged_groups
 from app.features.datasets.tables import GroupModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.independent_annotations.submission_queries import record_copy_verdict
-from app.features.people.visibility_queries import COPIES, shown_actor, visible_groups_condition
+from app.features.people.visibility_queries import (
+    COPIES,
+    shown_actor_column,
+    visible_groups_condition,
+)
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.json_text import json_text
 
@@ -48,7 +52,7 @@ _OF_GROUPS = (
 )
 _SHOWN = [column for column in _VERDICT.columns if column.name != "actor"]
 _LAST_OF_EACH = (
-    select(*_SHOWN, shown_actor(_VERDICT.c.actor, _VERDICT.c.at).label("actor"))
+    select(*_SHOWN, shown_actor_column(_VERDICT.c.actor, _VERDICT.c.at).label("actor"))
     .where(
         _VERDICT.c.id.in_(
             select(func.max(_VERDICT.c.id))
@@ -79,13 +83,13 @@ def _verdicts_by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
     return verdicts
 
 
-def judged_between(session: Session, first: int, last: int) -> list[int]:
+def list_groups_judged_between(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups that the verdicts of a range of ids judge."""
     statement = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     return list(session.scalars(statement.order_by(VerdictModel.id)))
 
 
-def newest_between(session: Session, first: int, last: int) -> list[int]:
+def list_groups_with_newest_verdict_between(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups whose newest verdict is one of a range of ids."""
     judged = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     newest = func.max(VerdictModel.id)
@@ -98,7 +102,7 @@ def newest_between(session: Session, first: int, last: int) -> list[int]:
     return list(session.scalars(statement))
 
 
-def inputs_judged(
+def read_judged_inputs(
     session: Session, first: int, last: int, group_ids: Sequence[int]
 ) -> dict[int, str]:
     """Inputs hash that the verdicts of a range of ids judged, by the group's id."""
@@ -119,7 +123,7 @@ class JudgeCount(NamedTuple):
 def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[JudgeCount]:
     """Everybody who judged a group of a dataset, with the groups that they judged since some time."""
     recent = case((VerdictModel.at >= since, VerdictModel.group_id))
-    actor = shown_actor(VerdictModel.actor, VerdictModel.at)
+    actor = shown_actor_column(VerdictModel.actor, VerdictModel.at)
     statement = (
         select(
             actor.label("actor"),
@@ -136,7 +140,7 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[Ju
     return session.rows(JudgeCount, statement)
 
 
-def next_verdict_id(session: Session) -> int:
+def find_next_verdict_id(session: Session) -> int:
     """The id that the next verdict gets."""
     return find_next_row_id(session, VerdictModel)
 
@@ -166,12 +170,12 @@ def insert_verdicts(
         record_copy_verdict(session, row["group_id"], row["state"], actor=actor, at=at)
 
 
-def newest_verdict(session: Session) -> int:
+def find_newest_verdict_id(session: Session) -> int:
     """Id of the last verdict of any group; 0 where there is none."""
     return session.scalar(select(func.max(VerdictModel.id))) or 0
 
 
-def judged_since(session: Session, dataset_id: int, after: int) -> list[int]:
+def list_groups_judged_since(session: Session, dataset_id: int, after: int) -> list[int]:
     """Ids of the groups of a dataset that somebody judged after a verdict, or took that back."""
     statement = (
         select(VerdictModel.group_id)

@@ -16,8 +16,8 @@ from app.features.queue.refresh_queries import update_verdict
 from app.features.verdicts.queries import (
     StoredVerdict,
     count_by_judge,
+    find_next_verdict_id,
     insert_verdicts,
-    next_verdict_id,
 )
 from app.json_text import Moment
 from app.soccer.choices import VerdictState
@@ -142,7 +142,7 @@ def _make_verdict(
     session: Session, stored: StoredGroup, verdict: Verdict, override: str | None, actor: str
 ) -> StoredVerdict:
     return StoredVerdict(
-        id=next_verdict_id(session),
+        id=find_next_verdict_id(session),
         group_id=stored.id,
         actor=actor,
         at=now(),

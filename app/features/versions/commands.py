@@ -96,7 +96,7 @@ def freeze(
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return
         version = run_freeze(store, dataset, request, actor=current_actor(), progress=progress)
-    print_values(version_values(version), json_)
+    print_values(version_to_values(version), json_)
 
 
 @commands.command()
@@ -112,7 +112,7 @@ def versions(dataset: Dataset, json_: Json = False) -> None:
         from app.features.versions.service import list_versions
 
         with opened_store() as store:
-            found = [version_values(item) for item in list_versions(store, dataset)]
+            found = [version_to_values(item) for item in list_versions(store, dataset)]
     print_rows(
         found,
         json_,
@@ -127,7 +127,7 @@ def versions(dataset: Dataset, json_: Json = False) -> None:
 @commands.command()
 def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json = False) -> None:
     """Tell what changed from one version to another."""
-    from app.features.versions.diff import changelog_lines, diff_versions
+    from app.features.versions.diff import describe_diff, diff_versions
     from app.features.versions.service import find_version
 
     with opened_store() as store:
@@ -136,7 +136,7 @@ def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json =
     if json_:
         print_json(found.values())
         return
-    for line in changelog_lines(found):
+    for line in describe_diff(found):
         say(line)
     for sign, passages in (("+", found.added), ("-", found.dropped)):
         _print_first_lines([f"{sign} {item.group}: {item.why}" for item in passages])
@@ -155,12 +155,12 @@ def verify(
     json_: Json = False,
 ) -> None:
     """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
-    from app.features.versions.service import find_version, newest_version
+    from app.features.versions.service import find_version, get_newest_version
     from app.features.versions.verify import verify_and_keep
 
     with opened_to_solve("Verifying", workers, cluster) as (store, executor, progress):
         if version is None:
-            chosen = newest_version(store, dataset)
+            chosen = get_newest_version(store, dataset)
         else:
             chosen = find_version(store, dataset, version)
         report = verify_and_keep(store, chosen.id, executor, progress, actor=current_actor())
@@ -172,7 +172,7 @@ def verify(
         raise typer.Exit(1)
 
 
-def version_values(version: Version) -> dict[str, Any]:
+def version_to_values(version: Version) -> dict[str, Any]:
     """A version as plain values."""
     policy = {"policy": version.policy.name, "policy_hash": version.policy.hash}
     own = {"counts": dict(version.counts), "split": version.split.values()}

@@ -13,7 +13,7 @@ from app.db.json_columns import Json, parse
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.versions.queries import annotation_rows
+from app.features.versions.queries import iterate_annotation_rows
 from app.features.versions.service import Version, read_version
 from app.soccer.codec import policy_to_json
 from app.wording import plural
@@ -82,7 +82,7 @@ class VersionDiff:
             "newer": {"id": self.newer.id, "name": self.newer.name, "hash": self.newer.hash},
             "same": self.older.hash == self.newer.hash,
             "counts": {**counts, "unchanged": self.unchanged},
-            "lines": changelog_lines(self),
+            "lines": describe_diff(self),
             **lists,
         }
 
@@ -103,7 +103,8 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     if older.dataset_id != newer.dataset_id:
         raise InputError("the two versions belong to two datasets", pointer="/against")
     before, after = (
-        {row.key: row for row in annotation_rows(session, item.id)} for item in (older, newer)
+        {row.key: row for row in iterate_annotation_rows(session, item.id)}
+        for item in (older, newer)
     )
     both = [key for key, row in after.items() if row.member and _is_member(before, key)]
     changes = (_change_of_group(before[key], after[key]) for key in both)
@@ -122,22 +123,22 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     )
 
 
-def version_changelog(store: Store, version_id: int) -> list[str]:
+def make_version_changelog(store: Store, version_id: int) -> list[str]:
     """What changed since the version before, in sentences."""
     with store.read() as session:
         return read_changelog(session, read_version(session, version_id))
 
 
 def read_changelog(session: Session, version: Version) -> list[str]:
-    """``version_changelog`` within a session."""
+    """``make_version_changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
         groups, balls = _count_of_groups(counts["groups"]), plural(counts["balls"], "ball")
         return [f"First version: {groups}, {balls} in views."]
-    return changelog_lines(read_diff(session, read_version(session, version.previous), version))
+    return describe_diff(read_diff(session, read_version(session, version.previous), version))
 
 
-def changelog_lines(diff: VersionDiff) -> list[str]:
+def describe_diff(diff: VersionDiff) -> list[str]:
     """A diff in sentences."""
     lines = [f"Since {diff.older.name}:"]
     for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):

@@ -25,9 +25,9 @@ from app.features.datasets.service import (
 from app.features.findings.queries import GroupDismissals, findings_from_rows, read_import_findings
 from app.features.groups.queries import read_groups
 from app.features.solutions.queries import (
-    present_bodies,
+    filter_stored_calibration_keys,
     read_calibration_bodies,
-    stored_calibration_keys,
+    read_current_solution_bodies,
 )
 from app.features.tracks.service import accepted_tracks
 from app.features.versions.frozen_queries import (
@@ -35,20 +35,20 @@ from app.features.versions.frozen_queries import (
     SOLUTION,
     TRACK,
     compress_text,
-    frame_places,
+    filter_stored_frozen_keys,
+    find_frame_files,
     freeze_annotations,
     insert_frozen,
-    known_frozen,
     read_json,
 )
 from app.features.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.features.versions.queries import BATCH, has_version, insert_version
 from app.features.versions.service import (
     Version,
-    calibration_names,
-    next_name,
+    collect_calibration_keys,
+    find_next_version_name,
+    hash_version,
     read_version,
-    version_hash,
 )
 from app.formats.manifest import software_version
 from app.json_text import canonical, digest_of, quoted
@@ -180,7 +180,7 @@ def freeze_dataset(
     values = run.values(rows, actor)
     with store.write() as session:
         _require_free(session, found, request.name)
-        name = request.name or next_name(session, found.id)
+        name = request.name or find_next_version_name(session, found.id)
         return _save_version(session, {**values, "name": name}, rows)
 
 
@@ -236,7 +236,7 @@ class _FreezeRun:
             "licence": request.licence.strip() or join_licences(self._matches(rows)),
             "created": now(),
             "actor": actor,
-            "hash": version_hash(dataset.policy, SOLVER_VERSION, rows, self._tracks),
+            "hash": hash_version(dataset.policy, SOLVER_VERSION, rows, self._tracks),
             "tracks": canonical(self._tracks) if self._tracks else None,
             "groups": request.groups,
             "policy": canonical(policy_to_json(dataset.policy)),
@@ -255,7 +255,7 @@ class _FreezeRun:
         if not ids:
             return {}
         stored = read_groups(self._session, ids)
-        solutions = present_bodies(self._session, ids, self._dataset.policy.hash)
+        solutions = read_current_solution_bodies(self._session, ids, self._dataset.policy.hash)
         noticed, dismissals = read_import_findings(self._session, ids)
         texts: dict[str, str] = {}
         bodies: dict[str, bytes] = {}
@@ -266,7 +266,7 @@ class _FreezeRun:
             key, solved = SOLUTION + digest_of(body), read_json(body)
             texts.update(annotations.texts)
             bodies[key] = body
-            names |= calibration_names(solved)
+            names |= collect_calibration_keys(solved)
             rows[number] = self._member(item.group, annotations.key, key, solved)
             if number in dismissals:
                 own = findings_from_rows(noticed[number], item.inputs_hash)
@@ -288,7 +288,7 @@ class _FreezeRun:
             # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
             ball = solved["ball"] is not None and view["included"]
             self._balls[side] = self._balls.get(side, 0) + bool(ball)
-        frames = frame_places(group, _media_facts_by_view(group))
+        frames = find_frame_files(group, _media_facts_by_view(group))
         return {
             "split": split,
             "splits": None if splits is None else canonical(splits),
@@ -302,7 +302,9 @@ class _FreezeRun:
         self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]
     ) -> None:
         """Bring what is not frozen yet into the database, in a transaction of its own."""
-        known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
+        known = filter_stored_frozen_keys(
+            self._session, self._dataset.id, {*texts, *bodies, *names}
+        )
         fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
         fresh |= {key: body for key, body in bodies.items() if key not in known}
         fresh |= {key: compress_text(text) for key, text in texts.items() if key not in known}
@@ -314,7 +316,7 @@ class _FreezeRun:
     def _deleted_calibrations(self, session: Session, names: set[str]) -> dict[str, bytes]:
         """Calibrations that somebody deleted since the snapshot, as they are in it."""
         keys = {name.removeprefix(CALIBRATION) for name in names}
-        gone = keys - stored_calibration_keys(session, keys)
+        gone = keys - filter_stored_calibration_keys(session, keys)
         bodies = read_calibration_bodies(self._session, gone) if gone else {}
         return {CALIBRATION + key: body for key, body in bodies.items()}
 

@@ -96,7 +96,7 @@ for _kind in (FrozenOutline, OutlineStation):
     look_through(_kind)
 
 
-def named_texts(annotations: Json) -> set[str]:
+def collect_shared_keys(annotations: Json) -> set[str]:
     """Keys of the shared stations and readings of paint that a frozen group names."""
     stations = {
         view["station"] for view in annotations["views"] if isinstance(view["station"], str)
@@ -157,7 +157,7 @@ def _thaw_view(
     return view_from_json({**value, "media": media}, whole)
 
 
-def frame_places(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
+def find_frame_files(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
     """Where the frames of a group lie; None where nothing is known of them.
 
     Args:
@@ -176,7 +176,7 @@ def frame_places(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames
     return frames or None
 
 
-def known_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:
+def filter_stored_frozen_keys(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:
     """Those of the keys that are there already."""
     statement = select(FrozenModel.key).where(
         FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
@@ -208,7 +208,7 @@ def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[
     return {key: body for key, body in bodies.items() if body is not None}
 
 
-def fitting_key(key: str, body: bytes) -> str:
+def compute_content_key(key: str, body: bytes) -> str:
     """The key that content has by its digest; ``key`` itself, where it is that of a calibration.
 
     Raises:
@@ -239,7 +239,7 @@ def compress_text(text: str) -> bytes:
 _BATCH = 200
 
 
-def frozen_batches(session: Session) -> Iterator[Sequence[Any]]:
+def iterate_frozen_batches(session: Session) -> Iterator[Sequence[Any]]:
     """Rows (dataset_id, key, body) of all frozen content, in batches that fit into memory."""
     place = tuple_(FrozenModel.dataset_id, FrozenModel.key)
     statement = (
@@ -254,7 +254,7 @@ def frozen_batches(session: Session) -> Iterator[Sequence[Any]]:
         rows = session.execute(statement.where(place > after)).all()
 
 
-def lost_calibrations(session: Session) -> list[str]:
+def list_lost_calibrations(session: Session) -> list[str]:
     """Keys of frozen calibrations whose body is neither there nor where the solver keeps it."""
     kept = CalibrationModel.key == func.replace(FrozenModel.key, CALIBRATION, "")
     statement = (
@@ -266,7 +266,7 @@ def lost_calibrations(session: Session) -> list[str]:
     return list(session.scalars(statement))
 
 
-def members_without_content(session: Session, version_id: int) -> list[str]:
+def list_members_without_content(session: Session, version_id: int) -> list[str]:
     """Keys of the members of a version whose annotations or solution are not there."""
     group = VersionGroupModel
     statement = (

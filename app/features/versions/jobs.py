@@ -63,7 +63,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
     def freezing(progress: JobProgress) -> Json:
         # The server may have stopped between the version and the record of its job.
         done = _find_version_of_job(jobs, store, progress.job, _request_from_job(progress.job))
-        return freeze_work(store, progress) if done is None else version_result(done)
+        return freeze_work(store, progress) if done is None else make_version_result(done)
 
     jobs.register_resume(FREEZE, freezing)
     jobs.register_resume(VERIFY, partial(verify_work, store))
@@ -108,7 +108,7 @@ def verify_work(store: Store, progress: JobProgress) -> Json:
         raise
 
 
-def version_result(version: Version) -> dict[str, Any]:
+def make_version_result(version: Version) -> dict[str, Any]:
     """What the job of a freeze leaves."""
     return {
         "version": version.id,
@@ -121,7 +121,7 @@ def version_result(version: Version) -> dict[str, Any]:
 def _freeze_in_worker(
     store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: ReportProgress
 ) -> Json:
-    return version_result(
+    return make_version_result(
         freeze_dataset(store, dataset_id, request, actor=actor, progress=progress)
     )
 

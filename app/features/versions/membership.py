@@ -13,7 +13,11 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.versions.diff import read_changelog
-from app.features.versions.queries import CandidateRow, candidate_rows, version_verdicts
+from app.features.versions.queries import (
+    CandidateRow,
+    iterate_version_verdicts,
+    list_candidate_rows,
+)
 from app.features.versions.service import Version, read_version
 from app.soccer.choices import VersionRule
 from app.soccer.codec import policy_to_json
@@ -54,11 +58,11 @@ class Candidate:
 
 def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
     """Every group of a dataset, by match and key: an order that no machine changes."""
-    found = [_candidate_from_row(row, rule) for row in candidate_rows(session, dataset_id)]
-    return sorted(found, key=lambda item: (item.match, natural(item.key), item.key))
+    found = [_candidate_from_row(row, rule) for row in list_candidate_rows(session, dataset_id)]
+    return sorted(found, key=lambda item: (item.match, natural_sort_key(item.key), item.key))
 
 
-def natural(key: str) -> list[str | int]:
+def natural_sort_key(key: str) -> list[str | int]:
     """Sorts 7_2 before 7_10, and frame 99 before 100."""
     parts: list[str | int] = list(_DIGITS.split(key))
     parts[1::2] = [int(part) for part in parts[1::2]]
@@ -130,7 +134,7 @@ def _why_not_passed(row: CandidateRow) -> str | None:
     return None if row.passes or overridden else f"fails {row.gate}"
 
 
-def version_manifest(store: Store, version_id: int) -> dict[str, Json]:
+def make_version_manifest(store: Store, version_id: int) -> dict[str, Json]:
     """Everything about a version but the files of one format.
 
     Raises:
@@ -144,24 +148,24 @@ def version_manifest(store: Store, version_id: int) -> dict[str, Json]:
             "version": version.name,
             "date": version.created,
             "counts": dict(version.counts),
-            "settings": version_settings(version),
+            "settings": describe_version_settings(version),
             "licence": version.licence,
             "verdicts": verdicts,
             "overrides": overrides,
-            **version_stamp(session, version),
+            **make_version_stamp(session, version),
         }
 
 
-def version_settings(version: Version) -> dict[str, Json]:
+def describe_version_settings(version: Version) -> dict[str, Json]:
     """Policy and solver as they were frozen, which groups entered, and how they are split."""
     return {
-        **policy_settings(version.policy, version.solver_version),
+        **describe_policy_settings(version.policy, version.solver_version),
         "groups": version.groups,
         "split": version.split.values(),
     }
 
 
-def policy_settings(policy: Policy, solver_version: str) -> dict[str, Json]:
+def describe_policy_settings(policy: Policy, solver_version: str) -> dict[str, Json]:
     """What judged and what computed."""
     return {
         "policy": policy_to_json(policy),
@@ -170,7 +174,7 @@ def policy_settings(policy: Policy, solver_version: str) -> dict[str, Json]:
     }
 
 
-def version_stamp(session: Session, version: Version) -> dict[str, Json]:
+def make_version_stamp(session: Session, version: Version) -> dict[str, Json]:
     """Hash, note, counts and changelog of a version, and who is not in it and why."""
     return {
         "frozen": {
@@ -190,14 +194,14 @@ def _read_dismissed(session: Session, version_id: int) -> dict[str, Json]:
     """Findings of its groups that people had checked; nothing of a version without any."""
     found = [
         {"group": key, **one}
-        for key, verdict in version_verdicts(session, version_id, member=True)
+        for key, verdict in iterate_version_verdicts(session, version_id, member=True)
         for one in (verdict or {}).get("dismissed", ())
     ]
     return {"dismissed": found} if found else {}
 
 
 def _read_rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
-    for key, verdict in version_verdicts(session, version_id, member=False):
+    for key, verdict in iterate_version_verdicts(session, version_id, member=False):
         if verdict is not None and verdict["state"].startswith("rejected"):
             yield {"group": key, "reason": verdict["reason"], "note": verdict["note"]}
 
@@ -205,7 +209,7 @@ def _read_rejected(session: Session, version_id: int) -> Iterator[dict[str, Json
 def _read_verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
     counts: Counter[str] = Counter()
     overrides: list[Json] = []
-    for key, stored in version_verdicts(session, version_id, member=True):
+    for key, stored in iterate_version_verdicts(session, version_id, member=True):
         verdict = {"state": "unreviewed"} if stored is None else stored
         counts[verdict["state"]] += 1
         if verdict.get("override"):

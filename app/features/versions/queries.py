@@ -20,7 +20,7 @@ from app.db.session import Base, Session, now
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import columns_shown
+from app.features.people.visibility_queries import list_columns_with_shown_actor
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
 from app.features.verdicts.tables import VerdictModel
@@ -130,9 +130,9 @@ class FrozenModel(Base):
 
 BATCH = 200
 _GROUPS = cast(Table, VersionGroupModel.__table__)
-_VERSIONS = select(*columns_shown(VersionModel), DatasetModel.name.label("dataset")).join(
-    DatasetModel, DatasetModel.id == VersionModel.dataset_id
-)
+_VERSIONS = select(
+    *list_columns_with_shown_actor(VersionModel), DatasetModel.name.label("dataset")
+).join(DatasetModel, DatasetModel.id == VersionModel.dataset_id)
 
 
 class VersionRow(NamedTuple):
@@ -207,18 +207,18 @@ class VersionGroup:
     frames: Mapping[str, Mapping[str, Any]] | None
 
 
-def all_versions(session: Session) -> Sequence[VersionRow]:
+def list_all_versions(session: Session) -> Sequence[VersionRow]:
     """The versions of every dataset, newest first, each with the name of its ``dataset``."""
     return session.rows(VersionRow, _VERSIONS.order_by(VersionModel.id.desc()))
 
 
-def dataset_versions(session: Session, dataset_id: int) -> Sequence[VersionRow]:
+def list_versions_of_dataset(session: Session, dataset_id: int) -> Sequence[VersionRow]:
     """The versions of a dataset, newest first, each with the name of its ``dataset``."""
     statement = _VERSIONS.where(VersionModel.dataset_id == dataset_id)
     return session.rows(VersionRow, statement.order_by(VersionModel.id.desc()))
 
 
-def version_row(session: Session, version_id: int) -> VersionRow | None:
+def find_version_row(session: Session, version_id: int) -> VersionRow | None:
     """One version with the name of its ``dataset``."""
     return session.row(VersionRow, _VERSIONS.where(VersionModel.id == version_id))
 
@@ -270,7 +270,7 @@ def read_page(
     return [_version_group(row) for row in session.execute(statement)]
 
 
-def annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow]:
+def iterate_annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow]:
     """What was said of each group of a version, as its hash and its differences need it."""
     model = VersionGroupModel
     columns = (model.key, model.member, model.why, model.split, model.splits, model.verdict)
@@ -278,7 +278,7 @@ def annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow
     yield from session.rows(AnnotationRow, statement.order_by(model.position))
 
 
-def version_verdicts(
+def iterate_version_verdicts(
     session: Session, version_id: int, *, member: bool
 ) -> Iterator[tuple[str, Json]]:
     """Key and verdict of the groups that are in a version, or of those that are not."""
@@ -292,14 +292,14 @@ def version_verdicts(
         yield key, None if verdict is None else parse(verdict)
 
 
-def version_matches(session: Session, version_id: int) -> set[str]:
+def read_version_matches(session: Session, version_id: int) -> set[str]:
     """The matches that a version has groups of, members or not."""
     model = VersionGroupModel
     statement = select(model.match).where(model.version_id == version_id).distinct()
     return set(session.scalars(statement))
 
 
-def candidate_rows(session: Session, dataset_id: int) -> Sequence[CandidateRow]:
+def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[CandidateRow]:
     """Every group of a dataset as it is judged, with what its newest verdict says."""
     newest = (
         select(VerdictModel.group_id, func.max(VerdictModel.id).label("id"))

@@ -17,7 +17,12 @@ from pydantic import (
 )
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import ACCEPTED, JobDocument, by_job, job_answer
+from app.features.jobs.schemas import (
+    ACCEPTED,
+    JobDocument,
+    make_job_response,
+    openapi_of_job_response,
+)
 from app.features.policies.schemas import PolicyDocument
 from app.features.versions import jobs as version_jobs
 from app.features.versions import service as versions
@@ -26,10 +31,10 @@ from app.features.versions.diff import (
     MembershipChange,
     Setting,
     diff_versions,
-    version_changelog,
+    make_version_changelog,
 )
 from app.features.versions.freeze import MAX_LICENCE, FreezePlan, FreezeRequest, plan_freeze
-from app.features.versions.membership import version_manifest
+from app.features.versions.membership import make_version_manifest
 from app.features.versions.queries import Verification
 from app.features.versions.verify import VersionDifference
 from app.http.cursor import paged
@@ -234,7 +239,7 @@ class VersionDiffDocument(BaseModel):
 router = APIRouter(tags=["versions"], route_class=Route)
 
 
-def called(
+def find_version_id_of_path(
     store: AppStore,
     version: Annotated[
         str, Path(min_length=1, max_length=100, description="Id, name or hash of the version.")
@@ -251,7 +256,7 @@ def called(
     return versions.find_version_id(store, version, dataset)
 
 
-VersionPath = Annotated[int, Depends(called)]
+VersionPath = Annotated[int, Depends(find_version_id_of_path)]
 
 
 @router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
@@ -275,7 +280,7 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def freeze_version(
     dataset: DatasetPath,
     request: VersionRequest,
@@ -314,7 +319,7 @@ def get_version(version: VersionPath, store: AppStore) -> versions.Version:
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_manifest(version: VersionPath, store: AppStore) -> VersionManifest:
     """What a version says of itself: counts, settings, licence, overrides, changelog."""
-    return VersionManifest.model_validate(version_manifest(store, version))
+    return VersionManifest.model_validate(make_version_manifest(store, version))
 
 
 @router.get("/versions/{version}/changelog", operation_id="getChangelog", responses=responses(404))
@@ -322,7 +327,7 @@ def get_manifest(version: VersionPath, store: AppStore) -> VersionManifest:
 def get_changelog(version: VersionPath, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
     found = versions.get_version(store, version)
-    return Changelog(id=found.id, version=found.name, lines=version_changelog(store, version))
+    return Changelog(id=found.id, version=found.name, lines=make_version_changelog(store, version))
 
 
 @router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))
@@ -348,10 +353,10 @@ def get_diff(
 @router.post(
     "/versions/{version}/verify",
     operation_id="verifyVersion",
-    **by_job(404),
+    **openapi_of_job_response(404),
 )
 @may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
-@responds(job_answer)
+@responds(make_job_response)
 def verify_version(version: VersionPath, services: AppServices, actor: Actor) -> Job:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""
     return version_jobs.request_verify(services.jobs, services.store, version, actor=actor)

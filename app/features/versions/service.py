@@ -21,7 +21,7 @@ from app.features.versions.frozen_queries import (
     CALIBRATION,
     FrozenOutline,
     OutlineStation,
-    named_texts,
+    collect_shared_keys,
     read_frozen,
     read_json,
     thaw_group,
@@ -31,10 +31,10 @@ from app.features.versions.queries import Verification as Verification
 from app.features.versions.queries import (
     VersionGroup,
     VersionRow,
-    all_versions,
-    dataset_versions,
+    find_version_row,
+    list_all_versions,
+    list_versions_of_dataset,
     read_verifications,
-    version_row,
 )
 from app.json_text import canonical, quoted
 from app.soccer.codec import policy_from_json
@@ -94,7 +94,7 @@ def list_versions(store: Store, dataset: str | int) -> list[Version]:
     """The versions of a dataset, newest first."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return _versions_from_rows(session, dataset_versions(session, found.id))
+        return _versions_from_rows(session, list_versions_of_dataset(session, found.id))
 
 
 def get_version(store: Store, version_id: int) -> Version:
@@ -145,7 +145,7 @@ def find_version_id(store: Store, version: str, dataset: str | None = None) -> i
     if dataset is not None:
         return find_version(store, dataset, version).id
     with store.read() as session:
-        found = _versions_from_rows(session, all_versions(session))
+        found = _versions_from_rows(session, list_all_versions(session))
     fitting: list[Version] = find_versions(found, version)
     if not fitting:
         raise NotFoundError(f"there is no version {quoted(version)}")
@@ -159,7 +159,7 @@ def find_version_id(store: Store, version: str, dataset: str | None = None) -> i
     return fitting[0].id
 
 
-def newest_version(store: Store, dataset: str | int) -> Version:
+def get_newest_version(store: Store, dataset: str | int) -> Version:
     """The version of a dataset that was frozen last.
 
     Raises:
@@ -171,17 +171,17 @@ def newest_version(store: Store, dataset: str | int) -> Version:
     return found[0]
 
 
-def next_name(session: Session, dataset_id: int) -> str:
+def find_next_version_name(session: Session, dataset_id: int) -> str:
     """The next of v1, v2, ... that no version has, and that no waiting freeze was asked to give."""
     jobs = read_jobs(session, dataset_id=dataset_id, kinds=(FREEZE,), states=OPEN)
-    names = {row.name for row in dataset_versions(session, dataset_id)}
+    names = {row.name for row in list_versions_of_dataset(session, dataset_id)}
     names |= {job.request["name"] for job in jobs}
     return next(name for number in count(1) if (name := f"v{number}") not in names)
 
 
 def read_version(session: Session, version_id: int) -> Version:
     """``get_version`` within a session."""
-    row = version_row(session, version_id)
+    row = find_version_row(session, version_id)
     if row is None:
         raise NotFoundError(f"there is no version {version_id}")
     return _versions_from_rows(session, [row])[0]
@@ -198,7 +198,7 @@ def read_frozen_groups(
     """
     bodies = _read_contents(session, version, {row.solution or "" for row in rows})
     solved = [read_json(bodies[row.solution or ""]) for row in rows]
-    names = {name for value in solved for name in calibration_names(value)}
+    names = {name for value in solved for name in collect_calibration_keys(value)}
     more = _read_contents(session, version, names)
     calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
     groups = thaw_groups(session, version, rows)
@@ -216,7 +216,7 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
     """
     bodies = _read_contents(session, version, {row.said or "" for row in rows})
     annotations = [read_json(bodies[row.said or ""]) for row in rows]
-    shared = {key for value in annotations for key in named_texts(value)}
+    shared = {key for value in annotations for key in collect_shared_keys(value)}
     more = _read_contents(session, version, shared)
     texts = {key: read_json(more[key]) for key in shared}
     return [
@@ -248,7 +248,7 @@ def _read_contents(session: Session, version: Version, keys: set[str]) -> Mappin
     return found
 
 
-def calibration_names(solved: Json) -> set[str]:
+def collect_calibration_keys(solved: Json) -> set[str]:
     """Keys of the frozen calibrations that a frozen solution names."""
     return {CALIBRATION + view["calibration_key"] for view in solved["views"]}
 
@@ -286,7 +286,7 @@ HASH_FORMAT = 1
 """Of what the hash covers; part of it."""
 
 
-def version_hash(
+def hash_version(
     policy: Policy,
     solver_version: str,
     rows: Iterable[Mapping[str, Any]],

@@ -18,8 +18,8 @@ from app.features.solutions.queries import decode_calibration, encode_calibratio
 from app.features.tracks.codec import TRACK_VERSION, track_again
 from app.features.versions.frozen_queries import (
     CALIBRATION,
-    fitting_key,
-    named_texts,
+    collect_shared_keys,
+    compute_content_key,
     read_frozen,
     read_json,
     read_text,
@@ -27,12 +27,17 @@ from app.features.versions.frozen_queries import (
 )
 from app.features.versions.queries import (
     VersionGroup,
-    annotation_rows,
+    iterate_annotation_rows,
     keep_verification,
     read_page,
-    version_matches,
+    read_version_matches,
 )
-from app.features.versions.service import Version, calibration_names, read_version, version_hash
+from app.features.versions.service import (
+    Version,
+    collect_calibration_keys,
+    hash_version,
+    read_version,
+)
 from app.json_text import canonical, digest_of
 from app.progress import ReportProgress
 from app.soccer.group import Group
@@ -151,7 +156,7 @@ class VerifyTask:
     splitter: Splitter
 
 
-def verify(
+def verify_version(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
@@ -178,7 +183,7 @@ def verify(
         )
         report.add(list(_version_differences(session, version)))
         frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
-        matches = version_matches(session, version.id)
+        matches = read_version_matches(session, version.id)
     done = 0
     for results in fan_out(verify_task, _VerifyTasks(store, version, matches), executor):
         for found in results:
@@ -202,15 +207,15 @@ def verify_and_keep(
     *,
     actor: str,
 ) -> VerifyReport:
-    """``verify``, with what comes of it kept with the version.
+    """``verify_version``, with what comes of it kept with the version.
 
-    Raises what ``verify`` raises; a failure is kept as such, a cancelled run leaves what was
+    Raises what ``verify_version`` raises; a failure is kept as such, a cancelled run leaves what was
     kept before.
     """
     with store.read() as session:
         read_version(session, version_id)
     try:
-        report = verify(store, version_id, executor, progress)
+        report = verify_version(store, version_id, executor, progress)
     except JobCancelled:
         raise
     except Exception as error:
@@ -237,9 +242,10 @@ def _version_differences(session: Session, version: Version) -> Iterator[Version
     """What of the version's own row does not follow from its groups."""
     names = ("key", "member", "split", "splits", "verdict", "said")
     rows = (
-        {name: getattr(row, name) for name in names} for row in annotation_rows(session, version.id)
+        {name: getattr(row, name) for name in names}
+        for row in iterate_annotation_rows(session, version.id)
     )
-    found = version_hash(version.policy, version.solver_version, rows, version.tracks)
+    found = hash_version(version.policy, version.solver_version, rows, version.tracks)
     if found != version.hash:
         yield VersionDifference(None, "hash", version.hash, found)
 
@@ -247,8 +253,8 @@ def _version_differences(session: Session, version: Version) -> Iterator[Version
 def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | None) -> None:
     """Compute a track anew from its frozen inputs, and report what is not as it was frozen."""
     place = f"track {stretch}"
-    if body is None or fitting_key(key, body) != key:
-        found = None if body is None else fitting_key(key, body)
+    if body is None or compute_content_key(key, body) != key:
+        found = None if body is None else compute_content_key(key, body)
         report.add([VersionDifference(None, place, key, found)])
         return
     value = read_json(body)
@@ -339,9 +345,9 @@ def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
     """Keys that the annotations and the solution of a group name, as far as those are there."""
     names: set[str] = set()
     if row.said is not None and row.said in frozen:
-        names |= named_texts(read_json(frozen[row.said]))
+        names |= collect_shared_keys(read_json(frozen[row.said]))
     if row.solution is not None and row.solution in frozen:
-        names |= calibration_names(read_json(frozen[row.solution]))
+        names |= collect_calibration_keys(read_json(frozen[row.solution]))
     return names
 
 
@@ -352,7 +358,7 @@ def _missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
 
 
 def _named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
-    return {key: read_json(frozen[key]) for key in named_texts(annotations)}
+    return {key: read_json(frozen[key]) for key in collect_shared_keys(annotations)}
 
 
 def _group_differences(
@@ -376,8 +382,8 @@ def _group_differences(
 def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
     """Parts that are not what their key says."""
     annotations, solution = row.said or "", row.solution or ""
-    for key in (annotations, *named_texts(read_json(task.frozen[annotations])), solution):
-        found = fitting_key(key, task.frozen[key])
+    for key in (annotations, *collect_shared_keys(read_json(task.frozen[annotations])), solution):
+        found = compute_content_key(key, task.frozen[key])
         if found != key:
             yield VersionDifference(row.key, "digest", key, found)
 

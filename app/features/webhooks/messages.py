@@ -97,7 +97,7 @@ def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]
     ]
 
 
-def ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
+def make_ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
     """A message that says nothing."""
     stamp = "".join(letter for letter in at if letter.isdigit())
     body = _message_body(Kind.PING, at, {"dataset": dataset, "actor": actor})
@@ -149,12 +149,12 @@ def _message_body(kind: Kind, at: str, data: Json) -> str:
     return canonical({"type": str(kind), "timestamp": at, "data": data})
 
 
-def new_salt() -> str:
+def make_salt() -> str:
     """What makes a secret another one."""
     return secrets.token_hex(16)
 
 
-def webhook_secret(settings: Settings, salt: str) -> str:
+def derive_webhook_secret(settings: Settings, salt: str) -> str:
     """The secret of a webhook, as the specification writes it (``whsec_``).
 
     Raises:

@@ -21,7 +21,12 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalled_batches
 from app.features.datasets.queries import read_dataset_names
-from app.features.webhooks.messages import Message, read_messages, sign_message, webhook_secret
+from app.features.webhooks.messages import (
+    Message,
+    derive_webhook_secret,
+    read_messages,
+    sign_message,
+)
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
@@ -306,7 +311,7 @@ class WebhookSender:
         settings = self._store.settings
         require_allowed(row.url, settings.webhooks)
         headers = sign_message(
-            webhook_secret(settings, row.salt), row.message, self._clock(), row.body
+            derive_webhook_secret(settings, row.salt), row.message, self._clock(), row.body
         )
         headers["Content-Type"] = "application/json"
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:

@@ -17,9 +17,9 @@ from app.features.datasets.service import dataset_id
 from app.features.webhooks.messages import (
     CHOSEN,
     Kind,
-    new_salt,
-    ping_message,
-    webhook_secret,
+    derive_webhook_secret,
+    make_ping_message,
+    make_salt,
 )
 from app.features.webhooks.queries import (
     DELIVERED,
@@ -108,8 +108,8 @@ def make_webhook(
         ConflictError: The operator allows none, or the dataset has as many as it may.
     """
     require_allowed(url, store.settings.webhooks, "/url")
-    number, salt = dataset_id(store, dataset), new_salt()
-    secret = webhook_secret(store.settings, salt)
+    number, salt = dataset_id(store, dataset), make_salt()
+    secret = derive_webhook_secret(store.settings, salt)
     with store.write() as session:
         if len(read_webhooks(session, number)) >= MOST:
             raise ConflictError(
@@ -160,8 +160,8 @@ def change_webhook(
 
 def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
     """Another secret in place of the one that was; what is sent from now on is signed with it."""
-    number, salt = dataset_id(store, dataset), new_salt()
-    secret = webhook_secret(store.settings, salt)
+    number, salt = dataset_id(store, dataset), make_salt()
+    secret = derive_webhook_secret(store.settings, salt)
     with store.write() as session:
         found = _read_webhook(session, number, webhook_id)
         update_webhook(session, webhook_id, {"salt": salt})
@@ -210,7 +210,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
             return _delivery_from_row(find_delivery(session, webhook_id, waiting.id))
-        message = ping_message(webhook_id, read_dataset_name(session, number), now(), actor)
+        message = make_ping_message(webhook_id, read_dataset_name(session, number), now(), actor)
         insert_delivery(session, webhook_id, message.id, message.kind, message.body)
         return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
 

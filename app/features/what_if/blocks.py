@@ -23,7 +23,7 @@ from app.features.groups.revision_queries import (
     list_changed_groups,
     list_groups_after,
 )
-from app.features.solutions.queries import StoredFacts, read_calibrations, solution_facts
+from app.features.solutions.queries import StoredFacts, read_calibrations, read_solution_facts
 from app.features.what_if.cache import (
     CachedBlock,
     CachedTable,
@@ -60,7 +60,7 @@ def read_tables(session: Session, rows: Sequence[Any]) -> tuple[YieldTable, Yiel
 
 def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, bytes]:
     """Facts of solutions, by group."""
-    rows = solution_facts(session, solution_ids)
+    rows = read_solution_facts(session, solution_ids)
     found = {row.group_id: row.facts for row in rows if row.facts is not None}
     bare = [row for row in rows if row.facts is None]
     found.update((group, facts_to_bytes(facts)) for group, facts in _recompute_facts(session, bare))

@@ -25,9 +25,9 @@ from app.features.groups.revision_queries import (
     find_newest_change_id,
     list_changed_group_ids,
 )
-from app.features.queue.queries import columns_from, read_columns
+from app.features.queue.queries import read_columns, read_columns_after
 from app.features.queue.statistics import COLUMNS, Counted, Statistics, count_rows, make_statistics
-from app.features.verdicts.queries import judged_since, newest_verdict
+from app.features.verdicts.queries import find_newest_verdict_id, list_groups_judged_since
 from app.features.what_if.cache import map_arrays, write_arrays
 from app.features.what_if.service import AT_ONCE, read_policy
 from app.geometry.arrays import IntArray
@@ -143,7 +143,7 @@ def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _Datase
 
 def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
     after = 0
-    while rows := columns_from(session, dataset_id, ("group_id", *COLUMNS), after, BATCH):
+    while rows := read_columns_after(session, dataset_id, ("group_id", *COLUMNS), after, BATCH):
         yield rows
         after = rows[-1].group_id
 
@@ -152,7 +152,7 @@ def _current_marks(session: Session) -> dict[str, Any]:
     number = newest_entry(session)
     return {
         "change": find_newest_change_id(session),
-        "verdict": newest_verdict(session),
+        "verdict": find_newest_verdict_id(session),
         "entry": (number, entry_hash(session, number) or ""),
     }
 
@@ -160,7 +160,7 @@ def _current_marks(session: Session) -> dict[str, Any]:
 def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
     """What has changed, read again; groups that are gone show in the number of those left."""
     changed = set(list_changed_group_ids(session, dataset_id, kept.change))
-    ids = sorted(changed | set(judged_since(session, dataset_id, kept.verdict)))
+    ids = sorted(changed | set(list_groups_judged_since(session, dataset_id, kept.verdict)))
     moment = _current_marks(session)
     if not ids:
         return replace(kept, **moment)

@@ -9,7 +9,7 @@ from app.db.store import Store
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, make_batch
 from app.features.independent_annotations.service import begin_annotation, submit_annotation
-from app.features.people.queries import person_by_name, update_person
+from app.features.people.queries import find_person_by_name, update_person
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.http.deps import Services
@@ -251,7 +251,7 @@ def hand_in_taken_back(api: Any) -> Request:
     made = make_batch(store, "broadcast", NewBatch("Once", annotators=["ann"]), actor="local")
     with store.write() as session:
         # Whoever asks a server without accounts is an annotator of this batch.
-        update_person(session, person_by_name(session, "ann").id, name="local")
+        update_person(session, find_person_by_name(session, "ann").id, name="local")
     Leases(store).submit(made.id, 1, BatchMember("local"), actor="local")
     return "DELETE", f"/batches/{made.id}/groups/1/submission", None, {}
 

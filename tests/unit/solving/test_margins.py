@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.features.solutions.codec import summarize
+from app.features.solutions.codec import summarize_solution
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, group, view
@@ -56,7 +56,7 @@ def test_the_gate_that_fails_misses_its_threshold_by_a_negative_share(clean, cha
     failing = solution.first_failing
     assert failing is not None and failing.name == name
     assert failing.margin is not None and failing.margin < 0
-    assert summarize(clean, solution).margin == failing.margin
+    assert summarize_solution(clean, solution).margin == failing.margin
 
 
 def test_a_threshold_of_zero_leaves_no_share_and_judges_as_before(clean):
@@ -71,5 +71,5 @@ def test_the_margin_of_a_group_that_passes_is_the_smallest_share(clean):
     solution = solve(clean, ASKED)
     judged = ("jac", "baseline", "reprojection", "parallax", "sigma")
     smallest = min(gate(solution, name).margin for name in judged)
-    found = summarize(clean, solution)
+    found = summarize_solution(clean, solution)
     assert found.margin == found.value == smallest

@@ -24,12 +24,12 @@ from app.errors import InputError, UnsafePathError
 from app.features.batches.service import get_batch
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.queries import delete_gold, insert_gold
-from app.features.people.access_tokens import new_token_text
+from app.features.people.access_tokens import make_access_token_text
 from app.features.people.logins import Login
 from app.features.people.roles import DatasetRoles, Role, Scope
 from app.features.people.service import invite
 from app.features.policies.service import policy_to_yaml
-from app.features.predictions.evaluation import evaluation_values, get_evaluation
+from app.features.predictions.evaluation import evaluation_to_values, get_evaluation
 from app.features.predictions.service import list_predictions
 from app.features.solutions.service import solve_dataset
 from app.features.solve.jobs import solve_fully
@@ -193,7 +193,7 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
     Path("found.csv").write_text(f"image,x,y,w,h,score\n{frame},600,300,9,9,0.5\n")
     measure = ("evaluate", "found.csv", "--dataset", "small", "--groups", "all", "--json")
     there = told(remote(*measure, "--out", "measured"))
-    here = evaluation_values(get_evaluation(place.store, there["id"]))
+    here = evaluation_to_values(get_evaluation(place.store, there["id"]))
     assert {name: there[name] for name in here} == json.loads(json_text(here))
     assert set(there) == {*here, "sets"}
     assert {"evaluation.json", "detection.csv", "frames.jsonl"} <= {
@@ -381,7 +381,7 @@ class TestRefusals:
     def test_a_token_that_is_not_valid_is_told_so_once(self, place: Place, tmp_path: Path) -> None:
         path = tmp_path / "token"
         path.touch(0o600)
-        path.write_text(new_token_text())
+        path.write_text(make_access_token_text())
         for content, sentence in (
             (None, "is unknown, expired or ended"),
             ("tl_x", "does not contain a complete token"),
@@ -397,7 +397,7 @@ class TestRefusals:
         self, place: Place, tmp_path: Path, mode: int
     ) -> None:
         path = tmp_path / "token"
-        path.write_text(new_token_text())
+        path.write_text(make_access_token_text())
         path.chmod(mode)
         with (
             pytest.raises(InputError, match="other users can read"),

@@ -15,7 +15,7 @@ from app.features.batches.service import Batch, NewBatch, change_batch, get_batc
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.notifications.queries import select_notifications
-from app.features.people.queries import person_by_name
+from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.people.visibility_queries import EVERYTHING
@@ -83,6 +83,6 @@ def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
     change_batch(store, batch.id, actor="lead", annotators=("ada", "bo", "cy"))
     for name in ("ada", "bo", "cy"):
         with store.read() as session:
-            person = person_by_name(session, name)
+            person = find_person_by_name(session, name)
             rings = select_notifications(session, person.id, EVERYTHING, "", 10, None)
         assert [ring.kind for ring in rings] == ["assigned"], name

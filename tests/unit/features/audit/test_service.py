@@ -28,7 +28,7 @@ from app.features.groups.submit import load, submit, submit_edits
 from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
 from app.features.jobs.service import Jobs
-from app.features.people.links import use_link
+from app.features.people.links import set_password_by_link
 from app.features.people.logins import Logins
 from app.features.people.roles import DatasetRoles, Role
 from app.features.people.service import find_person, give_role, invite
@@ -37,7 +37,7 @@ from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import list_reviewers, set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.queries import all_versions
+from app.features.versions.queries import list_all_versions
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
 
@@ -49,7 +49,7 @@ def said(store: Store, fill, make_group) -> int:
     """A group of which anna and a token of hers have said something, and bob was let in."""
     (group,) = fill(make_group())
     bob, link = invite(store, "bob", Role.NONE, actor="anna")
-    use_link(store, link.token, "three plain words")
+    set_password_by_link(store, link.token, "three plain words")
     Logins(store).log_in("bob", "three plain words", address="192.0.2.7")
     give_role(store, "demo", bob.id, Role.LEAD, actor="anna")
     begin_thread(store, group, "Behind the post?", actor="anna (token lens)")
@@ -204,7 +204,7 @@ def shown(store: Store) -> tuple[str, str | None, list[str]]:
 def made_by(store: Store) -> list[str]:
     """Who froze the version and made the jobs, the oldest first."""
     with store.read() as session:
-        (version,) = all_versions(session)
+        (version,) = list_all_versions(session)
         jobs = read_jobs(session)
     return [version.actor, *(job.actor for job in reversed(jobs))]
 

@@ -31,7 +31,7 @@ from app.features.groups.submit import load
 from app.features.independent_annotations.gold import mark_gold_group, unmark_gold_group
 from app.features.independent_annotations.queries import INDEPENDENT, find_annotation_of_copy_row
 from app.features.notifications.queries import select_notifications
-from app.features.people.queries import person_by_name
+from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.people.visibility_queries import EVERYTHING
@@ -163,7 +163,7 @@ class TestGoldGroups:
         make_batch(store, dataset, new, actor="lead")
         with store.read() as session:
             (ring,) = select_notifications(
-                session, person_by_name(session, "ada").id, EVERYTHING, "", 9
+                session, find_person_by_name(session, "ada").id, EVERYTHING, "", 9
             )
         assert said in ring.sentence
 
@@ -297,7 +297,7 @@ class TestLeases:
         assert said == [(groups[3], "bo", "the far goal line")]
         assert list_own_batches(store, lambda _: dan)[0].returned == []
         with store.read() as session:
-            person = person_by_name(session, "ada")
+            person = find_person_by_name(session, "ada")
             rings = select_notifications(session, person.id, EVERYTHING, "", 9)
         assert rings[0].sentence.endswith(" to you: the far goal line")
         told = read_audit(store, AuditQuery(), EVERYTHING).items[0]

@@ -13,9 +13,9 @@ from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import read_etags
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify, read_all, read_notifications
+from app.features.notifications.service import notify_person, read_all, read_notifications
 from app.features.people.logins import Login, read_roles
-from app.features.people.queries import person_by_name
+from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import change_person, give_role, invite
 from app.features.queue.changes import read_changes
@@ -36,7 +36,7 @@ def login(store: Store, name: str) -> Login:
     from datetime import UTC, datetime
 
     with store.read() as session:
-        row = person_by_name(session, name)
+        row = find_person_by_name(session, name)
         roles = read_roles(session, row.id, Role(row.role))
     return Login(1, row.id, name, roles, datetime.now(UTC))
 
@@ -167,7 +167,7 @@ class TestMentions:
         assert thread.comments[0].mentions == ("anna", "bob")
         assert [told(store, name) for name in ("anna", "bob", "carl")] == [[], ["mention"], []]
         with store.read() as session:
-            carl = person_by_name(session, "carl").id
+            carl = find_person_by_name(session, "carl").id
         give_role(store, "demo", carl, Role.VIEWER, actor="local")
         assert comments.list_mentionable_people(store, group) == ["anna", "bob", "carl"]
         assert told(store, "carl") == []
@@ -188,7 +188,7 @@ class TestMentions:
 
     def test_who_is_disabled_is_not_mentioned(self, store: Store, group: int) -> None:
         with store.read() as session:
-            bob = person_by_name(session, "bob").id
+            bob = find_person_by_name(session, "bob").id
         change_person(store, bob, actor="local", disabled=True)
         thread = comments.begin_thread(store, group, "@bob look", actor="anna")
         assert thread.comments[0].mentions == ()
@@ -245,7 +245,9 @@ class TestBell:
         change_person(store, bob, actor="local", disabled=True)
 
         def ring(session: Session, person: str, actor: str) -> bool:
-            return notify(session, person, NotificationKind.ASSIGNED, "x", actor=actor, address="/")
+            return notify_person(
+                session, person, NotificationKind.ASSIGNED, "x", actor=actor, address="/"
+            )
 
         with store.write() as session:
             assert not ring(session, "bob", "local")

@@ -11,7 +11,7 @@ from app.features.audit.service import assign_local_work
 from app.features.comments import service as comments
 from app.features.comments.service import examine_threads
 from app.features.datasets.service import delete_dataset
-from app.features.people.queries import person_by_name
+from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from tests.databases import said_for_sqlite
@@ -52,7 +52,7 @@ class TestExamineThreads:
 
     def test_a_name_that_is_shown_in_the_place_of_another_is_none(self, store: Store) -> None:
         with store.read() as session:
-            anna = person_by_name(session, "anna").id
+            anna = find_person_by_name(session, "anna").id
         assign_local_work(store, anna, actor="local")
         assert examine_threads(store).ok
 

@@ -9,7 +9,7 @@ from app.features.datasets.service import get_dataset, get_dataset_head, list_da
 from app.features.groups.submit import load
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import PAPER, STRICT
 
 
@@ -63,7 +63,7 @@ class TestSavePolicy:
         now = load(store, state.id)
         assert now.solution is None
         assert now.etag != state.etag
-        assert stale_groups(store, "demo") == [state.id]
+        assert list_stale_groups(store, "demo") == [state.id]
 
     def test_calibrates_nothing_anew(self, store, state, monkeypatch) -> None:
         def refuse(*_):

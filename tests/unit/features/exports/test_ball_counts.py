@@ -15,7 +15,7 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.groups.submit import load
-from app.features.predictions.frames import live_truth, version_truth
+from app.features.predictions.frames import read_live_truth, read_version_truth
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
 from app.formats.parquet import import_pyarrow
@@ -151,8 +151,8 @@ class TestCounts:
         with mixed.read() as session:
             version = find_version(mixed, dataset.id, "v1")
             truths = [
-                version_truth(session, version, None).frames,
-                live_truth(session, dataset, "passing", None).frames,
+                read_version_truth(session, version, None).frames,
+                read_live_truth(session, dataset, "passing", None).frames,
             ]
         for frames in truths:
             for kind in ("optimized", "exact"):

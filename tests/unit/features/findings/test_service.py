@@ -22,13 +22,13 @@ from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.queue.refresh_queries import differing_rows
+from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.membership import version_manifest
-from app.features.versions.verify import verify
+from app.features.versions.membership import make_version_manifest
+from app.features.versions.verify import verify_version
 from app.soccer.annotation import BallAnnotation
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.frames import Box
@@ -136,7 +136,7 @@ class TestSetDismissal:
         assert rebuild_tables(store) == 1
         assert list_groups(store, found.dataset_id, "finding:none dismissed:any").total == 1
         with store.read() as session:
-            assert differing_rows(session)[1] == []
+            assert find_outdated_rows(session)[1] == []
 
     def test_an_edit_that_changes_what_it_says_opens_it_again(self, store, found) -> None:
         after = all_of(store, found)
@@ -149,7 +149,7 @@ class TestSetDismissal:
         (row,) = list_groups(store, found.dataset_id, "finding:any").items
         assert row.findings
         with store.read() as session:
-            assert differing_rows(session)[1] == []
+            assert find_outdated_rows(session)[1] == []
 
     def test_who_saw_another_state_is_refused(self, store, found) -> None:
         dismiss(store, found, first(found))
@@ -208,7 +208,7 @@ class TestVersions:
         state = dismiss(store, state, first(state), dismissed=False)
         again = freeze_dataset(store, "demo", FreezeRequest("v3"), actor="ann")
         assert again.hash == plain.hash != checked.hash
-        assert verify(store, checked.id).ok
-        (told,) = version_manifest(store, checked.id)["frozen"]["dismissed"]
+        assert verify_version(store, checked.id).ok
+        (told,) = make_version_manifest(store, checked.id)["frozen"]["dismissed"]
         assert (told["kind"], told["note"]) == (first(state).kind, "fine")
         assert "ann" not in str(told)

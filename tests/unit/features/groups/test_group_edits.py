@@ -8,7 +8,7 @@ from app.features.groups.edit import SetPitch
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.submit import load
-from app.features.solutions.service import stale_groups
+from app.features.solutions.service import list_stale_groups
 
 WIDE, USUAL = SetPitch(105.0, 70.0), SetPitch(105.0, 68.0)
 
@@ -32,7 +32,7 @@ class TestGiveEdits:
         monkeypatch.setattr(group_edits, "_BATCH", batch)
         found = give(store, ids, lambda some: dict.fromkeys(some, WIDE), body={"why": "measured"})
         assert found == 3
-        assert sorted(stale_groups(store, "demo")) == sorted(ids)
+        assert sorted(list_stale_groups(store, "demo")) == sorted(ids)
         for number in ids:
             state = load(store, number)
             assert state.group.pitch.width == 70.0

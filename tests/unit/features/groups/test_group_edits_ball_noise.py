@@ -23,11 +23,11 @@ from app.features.match_estimates.queries import (
     NOISE,
     Factor,
     factors_to_json,
-    noise_factor,
+    find_noise_factor,
     read_factors,
 )
 from app.features.queue.service import list_groups
-from app.features.solutions.service import stale_groups
+from app.features.solutions.service import list_stale_groups
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -75,7 +75,7 @@ class TestGiveFactors:
         keys = [view.key for view in before.group.views if view.station.key == "cam2"]
         assert give(store, *FACTORS) == 1
         assert noise(store, static) == dict.fromkeys(keys, 2.0)
-        assert stale_groups(store, 1) and load(store, static).etag != before.etag
+        assert list_stale_groups(store, 1) and load(store, static).etag != before.etag
         after = solve_and_keep(store, static).solution
         assert after is not None and after.ball is not None and before.solution is not None
         assert after.ball.point == before.solution.ball.point
@@ -117,7 +117,7 @@ class TestGiveFactors:
         give(store, *FACTORS)
         camera = load(store, static).group.view(key)
         assert camera is not None
-        assert noise(store, static)[key] == noise_factor(FACTORS, camera.station.key, "ann")
+        assert noise(store, static)[key] == find_noise_factor(FACTORS, camera.station.key, "ann")
         place(store, static, "ann", replace(BALL, predicted_by="yolo"))
         with store.read() as session:
             assert read_last_ball_actors(session, [static]) == {static: {}}
@@ -186,7 +186,7 @@ class TestWithNoise:
         key = place(store, static, "ann")
         own = load(store, static).group.view(key)
         assert own is not None
-        wanted = noise_factor(FACTORS, own.station.key, "ann")
+        wanted = find_noise_factor(FACTORS, own.station.key, "ann")
         assert own.noise == wanted != given.get(key, 1.0)
         undo_group_edit(store, static, if_match=load(store, static).etag, actor="ann")
         assert noise(store, static) == given
@@ -210,8 +210,8 @@ class TestWithNoise:
 class TestFactorOf:
     def test_cameras_and_people_that_are_not_named_are_any_other(self) -> None:
         asked = [("cam2", "ann"), ("cam2", "eve"), ("cam9", "ann"), ("cam9", None), (None, None)]
-        assert [noise_factor(FACTORS, *at) for at in asked] == [4.0, 2.0, 1.5, 1.0, 1.0]
-        assert noise_factor((), "cam2", "ann") == 1.0
+        assert [find_noise_factor(FACTORS, *at) for at in asked] == [4.0, 2.0, 1.5, 1.0, 1.0]
+        assert find_noise_factor((), "cam2", "ann") == 1.0
 
 
 class TestReadPlaced:

@@ -22,7 +22,7 @@ from app.features.verdicts.bulk import give_verdicts
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import freeze_annotations
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, make_lines
@@ -139,7 +139,7 @@ class TestVersions:
         change(store, IncludeView("7_1.png", False))
         plain = freeze_dataset(store, "demo", FreezeRequest("v2", groups="passing"), actor="ann")
         assert version.hash != plain.hash
-        assert verify(store, version.id).ok and verify(store, plain.id).ok
+        assert verify_version(store, version.id).ok and verify_version(store, plain.id).ok
 
 
 class TestImport:

@@ -6,7 +6,7 @@ from app.features.groups.revision_queries import (
     iterate_changes_after_entry,
     list_groups_solved_after,
 )
-from app.features.solutions.queries import newest_solution
+from app.features.solutions.queries import find_newest_solution_id
 
 
 class TestLoggedChanges:
@@ -29,4 +29,7 @@ class TestLoggedChanges:
 class TestSolvedGroups:
     def test_nothing_is_solved_where_nothing_was(self, filled) -> None:
         with filled.read() as session:
-            assert (newest_solution(session), list_groups_solved_after(session, 0)) == (0, [])
+            assert (find_newest_solution_id(session), list_groups_solved_after(session, 0)) == (
+                0,
+                [],
+            )

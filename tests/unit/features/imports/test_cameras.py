@@ -16,7 +16,7 @@ from app.features.groups.submit import load, submit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import import_groups
 from app.features.imports.sources import ImportSource, import_source
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.stations.service import load_station, submit_station
 from app.formats.camera_json import covariance_to_json
 from app.formats.cameras import camera_file_text
@@ -53,7 +53,7 @@ class TestIngestCameras:
         ids = fill(make_static(10), make_static(11))
         assert attach(store, {"cam1": opposite}).changed == 1
         assert load(store, ids[1]).group.view("cam1").station.given == opposite
-        assert stale_groups(store, "demo") == ids
+        assert list_stale_groups(store, "demo") == ids
 
     def test_what_was_known_of_the_camera_before_is_not_known_of_the_new_one(
         self, store, fill, make_static, opposite

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from app.features.jobs.runner import ending_sentence
+from app.features.jobs.runner import describe_result
 from app.features.jobs.schemas import JobKind
 
 SOLVED = {"groups": 60, "solved": 60, "passed": 52, "failed": 0, "failures": []}
@@ -141,7 +141,7 @@ RESULTS = [
 class TestEnding:
     @pytest.mark.parametrize(("kind", "result", "told"), RESULTS)
     def test_every_kind_tells_its_result(self, kind: str, result: object, told: str) -> None:
-        assert ending_sentence(kind, result) == told
+        assert describe_result(kind, result) == told
 
     def test_no_kind_is_forgotten(self) -> None:
         # Nothing asks for the kind "detect" any more; its jobs are listed.
@@ -152,6 +152,6 @@ class TestEnding:
         assert not re.match(r"(?!Nothing)[A-Z]\w+ing\b", told)
 
     def test_a_result_of_another_shape_says_nothing(self) -> None:
-        assert ending_sentence("bulk", "whatever") is None
-        assert ending_sentence("solve", {}) is None
-        assert ending_sentence("unknown", {}) is None
+        assert describe_result("bulk", "whatever") is None
+        assert describe_result("solve", {}) is None
+        assert describe_result("unknown", {}) is None

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.config import Settings
-from app.features.maintenance.service import exposure_warning
+from app.features.maintenance.service import find_exposure_warning
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ from app.features.maintenance.service import exposure_warning
     ],
 )
 def test_what_strangers_cannot_reach_or_read_is_safe(safe: dict[str, Any]) -> None:
-    assert exposure_warning(Settings(**safe)) is None
+    assert find_exposure_warning(Settings(**safe)) is None
 
 
 @pytest.mark.parametrize(
@@ -37,4 +37,4 @@ def test_what_strangers_cannot_reach_or_read_is_safe(safe: dict[str, Any]) -> No
     ],
 )
 def test_what_strangers_could_reach_or_read_is_said(unsafe: dict[str, Any], says: str) -> None:
-    assert says in (exposure_warning(Settings(**unsafe)) or "")
+    assert says in (find_exposure_warning(Settings(**unsafe)) or "")

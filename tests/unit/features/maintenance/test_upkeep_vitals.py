@@ -16,7 +16,7 @@ from app.features.datasets.service import get_dataset
 from app.features.datasets.tables import GroupModel
 from app.features.jobs.service import Jobs
 from app.features.maintenance import upkeep as vitals
-from app.features.maintenance.upkeep import file_sizes, read_home
+from app.features.maintenance.upkeep import read_database_file_sizes, read_home
 from app.features.policies.service import change_policy
 from app.features.queue.tables import QueueModel
 from app.features.solve.jobs import request_solve
@@ -68,9 +68,9 @@ def test_groups_that_an_earlier_solver_solved_wait(
 
 def test_files_are_those_of_the_database_wherever_it_lies(tmp_path: Path) -> None:
     settings = Settings(home=tmp_path, database_url=f"sqlite:///{tmp_path}/elsewhere.db")
-    assert file_sizes(settings) == {}
+    assert read_database_file_sizes(settings) == {}
     settings.database_file.write_bytes(b"123")
-    assert file_sizes(settings) == {"database": 3}
+    assert read_database_file_sizes(settings) == {"database": 3}
 
 
 def test_nothing_waits_once_all_is_solved(store: Store, fill, make_group) -> None:

@@ -18,7 +18,7 @@ from app.features.jobs.service import Jobs
 from app.features.match_estimates import jobs as pictures_job
 from app.features.match_estimates.jobs import PICTURES
 from app.features.match_estimates.pictures import change_pictures, read_pictures
-from app.features.solutions.service import stale_groups
+from app.features.solutions.service import list_stale_groups
 from app.features.solve.jobs import change_and_solve
 from app.progress import ReportProgress
 from app.soccer.group import Group, Station, View
@@ -129,7 +129,7 @@ def test_a_picture_that_is_said_is_solved_and_no_longer_proposed(jobs: Jobs, two
         job = say(jobs, two, {WIDE: picture})
     assert (finished(jobs, job).kind, [one.id for one in kept]) == ("solve", [job.id])
     assert aspects(two) == {WIDE: picture.aspect, PLAIN: None}
-    assert stale_groups(two, "demo") == []
+    assert list_stale_groups(two, "demo") == []
     item = items(jobs, two, WIDE)[WIDE]
     assert item["proposed"] is None and item["estimate"]["aspect"] == picture.aspect
 

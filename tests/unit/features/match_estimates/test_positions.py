@@ -22,9 +22,9 @@ from app.features.match_estimates.positions import (
 )
 from app.features.pitches.service import change_pitches
 from app.features.policies.service import change_policy
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
@@ -136,7 +136,7 @@ class TestSharePositions:
     def test_an_edit_solves_its_group_at_once_and_no_other(self, shared):
         draw(shared, 1)
         assert load(shared, 1).solution is not None
-        assert stale_groups(shared, "demo") == []
+        assert list_stale_groups(shared, "demo") == []
         assert state(shared).current is False
         assert "the data that it was estimated from has changed" in state(shared).sentence
         assert "share it again" in state(shared).sentence
@@ -145,7 +145,7 @@ class TestSharePositions:
         draw(shared, 1)
         share_positions(shared, "demo", actor="ben")
         assert state(shared).current is True
-        assert {2, 3, 4, 5, 6} <= set(stale_groups(shared, "demo"))
+        assert {2, 3, 4, 5, 6} <= set(list_stale_groups(shared, "demo"))
 
     def test_what_is_current_is_left_alone(self, shared):
         share_positions(shared, "demo", actor="ann")
@@ -262,7 +262,7 @@ class TestSharePositions:
             shared, "demo", FreezeRequest("one", groups="passing"), actor="ann"
         )
         take_back(shared, MATCH)
-        report = verify(shared, version.id)
+        report = verify_version(shared, version.id)
         assert (report.ok, report.groups) == (True, 6)
 
 

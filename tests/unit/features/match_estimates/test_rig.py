@@ -17,14 +17,14 @@ from app.features.match_estimates.rig import (
     SIGMA,
     ProposedRig,
     accept_rig,
-    anchor_sentence,
-    proposal_values,
+    describe_anchor,
+    describe_time_difference,
     propose_adjustment,
+    rig_proposal_to_json,
     take_back,
-    time_sentence,
 )
 from app.features.pitches.service import change_pitches, read_pitches
-from app.features.solutions.service import stale_groups
+from app.features.solutions.service import list_stale_groups
 from app.features.stations.service import load_station, submit_station
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.soccer.annotation import BallAnnotation
@@ -86,9 +86,9 @@ class TestPropose:
         assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
 
     def test_says_what_holds_the_rig_and_that_no_camera_is_ahead(self, proposed) -> None:
-        assert "points of field lines" in anchor_sentence(proposed.proposal)
-        assert time_sentence(proposed.proposal).startswith("no camera is ahead")
-        values = proposal_values(proposed)
+        assert "points of field lines" in describe_anchor(proposed.proposal)
+        assert describe_time_difference(proposed.proposal).startswith("no camera is ahead")
+        values = rig_proposal_to_json(proposed)
         assert json.loads(json.dumps(values)) == values
 
     def test_tells_the_largest_difference_in_time_that_is_one(self, proposed) -> None:
@@ -97,7 +97,7 @@ class TestPropose:
                 replace(pair, offset_frames=offset, offset_sigma_frames=sigma)
                 for pair, (offset, sigma) in zip(proposed.proposal.pairs, offsets, strict=False)
             )
-            return time_sentence(replace(proposed.proposal, pairs=pairs))
+            return describe_time_difference(replace(proposed.proposal, pairs=pairs))
 
         first, second = proposed.proposal.pairs[:2]
         # Small and sure, large and sure enough, larger and unsure.
@@ -141,7 +141,7 @@ class TestAccept:
         for change in proposed.proposal.cameras:
             station = stations(store, proposed)[change.key]
             assert (station.given, station.given_covariance) == (change.after, change.covariance)
-        assert set(stale_groups(store, "demo")) == set(ids)
+        assert set(list_stale_groups(store, "demo")) == set(ids)
 
     def test_accepting_sigma_keeps_the_cameras_and_says_how_far_they_may_be_off(
         self, store, proposed

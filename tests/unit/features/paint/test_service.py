@@ -26,9 +26,9 @@ from app.features.paint import service as editing
 from app.features.paint.service import get_paint, read_paint, take_back_paint
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
 from app.media import files as media
@@ -217,7 +217,7 @@ class TestReadPaint:
     def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
         monkeypatch.setattr(media, "_decode_pixels", lambda *_: pytest.fail("it was decoded again"))
         read_paint(painted, "demo", actor="ann")
-        assert (here.read, looked, stale_groups(painted, "demo")) == (4, [], [])
+        assert (here.read, looked, list_stale_groups(painted, "demo")) == (4, [], [])
         assert [entry.kind for entry in read_history(painted, 1)] == ["import", "paint"]
 
     def test_an_edit_of_a_ball_leaves_cameras_and_paint(self, painted, here, looked):
@@ -417,7 +417,7 @@ class TestKept:
             painted, "demo", FreezeRequest("one", groups="passing"), actor="ann"
         )
         take_back(painted)
-        report = verify(painted, version.id)
+        report = verify_version(painted, version.id)
         assert (report.ok, report.groups) == (True, int(version.counts["groups"]))
         assert report.groups > 0
 

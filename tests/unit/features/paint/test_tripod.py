@@ -18,7 +18,7 @@ from app.features.paint import service
 from app.features.paint.service import take_back_paint
 from app.features.paint.tripod import share_tripods
 from app.features.policies.service import change_policy
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import TOUCHLINE
 from tests.unit.solving.test_match_tripod import match
 
@@ -65,7 +65,7 @@ def test_main_cameras_of_a_match_know_it_together_and_solving_follows(dataset):
     before = sigmas(dataset)
     share(dataset)
     assert [item.tripod is not None for item in readings(dataset)] == [True] * 4 + [False]
-    assert sorted(stale_groups(dataset, "demo")) == [1, 2, 3, 4]
+    assert sorted(list_stale_groups(dataset, "demo")) == [1, 2, 3, 4]
     solve_dataset(dataset, "demo")
     after = sigmas(dataset)
     assert after[4] == before[4]
@@ -77,7 +77,7 @@ def test_once_more_changes_nothing(dataset):
     given = readings(dataset)
     solve_dataset(dataset, "demo")
     share(dataset)
-    assert readings(dataset) == given and stale_groups(dataset, "demo") == []
+    assert readings(dataset) == given and list_stale_groups(dataset, "demo") == []
 
 
 def test_another_match_is_left_alone(dataset):

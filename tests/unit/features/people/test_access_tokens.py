@@ -20,7 +20,7 @@ from app.features.people.access_tokens import (
     INVALID,
     AccessTokens,
     has_valid_checksum,
-    new_token_text,
+    make_access_token_text,
 )
 from app.features.people.logins import Login
 from app.features.people.queries import update_person
@@ -64,7 +64,7 @@ def anna(home, clock) -> Login:
 
 class TestText:
     def test_a_token_with_a_wrong_missing_or_swapped_letter_is_not_whole(self) -> None:
-        text = new_token_text()
+        text = make_access_token_text()
         assert has_valid_checksum(text)
         assert not has_valid_checksum(text + "\n")
         for place in range(len(text)):
@@ -111,7 +111,7 @@ class TestFind:
 
     def test_one_that_was_not_copied_whole_is_told_so(self, tokens) -> None:
         with pytest.raises(NotLoggedInError) as refused:
-            tokens.find(new_token_text()[:-1])
+            tokens.find(make_access_token_text()[:-1])
         assert refused.value.message == CUT
 
     def test_who_is_disabled_is_refused_whatever_tokens_there_are(self, home, tokens, anna) -> None:

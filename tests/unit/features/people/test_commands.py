@@ -71,7 +71,7 @@ class TestUsers:
     def test_an_invitation_is_a_link_that_logs_in(self, store: Store) -> None:
         done = run("users", "add", "anna", "--role", "lead")
         assert done.exit_code == 0, done.output
-        links.use_link(store, token_in(done.stdout), SECRET)
+        links.set_password_by_link(store, token_in(done.stdout), SECRET)
         logins = Logins(store)
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None
@@ -106,12 +106,12 @@ class TestUsers:
         assert json.loads(run("users", "list", "--json").stdout) == []
         done = run("users", "invite-many", str(file))
         assert '"boss" is not a role' in done.stdout
-        links.use_link(store, token_in(done.stdout), SECRET)
+        links.set_password_by_link(store, token_in(done.stdout), SECRET)
         assert found(Logins(store), "anna").role is Role.LEAD
 
     def test_the_list_says_where_everybody_is(self, store: Store) -> None:
         for name in ("anna", "bob"):
-            links.use_link(store, token_in(run("users", "add", name).stdout), SECRET)
+            links.set_password_by_link(store, token_in(run("users", "add", name).stdout), SECRET)
         run("users", "add", "carl")
         run("users", "disable", "bob")
         run("users", "role", "anna", "viewer")
@@ -126,14 +126,16 @@ class TestUsers:
         assert "disabled" not in run("users", "list").stdout
 
     def test_a_reset_gives_another_password(self, store: Store) -> None:
-        links.use_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
-        links.use_link(store, token_in(run("users", "reset", "anna").stdout), "other plain words")
+        links.set_password_by_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
+        links.set_password_by_link(
+            store, token_in(run("users", "reset", "anna").stdout), "other plain words"
+        )
         assert Logins(store).log_in("anna", "other plain words")
 
     def test_a_role_in_one_dataset_is_granted_and_taken(self, store: Store) -> None:
         for dataset in ("issia", "league"):
             ensure_dataset(store, dataset, "local")
-        links.use_link(
+        links.set_password_by_link(
             store, token_in(run("users", "add", "anna", "--role", "none").stdout), SECRET
         )
         assert run("users", "grant", "anna", "issia", "reviewer").exit_code == 0
@@ -164,7 +166,7 @@ class TestUsers:
         assert str(run("users", "adopt", "carl").exception) == "there is no user carl"
 
     def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:
-        links.use_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
+        links.set_password_by_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
         logins, factors = Logins(store), SecondFactors(store)
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None and not login.must_enrol
@@ -172,7 +174,7 @@ class TestUsers:
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None and login.must_enrol
         factors.confirm(login, pyotp.TOTP(factors.begin(login, SECRET).secret).now())
-        links.use_link(store, token_in(run("users", "reset", "anna").stdout), SECRET)
+        links.set_password_by_link(store, token_in(run("users", "reset", "anna").stdout), SECRET)
         with pytest.raises(NotLoggedInError, match="second factor"):
             logins.log_in("anna", SECRET)
         assert run("users", "reset", "anna", "--second-factor").exit_code == 0
@@ -201,7 +203,7 @@ class TestUsers:
 
     def test_tokens_are_listed_and_ended(self, store: Store) -> None:
         for name in ("anna", "bob"):
-            links.use_link(store, token_in(run("users", "add", name).stdout), SECRET)
+            links.set_password_by_link(store, token_in(run("users", "add", name).stdout), SECRET)
             logins, tokens = Logins(store), AccessTokens(store)
             login = logins.find(logins.log_in(name, SECRET))
             assert login is not None
@@ -263,7 +265,7 @@ class TestServe:
         assert "https://x.org/join#" in second
         with pytest.raises(Exception, match="no longer valid"):
             links.find_link_holder(store, token_in(first))
-        links.use_link(store, token_in(second), SECRET, "ada")
+        links.set_password_by_link(store, token_in(second), SECRET, "ada")
         assert "/join#" not in run("serve", "--team", "--port", "0").stdout
 
     def test_a_home_of_a_team_is_not_served_to_everybody(self) -> None:

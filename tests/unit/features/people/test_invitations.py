@@ -148,7 +148,7 @@ class TestPost:
             address = "anna@example.org"
             renew_one(store, person.id, address, post, actor="berta")
             again, row = renew_one(store, person.id, None, post, actor="berta")
-            links.use_link(store, token_of(row.link or ""), "three plain words")
+            links.set_password_by_link(store, token_of(row.link or ""), "three plain words")
             _, reset = renew_one(store, person.id, address, post, actor="berta")
         assert (first.state, row.state, reset.state) == ("invited", "invited", "reset")
         assert reset.mailed and not again.joined

@@ -52,7 +52,7 @@ class Desk:
 
     def join(self, name: str) -> None:
         _, link = invite(self.store, name, Role.LEAD, actor="local")
-        links.use_link(self.store, link.token, SECRET)
+        links.set_password_by_link(self.store, link.token, SECRET)
 
     def login(self, name: str = "anna", code: str | None = None) -> Login:
         found = self.logins.find(self.logins.log_in(name, SECRET, code=code))

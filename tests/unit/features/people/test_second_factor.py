@@ -51,7 +51,7 @@ class Desk:
         self.store, self.clock = store, Clock()
         self.logins, self.factors = Logins(store, self.clock), SecondFactors(store, self.clock)
         _, link = invite(store, "anna", Role.LEAD, actor="local")
-        links.use_link(store, link.token, SECRET)
+        links.set_password_by_link(store, link.token, SECRET)
         self.totp = pyotp.TOTP(pyotp.random_base32())
         self.codes: list[str] = []
 

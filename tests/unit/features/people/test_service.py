@@ -29,7 +29,7 @@ from app.features.people.roles import (
     Action,
     DatasetRoles,
     Role,
-    checked_name,
+    normalize_user_name,
     require_permission,
     role_allows,
 )
@@ -74,7 +74,7 @@ def logins(home, clock) -> Logins:
 def join(store: Store, name: str, role: Role = Role.REVIEWER) -> None:
     """Somebody who was invited and has come."""
     _, link = invite(store, name, role, actor="local")
-    links.use_link(store, link.token, SECRET)
+    links.set_password_by_link(store, link.token, SECRET)
 
 
 def found(logins: Logins, token: str) -> Login:
@@ -101,19 +101,19 @@ class TestNames:
     )
     def test_no_name_passes_for_a_script_or_the_local_user(self, name: str) -> None:
         with pytest.raises(InputError):
-            checked_name(name)
+            normalize_user_name(name)
 
     def test_capitals_are_the_same_person(self) -> None:
-        assert checked_name(" Anna ") == "anna"
+        assert normalize_user_name(" Anna ") == "anna"
 
 
 class TestLinks:
     def test_a_link_is_good_once(self, home, logins) -> None:
         _, link = invite(home, "anna", Role.VIEWER, actor="local")
         assert links.find_link_holder(home, link.token) == links.LinkHolder("anna", False)
-        assert links.use_link(home, link.token, SECRET) == "anna"
+        assert links.set_password_by_link(home, link.token, SECRET) == "anna"
         with pytest.raises(NotFoundError, match="no longer valid"):
-            links.use_link(home, link.token, SECRET)
+            links.set_password_by_link(home, link.token, SECRET)
         assert found(logins, logins.log_in("anna", SECRET)).role is Role.VIEWER
 
     def test_a_new_one_ends_the_one_before(self, home) -> None:
@@ -132,14 +132,14 @@ class TestLinks:
             past = datetime.now(UTC) - links.LASTS - timedelta(seconds=1)
             link = insert_new(session, person, by="local", at=past)
         with pytest.raises(NotFoundError):
-            links.use_link(home, link.token, SECRET)
+            links.set_password_by_link(home, link.token, SECRET)
 
     def test_a_reset_ends_every_session(self, home, logins) -> None:
         join(home, "anna")
         token = logins.log_in("anna", SECRET)
         _, link = renew_link(home, find_person(home, "anna").id, actor="local")
         assert logins.find(token), "a link that nobody has used ends nothing"
-        links.use_link(home, link.token, SECRET + "!")
+        links.set_password_by_link(home, link.token, SECRET + "!")
         assert logins.find(token) is None
         with pytest.raises(NotLoggedInError):
             logins.log_in("anna", SECRET)
@@ -148,25 +148,25 @@ class TestLinks:
         link = links.make_first_link(home, actor="local")
         assert link is not None
         assert links.find_link_holder(home, link.token).name is None
-        assert links.use_link(home, link.token, SECRET, "Anna") == "anna"
+        assert links.set_password_by_link(home, link.token, SECRET, "Anna") == "anna"
         assert found(logins, logins.log_in("anna", SECRET)).role is Role.ADMIN
         assert links.make_first_link(home, actor="local") is None
         with pytest.raises(NotFoundError):
-            links.use_link(home, link.token, SECRET, "eve")
+            links.set_password_by_link(home, link.token, SECRET, "eve")
 
     def test_the_link_of_the_first_admin_ends_once_there_is_another(self, home) -> None:
         link = links.make_first_link(home, actor="local")
         assert link is not None
         join(home, "anna", Role.ADMIN)
         with pytest.raises(NotFoundError):
-            links.use_link(home, link.token, SECRET, "eve")
+            links.set_password_by_link(home, link.token, SECRET, "eve")
 
     def test_a_password_that_cannot_be_one_leaves_the_link_good(self, home) -> None:
         _, link = invite(home, "anna.of.the.north", Role.VIEWER, actor="local")
         for bad in ("short", "x" * 201, "Anna.of.the.North"):
             with pytest.raises(InputError):
-                links.use_link(home, link.token, bad)
-        links.use_link(home, link.token, SECRET)
+                links.set_password_by_link(home, link.token, bad)
+        links.set_password_by_link(home, link.token, SECRET)
 
 
 class TestLogins:
@@ -251,7 +251,7 @@ class TestLogins:
     def test_the_database_holds_no_secret(self, home, logins) -> None:
         _, link = invite(home, "anna", Role.VIEWER, actor="local")
         _, waiting = invite(home, "bob", Role.VIEWER, actor="local")
-        links.use_link(home, link.token, SECRET)
+        links.set_password_by_link(home, link.token, SECRET)
         token = logins.log_in("anna", SECRET)
         home.close()
         kept = all_that_is_kept(home.settings.home)
@@ -269,7 +269,7 @@ class TestChangePerson:
         change_person(home, anna.id, actor="local", disabled=True)
         assert logins.find(token) is None
         with pytest.raises(NotFoundError):
-            links.use_link(home, link.token, SECRET)
+            links.set_password_by_link(home, link.token, SECRET)
         with pytest.raises(ConflictError, match="is disabled"):
             renew_link(home, anna.id, actor="local")
         change_person(home, anna.id, actor="local", disabled=False)

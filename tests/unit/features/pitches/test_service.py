@@ -18,14 +18,14 @@ from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,
     estimate_pitches,
-    give_pitch,
-    note_proposals,
+    list_matches_to_estimate,
     parse_pitch,
     read_pitches,
-    stale_matches,
+    set_pitch_of_groups,
+    update_pitch_findings,
 )
 from app.features.queue.service import list_groups
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import OPEN, PictureGeometry
@@ -167,7 +167,7 @@ class TestGroupsWithoutMatch:
         # One more came since: the size before was not that of all.
         assert read_pitches(store, "demo").items[0].previous is None
         with store.write() as session:
-            give_pitch(session, 1, [3], Pitch(101.0, 65.0), "ann")
+            set_pitch_of_groups(session, 1, [3], Pitch(101.0, 65.0), "ann")
         import_groups(store, "demo", [first], source="files", actor="ann")
         assert [load(store, n).group.pitch.length for n in (1, 2, 3)] == [103.0, 103.0, 101.0]
         assert read_pitches(store, "demo").items[0].previous is None
@@ -196,7 +196,7 @@ class TestChangePitches:
     def test_all_groups_of_the_match_get_the_size_and_are_stale(self, solved):
         accept(solved)
         assert sizes(solved) == {SMALL: TRUE, RIGHT: Pitch()}
-        assert stale_groups(solved, "demo") == [1, 2, 3, 4, 5, 6]
+        assert list_stale_groups(solved, "demo") == [1, 2, 3, 4, 5, 6]
 
     def test_the_finding_goes_once_the_size_is_accepted(self, solved):
         accept(solved)
@@ -211,7 +211,7 @@ class TestChangePitches:
         assert small.previous == Pitch()
         accept(solved, pitch=small.previous)
         assert sizes(solved)[SMALL] == Pitch()
-        assert stale_groups(solved, "demo") == []
+        assert list_stale_groups(solved, "demo") == []
         assert len(read_pitches(solved, "demo").proposals) == 1
 
     def test_the_log_tells_it_again(self, solved):
@@ -282,8 +282,8 @@ class TestChangePitches:
         first, second, third, *_ = season()
         import_groups(store, "demo", (first, second), source="files", actor="ann")
         with store.write() as session:
-            give_pitch(session, 1, [2], TRUE, "ann")
-            give_pitch(session, 1, [1], Pitch(101.0, 65.0), "ann")
+            set_pitch_of_groups(session, 1, [2], TRUE, "ann")
+            set_pitch_of_groups(session, 1, [1], Pitch(101.0, 65.0), "ann")
         import_groups(store, "demo", (third,), source="files", actor="ann")
         assert load(store, 3).group.pitch == Pitch(101.0, 65.0)
 
@@ -291,9 +291,9 @@ class TestChangePitches:
 class TestReadPitches:
     def test_of_groups_of_several_sizes_each_is_held_against_the_lines(self, solved):
         with solved.write() as session:
-            give_pitch(session, 1, [4, 5], TRUE, "ann")
-            give_pitch(session, 1, [7, 8], TRUE, "ann")
-            note_proposals(session, 1)
+            set_pitch_of_groups(session, 1, [4, 5], TRUE, "ann")
+            set_pitch_of_groups(session, 1, [7, 8], TRUE, "ann")
+            update_pitch_findings(session, 1)
         small, right = read_pitches(solved, "demo").items
         assert (small.mixed, right.mixed) == (True, True)
         assert small.proposed.length == pytest.approx(103.0, abs=0.3)
@@ -304,7 +304,7 @@ class TestReadPitches:
     def test_a_minority_of_another_size_is_told(self, solved):
         accept(solved)
         with solved.write() as session:
-            give_pitch(session, 1, [2], Pitch(), "ann")
+            set_pitch_of_groups(session, 1, [2], Pitch(), "ann")
         small, _ = read_pitches(solved, "demo").items
         assert (small.pitch, small.mixed) == (TRUE, True)
         assert small.proposed.length == pytest.approx(103.0, abs=0.3)
@@ -314,7 +314,7 @@ class TestReadPitches:
         accept(solved)
         near = Pitch(TRUE.length + 0.1, TRUE.width)
         with solved.write() as session:
-            give_pitch(session, 1, [2], near, "ann")
+            set_pitch_of_groups(session, 1, [2], near, "ann")
         small, _ = read_pitches(solved, "demo").items
         assert small.proposed == TRUE
 
@@ -325,7 +325,7 @@ class TestReadPitches:
         small, right = read_pitches(solved, "demo").items
         assert (small.estimate, small.problem, small.proposed) == (None, None, None)
         assert right.estimate is not None
-        assert stale_matches(solved, "demo") == [SMALL]
+        assert list_matches_to_estimate(solved, "demo") == [SMALL]
 
     def test_many_matches_cost_no_more_questions_than_one(self, solved):
         accept(solved)

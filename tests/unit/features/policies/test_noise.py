@@ -21,7 +21,7 @@ from app.features.policies import noise
 from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
 from app.features.policies.service import change_policy, policy_with, read_policy
 from app.features.solutions import service as recompute
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.solve.jobs import solve_fully
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
@@ -165,7 +165,7 @@ class TestReadNoise:
         before = _spreads(store)
         state = apply_noise(store, found, actor="ben")
         assert state.policy.calibration.line_sigma_px == sigma.estimate
-        assert len(stale_groups(store, state.dataset_id)) == 8
+        assert len(list_stale_groups(store, state.dataset_id)) == 8
         solve_dataset(store, "demo")
         assert (_spreads(store) < before).mean() > 0.8
         again = read_noise(store, "demo")
@@ -231,7 +231,7 @@ class TestApplyNoise:
         assert (state.policy.name, state.history[-1].actor) == ("custom", "ben")
         name = found.advice[0].name
         assert getattr(state.policy, name) == found.advice[0].estimate
-        assert len(stale_groups(store, state.dataset_id)) == 25
+        assert len(list_stale_groups(store, state.dataset_id)) == 25
         solve_dataset(store, "demo")
         again = read_noise(store, "demo")
         assert all(item.agrees for item in again.advice)
@@ -301,7 +301,7 @@ class TestFollowing:
         state = read_states_of(store)[0]
         ball = BallAnnotation(point=ImagePoint(5.0, 5.0))
         submit(store, state.id, set_ball("a", ball), if_match=state.etag, actor="ben")
-        assert not stale_groups(store, "demo")
+        assert not list_stale_groups(store, "demo")
         assert read_policy(store, "demo") == before
 
     def test_numbers_of_a_person_win(self, store: Store) -> None:

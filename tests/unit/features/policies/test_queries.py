@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.db.log import Entry, append
-from app.features.policies.queries import PolicyVersion, policy_history
+from app.features.policies.queries import PolicyVersion, read_policy_history
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import PAPER
 
@@ -18,8 +18,8 @@ class TestPolicyHistory:
                 ("c", "policy", other),
             ):
                 append(session, [Entry(kind, "ann", at, {"policy": policy_to_json(policy)}, 1)])
-            assert policy_history(session, 1) == (
+            assert read_policy_history(session, 1) == (
                 PolicyVersion(1, "a", "ann", PAPER),
                 PolicyVersion(2, "c", "ann", other),
             )
-            assert policy_history(session, 2) == ()
+            assert read_policy_history(session, 2) == ()

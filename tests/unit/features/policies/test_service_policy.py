@@ -14,7 +14,7 @@ from app.features.policies.service import change_policy, policy_with, read_polic
 from app.features.queue.service import list_groups
 from app.features.solutions import service as recompute
 from app.features.solutions.queries import CalibrationModel, SolutionModel
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import PAPER, STRICT
 from app.solving import calibrate
 
@@ -102,7 +102,7 @@ class TestChangePolicy:
         calibrations.clear()
         kept = count(store, CalibrationModel)
         change_policy(store, "demo", TIGHT, if_match=None, actor="ann")
-        assert stale_groups(store, "demo") == ids
+        assert list_stale_groups(store, "demo") == ids
         assert get_dataset(store, "demo").solved == 0
         report = solve_dataset(store, "demo")
         assert (report.solved, report.passed) == (4, 3)
@@ -121,7 +121,7 @@ class TestChangePolicy:
         solve_dataset(store, "demo")
         solutions = count(store, SolutionModel)
         change_policy(store, "demo", PAPER, if_match=None, actor="ann")
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
         assert get_dataset(store, "demo").solved == 2
         assert solve_dataset(store, "demo").total == 0
         assert count(store, SolutionModel) == solutions
@@ -130,7 +130,7 @@ class TestChangePolicy:
         fill(make_group())
         named = policy_with(PAPER, {}, name="ours")
         assert change_policy(store, "demo", named, if_match=None, actor="ann").version == 2
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
 
     def test_another_calibration_part_calibrates_every_camera_once(
         self, store: Store, fill, make_static, calibrations

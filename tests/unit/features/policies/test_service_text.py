@@ -11,8 +11,8 @@ from app.errors import InputError
 from app.features.policies.service import (
     MAX_CHARACTERS,
     policy_from_yaml,
+    policy_to_values,
     policy_to_yaml,
-    policy_values,
     policy_with,
 )
 from app.soccer.policy import PAPER, POLICIES, STRICT, TOUCHLINE, CalibrationPolicy, Policy
@@ -124,7 +124,7 @@ class TestPolicyWith:
         assert (policy.max_sigma_m, policy.min_parallax_degrees) == (None, 5.0)
 
     def test_values_of_a_policy_make_it_again(self) -> None:
-        assert policy_with(PAPER, policy_values(STRICT), name="strict") == STRICT
+        assert policy_with(PAPER, policy_to_values(STRICT), name="strict") == STRICT
 
     @pytest.mark.parametrize(
         ("values", "noise"),

@@ -19,7 +19,7 @@ from app.features.predictions.accept import (
     plan_accept,
 )
 from app.features.predictions.reader import PredictionFiles
-from app.features.predictions.service import add_predictions, frame_names, save_predictions
+from app.features.predictions.service import add_predictions, read_frame_names, save_predictions
 from app.soccer.frames import Box
 
 
@@ -48,7 +48,7 @@ def predictions(store, cleared, tmp_path):
 def absurd(store, cleared):
     """A set as no reader lets it in any more: a box as wide as a country."""
     found = {cleared.view_ids["7.png"]: [Detection(Box(1, 2, 3e9, 4), 0.95)]}
-    names = frame_names(store, "demo")
+    names = read_frame_names(store, "demo")
     report = {"problems": [], "more_problems": 0}
     return save_predictions(
         store, "demo", "old", found, {},

@@ -6,8 +6,8 @@ import pytest
 from app.errors import InputError
 from app.features.predictions.detect import (
     Letterbox,
-    ball_category,
     decode_output,
+    find_ball_category,
     suppress_overlapping,
 )
 from app.soccer.frames import ImageSize
@@ -92,9 +92,9 @@ class TestSuppress:
 
 class TestBallCategory:
     def test_is_the_only_class_called_a_ball_or_the_only_class_at_all(self) -> None:
-        assert ball_category(["person", "sports ball"]) == 1
-        assert ball_category(["anything"]) == 0
-        assert ball_category(["ball", "sports ball"]) is None
-        assert ball_category(["tennis ball", "player", "Football", "ball boy"]) == 2
-        assert ball_category(["person", "balloon"]) is None
-        assert ball_category([]) is None
+        assert find_ball_category(["person", "sports ball"]) == 1
+        assert find_ball_category(["anything"]) == 0
+        assert find_ball_category(["ball", "sports ball"]) is None
+        assert find_ball_category(["tennis ball", "player", "Football", "ball boy"]) == 2
+        assert find_ball_category(["person", "balloon"]) is None
+        assert find_ball_category([]) is None

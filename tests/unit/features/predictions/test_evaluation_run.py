@@ -11,7 +11,7 @@ from app.features.predictions.evaluation_run import (
     AcceptedTruth,
     EvaluationRequest,
     SourcesRequest,
-    prediction_set,
+    read_or_find_prediction_set,
 )
 from app.features.predictions.reader import PredictionFiles
 from app.soccer.frames import Box, ImageSize
@@ -78,7 +78,9 @@ class TestPredictionSet:
     ) -> None:
         fill(make_group(7))
         with pytest.raises(NotFoundError, match="no file and no set of predictions"):
-            prediction_set(store, "demo", PredictionFiles(Path("nothing.json")), actor="ann")
+            read_or_find_prediction_set(
+                store, "demo", PredictionFiles(Path("nothing.json")), actor="ann"
+            )
 
     def test_beside_cameras_a_missing_file_is_never_taken_for_a_set(
         self, store, fill, make_group, tmp_path
@@ -86,4 +88,4 @@ class TestPredictionSet:
         fill(make_group(7))
         source = PredictionFiles(Path("nothing.json"), cameras=tmp_path)
         with pytest.raises(NotFoundError, match=r"there is no file nothing\.json"):
-            prediction_set(store, "demo", source, actor="ann")
+            read_or_find_prediction_set(store, "demo", source, actor="ann")

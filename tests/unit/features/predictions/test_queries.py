@@ -3,9 +3,9 @@ from __future__ import annotations
 from app.db.store import Store
 from app.features.predictions.queries import (
     count_prediction_sets,
-    dataset_prediction_sets,
     has_prediction_set,
     insert_prediction_set,
+    list_prediction_sets_of_dataset,
     read_prediction_sets,
 )
 
@@ -31,8 +31,8 @@ class TestPredictionSets:
                 insert_prediction_set(session, {**SET, "name": name}, {}, {})
                 for name in ("one", "two")
             )
-            assert [item.id for item in dataset_prediction_sets(session, 1)] == [two, one]
-            assert dataset_prediction_sets(session, 2) == []
+            assert [item.id for item in list_prediction_sets_of_dataset(session, 1)] == [two, one]
+            assert list_prediction_sets_of_dataset(session, 2) == []
             assert [item.id for item in read_prediction_sets(session, {one, two, 9})] == [two, one]
             assert read_prediction_sets(session, set()) == []
             assert [has_prediction_set(session, 1, name) for name in ("one", "ONE")] == [

@@ -8,13 +8,13 @@ from app.db.store import Store
 from app.features.predictions.queries import (
     FrameCondition,
     count_frame_rows,
-    dataset_evaluations,
     delete_evaluation,
     find_evaluation,
     insert_evaluation,
     is_between,
     is_missing,
     is_of_match,
+    list_evaluations_of_dataset,
     read_frame_rows,
 )
 from app.features.predictions.tables import EvaluationFrameModel
@@ -88,12 +88,12 @@ class TestReadFrameRows:
 class TestEvaluations:
     def test_runs_come_the_newest_first_until_they_are_deleted(self, session) -> None:
         second = insert_evaluation(session, {**RUN, "name": "second"}, {}, [])
-        assert [run.name for run in dataset_evaluations(session, 1)] == ["second", "first"]
-        assert dataset_evaluations(session, 2) == []
+        assert [run.name for run in list_evaluations_of_dataset(session, 1)] == ["second", "first"]
+        assert list_evaluations_of_dataset(session, 2) == []
         found = find_evaluation(session, 1)
         assert found is not None
         assert (found.dataset, found.figures) == ("demo", ("roc",))
         delete_evaluation(session, 1)
         assert find_evaluation(session, 1) is None
-        assert [run.id for run in dataset_evaluations(session, 1)] == [second]
+        assert [run.id for run in list_evaluations_of_dataset(session, 1)] == [second]
         assert session.scalars(select(EvaluationFrameModel.position)).all() == []

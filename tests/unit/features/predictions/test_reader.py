@@ -17,7 +17,7 @@ from app.features.predictions.reader import (
     PredictionFiles,
     PredictionReader,
     read_files,
-    uploaded_files,
+    resolve_uploaded_files,
 )
 from app.formats.file_tree import Limits
 from app.soccer.frames import ImageSize
@@ -54,12 +54,12 @@ class TestUploadedFiles:
 
         names = ("boxes.csv", "images.json", "cameras.zip")
         how = PredictionFiles(None, "csv", category=3)
-        found = uploaded_files(settings, how, *map(sent, names))
+        found = resolve_uploaded_files(settings, how, *map(sent, names))
         assert [found.path.name, found.images.name, found.cameras.name] == [*names]
         assert (found.format, found.category) == ("csv", 3)
-        assert uploaded_files(settings, how, None, None, None) == how
+        assert resolve_uploaded_files(settings, how, None, None, None) == how
         with pytest.raises(NotFoundError):
-            uploaded_files(settings, how, "0" * 32, None, None)
+            resolve_uploaded_files(settings, how, "0" * 32, None, None)
 
 
 class TestPredictionReader:

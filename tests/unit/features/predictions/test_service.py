@@ -16,8 +16,8 @@ from app.features.predictions.service import (
     delete_predictions,
     get_predictions,
     list_predictions,
-    prediction_set_name,
-    view_predictions,
+    make_prediction_set_name,
+    read_predictions_of_view,
 )
 from app.features.predictions.tables import PredictedCameraModel, PredictionModel
 from app.features.solutions.queries import read_solutions
@@ -48,7 +48,7 @@ class TestAddPredictions:
         assert (found.frames, found.boxes, found.unknown, found.cameras) == (1, 2, 1, 0)
         assert (found.source, found.format, found.actor) == ("yolo.json", "coco", "ann")
         assert found.report["unknown_frames"][0]["frame"] == "99.png"
-        (kept, boxes), *_ = view_predictions(store, state.view_ids["7.png"])
+        (kept, boxes), *_ = read_predictions_of_view(store, state.view_ids["7.png"])
         assert kept == found
         assert [(box.x, box.width, round(box.score, 9)) for box in boxes] == [
             (600, 14, 0.9), (600, 14, 0.8),
@@ -134,7 +134,7 @@ class TestDeletePredictions:
             store, "demo", "a", results(tmp_path / "a.json", "7.png"), actor="a"
         )
         delete_predictions(store, found.id, actor="local")
-        assert view_predictions(store, state.view_ids["7.png"]) == []
+        assert read_predictions_of_view(store, state.view_ids["7.png"]) == []
         with pytest.raises(NotFoundError):
             get_predictions(store, found.id)
         with pytest.raises(NotFoundError):
@@ -155,7 +155,7 @@ class TestDeletePredictions:
 
 class TestSetName:
     def test_letters_that_a_set_cannot_have_become_dashes(self) -> None:
-        assert prediction_set_name(Path("runs/best model (2).json")) == "best-model--2"
+        assert make_prediction_set_name(Path("runs/best model (2).json")) == "best-model--2"
 
     def test_a_name_without_a_single_letter_is_replaced(self) -> None:
-        assert prediction_set_name(Path("---.json")) == "predictions"
+        assert make_prediction_set_name(Path("---.json")) == "predictions"

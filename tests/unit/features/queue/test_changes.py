@@ -14,7 +14,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.queue import changes as module
 from app.features.queue.changes import LoggedChange, read_changes, read_solved, read_solved_since
-from app.features.solutions.queries import newest_solution
+from app.features.solutions.queries import find_newest_solution_id
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station, submit_station
 from app.features.verdicts.service import set_verdict
@@ -114,7 +114,7 @@ class TestReadSolved:
     def test_tells_the_groups_that_got_a_solution(self, store: Store, fill, make_group) -> None:
         one, two = fill(make_group(7), make_group(8), solved=False)
         with store.read() as session:
-            before = newest_solution(session)
+            before = find_newest_solution_id(session)
         solve_dataset(store, "demo")
         with store.read() as session:
             told = read_solved(session, before)
@@ -130,7 +130,7 @@ class TestReadSolved:
     ) -> None:
         fill(*(make_group(number) for number in (1, 2, 3)))
         with store.read() as session:
-            newest = newest_solution(session)
+            newest = find_newest_solution_id(session)
         assert read_solved_since(store, newest) == []
         assert [one.group_id for one in read_solved_since(store, newest - 3)] == [1, 2, 3]
         monkeypatch.setattr(module, "FAR", 2)

@@ -6,7 +6,7 @@ from sqlalchemy import update
 from app.features.queue.queries import (
     Condition,
     Listing,
-    any_of,
+    any_condition,
     compare_condition,
     contains_text,
     has_all_pictures,
@@ -16,7 +16,7 @@ from app.features.queue.queries import (
     is_empty,
     is_flag,
     is_text,
-    negate,
+    negate_condition,
 )
 from app.features.queue.tables import QueueModel
 
@@ -47,7 +47,7 @@ class TestConditions:
             (compare_condition("min_jac", "=", 0.75), True),
             (compare_condition("status", "=", "accepted"), True),
             (compare_condition("sigma_m", "<", 1e9), False),
-            (negate(compare_condition("sigma_m", "<", 1e9)), False),
+            (negate_condition(compare_condition("sigma_m", "<", 1e9)), False),
             (is_absent("sigma_m"), True),
             (is_absent("min_jac"), False),
             (is_empty("reviewer"), True),
@@ -55,7 +55,7 @@ class TestConditions:
             (is_empty("split"), False),
             (is_text("split", "test"), True),
             (is_text("reviewer", "ann"), False),
-            (negate(is_text("reviewer", "ann")), True),
+            (negate_condition(is_text("reviewer", "ann")), True),
             (is_flag("solved", True), True),
             (is_flag("passes", False), False),
             (contains_text("label", "0% _"), True),
@@ -67,8 +67,8 @@ class TestConditions:
             (has_group_id([7, 1]), True),
             (has_group_id([7]), False),
             (has_group_id(range(2, 20_000)), False),
-            (any_of([has_group_id([7]), is_flag("solved", True)]), True),
-            (any_of([has_group_id([7]), is_flag("solved", False)]), False),
+            (any_condition([has_group_id([7]), is_flag("solved", True)]), True),
+            (any_condition([has_group_id([7]), is_flag("solved", False)]), False),
         ],
     )
     def test_a_group_is_meant_or_not(self, filled, condition: Condition, holds: bool) -> None:

@@ -11,9 +11,9 @@ from app.features.queue.service import (
     COLUMNS,
     ERROR_PERCENT,
     SIGMA_M,
-    bin_indices,
+    find_bin_indices,
     list_groups,
-    logarithmic_bins,
+    make_logarithmic_bins,
     summarize_groups,
 )
 from app.features.queue.statistics import MEASURES
@@ -22,7 +22,7 @@ from app.features.queue.tables import QueueModel
 
 class TestDecades:
     def test_the_powers_of_ten_are_edges_and_nothing_lies_before_zero(self):
-        assert logarithmic_bins(-2, 1, 3) == (0.0, 0.01, 0.0215, 0.0464, 0.1, 0.215, 0.464, 1.0, 2.15,
+        assert make_logarithmic_bins(-2, 1, 3) == (0.0, 0.01, 0.0215, 0.0464, 0.1, 0.215, 0.464, 1.0, 2.15,
                                      4.64, 10.0)  # fmt: skip
 
     def test_bars_are_equally_wide_on_a_logarithmic_scale(self):
@@ -36,12 +36,12 @@ class TestDecades:
 
 class TestPlaces:
     def test_zero_is_in_the_first_bin_and_an_edge_in_the_bin_that_it_begins(self):
-        found = bin_indices((0.0, 0.1, 1.0), np.array([0.0, 0.1, 1.0, 9.0, np.nan]),
+        found = find_bin_indices((0.0, 0.1, 1.0), np.array([0.0, 0.1, 1.0, 9.0, np.nan]),
                        open_low=False, open_high=True)  # fmt: skip
         assert found.tolist() == [0, 1, 1, 1, -1]
 
     def test_beyond_a_closed_end_there_is_no_bin(self):
-        found = bin_indices(
+        found = find_bin_indices(
             (0.0, 0.5, 1.0), np.array([-1.0, 1.0, 1.1]), open_low=False, open_high=False
         )
         assert found.tolist() == [-1, 1, -1]

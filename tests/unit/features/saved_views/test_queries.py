@@ -1,10 +1,10 @@
 from __future__ import annotations
 
 from app.features.saved_views.queries import (
-    dataset_saved_views,
     delete_saved_view,
     find_saved_view,
     insert_saved_view,
+    list_saved_views_of_dataset,
 )
 
 
@@ -13,10 +13,10 @@ class TestSavedViews:
         with filled.write() as session:
             late = insert_saved_view(session, 1, name="late", query="sort:newest", actor="ann")
             early = insert_saved_view(session, 1, name="early", query="views:2", actor="bob")
-            assert [row.id for row in dataset_saved_views(session, 1)] == [early, late]
-            assert dataset_saved_views(session, 2) == []
+            assert [row.id for row in list_saved_views_of_dataset(session, 1)] == [early, late]
+            assert list_saved_views_of_dataset(session, 2) == []
             found = find_saved_view(session, late)
             assert (found.dataset_id, found.name, found.query) == (1, "late", "sort:newest")
             delete_saved_view(session, late)
             assert find_saved_view(session, late) is None
-            assert [row.name for row in dataset_saved_views(session, 1)] == ["early"]
+            assert [row.name for row in list_saved_views_of_dataset(session, 1)] == ["early"]

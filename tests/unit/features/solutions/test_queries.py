@@ -9,7 +9,7 @@ from sqlalchemy import insert, text
 
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.solutions import codec as value_codec
-from app.features.solutions.codec import summarize
+from app.features.solutions.codec import summarize_solution
 from app.features.solutions.queries import (
     SolutionKey,
     _is_undetermined,
@@ -160,7 +160,7 @@ class TestRoundTrip:
 class TestValueCodec:
     def test_numbers_that_are_not_finite_come_back(self) -> None:
         ball = Ball3D((math.inf, -math.inf, 1.0), (math.inf,) * 9, math.inf, 0.5, ())
-        text_ = value_codec.dumps(value_codec.to_json(ball))
+        text_ = value_codec.solution_json_text(value_codec.to_json(ball))
         assert value_codec.from_json(Ball3D, json.loads(text_)) == ball
 
     def test_a_field_that_is_new_has_its_default(self) -> None:
@@ -205,17 +205,17 @@ def painted_views(solution: Solution, fits: tuple[PaintFit | None, ...]) -> Solu
 
 class TestSummary:
     def test_names_the_first_failing_gate_with_its_margin(self, full_group, solution) -> None:
-        found = summarize(full_group, solution)
+        found = summarize_solution(full_group, solution)
         assert (found.passes, found.gate, found.gate_view) == (False, "reprojection", "cam1")
         assert found.margin == pytest.approx(-8 / 22)
 
     def test_value_is_the_margin_without_its_sign(self, full_group, solution) -> None:
-        assert summarize(full_group, solution).value == pytest.approx(8 / 22)
+        assert summarize_solution(full_group, solution).value == pytest.approx(8 / 22)
         passing = replace(solution, gates=solution.gates[:1])
-        assert summarize(full_group, passing).value == pytest.approx(0.2)
+        assert summarize_solution(full_group, passing).value == pytest.approx(0.2)
 
     def test_numbers_come_from_the_ball_and_the_views_behind_it(self, full_group, solution) -> None:
-        found = summarize(full_group, solution)
+        found = summarize_solution(full_group, solution)
         assert found.size_ratio == 1.25
         assert (found.sigma_m, found.parallax_degrees, found.height_m) == (0.3, 75.0, 0.5)
         assert found.min_jac == 0.9
@@ -224,14 +224,16 @@ class TestSummary:
     def test_agreement_is_the_lowest_of_the_views_in_use_whose_paint_was_read(
         self, full_group, solution
     ) -> None:
-        assert summarize(full_group, solution).agreement is None
+        assert summarize_solution(full_group, solution).agreement is None
         painted = painted_views(solution, (PaintFit(0.9, 0.8, 90), None, None))
-        assert summarize(full_group, painted).agreement == pytest.approx(0.72)
+        assert summarize_solution(full_group, painted).agreement == pytest.approx(0.72)
         # The second view is left out.
         fits = PaintFit(0.9, 0.8, 90), PaintFit(0.1, 0.2, 90), PaintFit(0.5, 0.5, 90)
-        assert summarize(full_group, painted_views(solution, fits)).agreement == pytest.approx(0.25)
+        assert summarize_solution(
+            full_group, painted_views(solution, fits)
+        ).agreement == pytest.approx(0.25)
         unseen = painted_views(solution, (PaintFit(None, None, 0, reason="no_frame"), None, None))
-        assert summarize(full_group, unseen).agreement is None
+        assert summarize_solution(full_group, unseen).agreement is None
 
     def test_the_error_is_that_of_the_gate_with_and_without_a_ball(
         self, full_group, solution
@@ -239,25 +241,27 @@ class TestSummary:
         judged = replace(solution.gates[1], value=3.5)
         diagonal = full_group.views[0].size.diagonal
         for ball in (solution.ball, None):
-            found = summarize(full_group, replace(solution, ball=ball, gates=(judged,)))
+            found = summarize_solution(full_group, replace(solution, ball=ball, gates=(judged,)))
             assert found.error_px == 3.5
             assert found.error_percent == pytest.approx(350 / diagonal)
-        unjudged = summarize(full_group, replace(solution, gates=(replace(judged, value=None),)))
+        unjudged = summarize_solution(
+            full_group, replace(solution, gates=(replace(judged, value=None),))
+        )
         assert (unjudged.error_px, unjudged.error_percent) == (None, None)
 
     def test_without_a_ball_there_is_no_parallax_of_it(self, full_group, solution) -> None:
-        found = summarize(full_group, replace(solution, ball=None))
+        found = summarize_solution(full_group, replace(solution, ball=None))
         assert (found.parallax_degrees, found.height_m) == (None, None)
 
     def test_a_group_without_anything_has_no_numbers(self, full_group) -> None:
-        found = summarize(full_group, Solution((), (), None, ()))
+        found = summarize_solution(full_group, Solution((), (), None, ()))
         assert found.passes
         assert (found.value, found.margin, found.error_px, found.min_jac) == (None,) * 4
 
     def test_comes_back_from_its_text(self, full_group, solution) -> None:
         summary = encode_solution(full_group, solution).summary
         assert (
-            read_summary(value_codec.dumps(value_codec.to_json(summary)))
+            read_summary(value_codec.solution_json_text(value_codec.to_json(summary)))
             == summary
-            == summarize(full_group, solution)
+            == summarize_solution(full_group, solution)
         )

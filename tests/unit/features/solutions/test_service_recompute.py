@@ -12,7 +12,7 @@ from app.features.groups.submit import load, submit
 from app.features.queue.service import list_groups
 from app.features.solutions import service as module
 from app.features.solutions.queries import EncodedSolution
-from app.features.solutions.service import solve_dataset, solve_encoded, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset, solve_encoded
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
@@ -40,19 +40,19 @@ def small_chunks(monkeypatch) -> None:
 
 class TestSolveDataset:
     def test_solves_what_is_stale_as_the_solver_does(self, store, ids) -> None:
-        assert stale_groups(store, "demo") == ids
+        assert list_stale_groups(store, "demo") == ids
         report = solve_dataset(store, "demo")
         assert (report.total, report.solved, report.passed) == (6, 6, 6)
         state = load(store, ids[3])
         assert state.solution == solve(state.group, state.policy)
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
         assert solve_dataset(store, "demo").total == 0
 
     def test_only_what_changed_is_solved_again(self, store, ids) -> None:
         solve_dataset(store, "demo")
         state = load(store, ids[2])
         submit(store, ids[2], set_ball("cam1", None), if_match=state.etag, actor="ann")
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
 
     def test_an_executor_makes_the_same(self, store, ids, small_chunks) -> None:
         with ThreadPoolExecutor(2) as executor:
@@ -79,21 +79,21 @@ class TestSolveDataset:
 
         with pytest.raises(KeyboardInterrupt):
             solve_dataset(store, "demo", None, kill)
-        assert stale_groups(store, "demo") == ids[4:]
+        assert list_stale_groups(store, "demo") == ids[4:]
         assert solve_dataset(store, "demo").solved == 2
 
     def test_a_run_that_is_told_to_stop_keeps_what_is_done(self, store, ids, small_chunks) -> None:
         asked = iter([False, False, True])
         report = solve_dataset(store, "demo", stop=lambda: next(asked, True))
         assert (report.total, report.solved) == (6, 4)
-        assert stale_groups(store, "demo") == ids[4:]
+        assert list_stale_groups(store, "demo") == ids[4:]
 
     def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(module, "solve_encoded", stumbling)
         report = solve_dataset(store, "demo")
         assert report.solved == 5
         assert report.failed == [("11", "ZeroDivisionError: frame 11")]
-        assert stale_groups(store, "demo") == [ids[1]]
+        assert list_stale_groups(store, "demo") == [ids[1]]
 
     def test_static_cameras_are_calibrated_once(self, store, ids, monkeypatch) -> None:
         def refuse(*_):

@@ -12,7 +12,7 @@ from app.features.groups.submit import load
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import service as recompute
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.databases import said_for_sqlite
@@ -62,7 +62,7 @@ class TestRetell:
         report = solve_dataset(store, "demo")
         assert solved == ["3.png"]
         assert (report.total, report.solved, report.failed) == (4, 4, [])
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
         state = load(store, ids[1])
         assert state.solution == solve(state.group, state.policy)
 
@@ -75,7 +75,7 @@ class TestRetell:
             session.execute(
                 text("DELETE FROM solution WHERE policy_hash = :policy"), {"policy": TIGHT.hash}
             )
-        monkeypatch.setattr(recompute, "rethreshold_tasks", lambda *_: iter(()))
+        monkeypatch.setattr(recompute, "make_rethreshold_tasks", lambda *_: iter(()))
         assert solve_dataset(store, "demo").solved == 4
         assert rows(store, TIGHT.hash) == told
         assert list_groups(store, load(store, ids[0]).dataset_id, "").items == listed

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
-from app.features.pitches.service import stale_matches
-from app.features.solutions.service import stale_groups
+from app.features.pitches.service import list_matches_to_estimate
+from app.features.solutions.service import list_stale_groups
 from app.features.solve import jobs as full_solve
-from app.features.solve.jobs import count_yield, pending_work, solve_fully
+from app.features.solve.jobs import count_yield, describe_pending_work, solve_fully
 from app.features.what_if import blocks as gathered
 
 
@@ -34,30 +34,30 @@ class Told:
 def test_groups_are_solved_and_pitches_estimated(two: Store) -> None:
     report = solve_fully(two, "demo", None, Told())
     assert (report.total, report.solved) == (2, 2)
-    assert (stale_groups(two, "demo"), stale_matches(two, "demo")) == ([], [])
+    assert (list_stale_groups(two, "demo"), list_matches_to_estimate(two, "demo")) == ([], [])
 
 
 def test_once_it_is_stopped_what_is_solved_stays_and_no_more_is_begun(two: Store) -> None:
     asked = iter([False])
     report = solve_fully(two, "demo", None, Told(), lambda: next(asked, True))
     assert report.solved == 2
-    assert stale_groups(two, "demo") == []
-    assert stale_matches(two, "demo") == ["7", "8"]
+    assert list_stale_groups(two, "demo") == []
+    assert list_matches_to_estimate(two, "demo") == ["7", "8"]
 
 
 def test_stopped_between_two_matches_it_keeps_the_first(two: Store) -> None:
-    solve_fully(two, "demo", None, Told(), lambda: not stale_groups(two, "demo"))
-    before = stale_matches(two, "demo")
-    solve_fully(two, "demo", None, Told(), lambda: len(stale_matches(two, "demo")) < 2)
-    assert (before, stale_matches(two, "demo")) == (["7", "8"], ["8"])
+    solve_fully(two, "demo", None, Told(), lambda: not list_stale_groups(two, "demo"))
+    before = list_matches_to_estimate(two, "demo")
+    solve_fully(two, "demo", None, Told(), lambda: len(list_matches_to_estimate(two, "demo")) < 2)
+    assert (before, list_matches_to_estimate(two, "demo")) == (["7", "8"], ["8"])
 
 
 def test_what_is_left_is_said_as_long_as_something_is(two: Store) -> None:
-    assert pending_work(two, "demo") == "2 are left to do"
-    solve_fully(two, "demo", None, Told(), lambda: not stale_groups(two, "demo"))
-    assert pending_work(two, "demo") == "the pitch of 2 matches is left to estimate"
+    assert describe_pending_work(two, "demo") == "2 are left to do"
+    solve_fully(two, "demo", None, Told(), lambda: not list_stale_groups(two, "demo"))
+    assert describe_pending_work(two, "demo") == "the pitch of 2 matches is left to estimate"
     solve_fully(two, "demo", None, Told())
-    assert pending_work(two, "demo") is None
+    assert describe_pending_work(two, "demo") is None
 
 
 @pytest.mark.parametrize(("at_once", "counted"), [(1, True), (2, False)])

@@ -14,7 +14,7 @@ from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import ensure_dataset
 from app.features.jobs.runner import JobProgress
 from app.features.jobs.service import Jobs
-from app.features.solutions.service import SolveReport, stale_groups
+from app.features.solutions.service import SolveReport, list_stale_groups
 from app.features.solve import jobs as full_solve
 from app.features.solve import jobs as solve_job
 from app.features.solve.jobs import request_solve, resume_solving, solve_leftovers
@@ -54,7 +54,7 @@ class TestRequestSolve:
             "2 groups solved: 1 pass, 1 do not (first failing gate: reprojection 1); 0 errors. The "
             "pitch of 1 match was estimated: no other size is proposed."
         )
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
 
     @pytest.mark.parametrize(
         ("edited", "solved", "follows"),
@@ -174,7 +174,7 @@ class TestSolveLeftovers:
         solve_leftovers(second, store, actor="ann")
         done = second.wait(job.id, SECONDS)
         assert (done.state, done.result["solved"]) == ("done", 5)
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
         second.close()
 
     def test_a_dataset_that_is_complete_needs_no_job(self, jobs: Jobs, store: Store, state) -> None:
@@ -189,4 +189,4 @@ class TestSolveLeftovers:
         solve_leftovers(jobs, store, actor="ann")
         (job,) = jobs.find()
         assert jobs.wait(job.id, SECONDS).result["solved"] == 1
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []

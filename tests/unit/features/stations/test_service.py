@@ -8,7 +8,7 @@ from app.errors import ConflictError, NotFoundError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
 from app.features.groups.submit import load
 from app.features.queue.service import list_groups
-from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.stations.service import load_station, redo_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
@@ -41,7 +41,7 @@ class TestSubmitStation:
         assert after.groups == tuple(ids)
         assert after.station.lines["Middle line"] == EDIT.lines["Middle line"]
         assert (after.revision, after.can_undo) == (2, True)
-        assert stale_groups(store, "demo") == ids
+        assert list_stale_groups(store, "demo") == ids
         for old, number in zip(before, ids, strict=True):
             new = load(store, number)
             assert new.group.view("cam1").station == after.station
@@ -52,7 +52,7 @@ class TestSubmitStation:
     def test_solving_again_makes_the_groups_whole(self, store, ids, station) -> None:
         change(store, station)
         assert solve_dataset(store, "demo").solved == len(ids)
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
 
     def test_an_older_state_is_refused(self, store, station) -> None:
         change(store, station)
@@ -110,7 +110,7 @@ class TestUndoStation:
         back = undo_station(store, station.id, if_match=after.etag, actor="ann")
         assert back.station == station.station
         assert (back.can_undo, back.can_redo) == (False, True)
-        assert stale_groups(store, "demo") == []
+        assert list_stale_groups(store, "demo") == []
         assert load(store, ids[0]).solution == before.solution
         again = redo_station(store, station.id, if_match=back.etag, actor="ann")
         assert again.station == after.station

@@ -18,7 +18,7 @@ from app.features.groups.edit import set_ball
 from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load, submit
 from app.features.groups.suggested_edits import list_edits_of_finding
-from app.features.queue.refresh_queries import differing_rows
+from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks import findings, making
@@ -96,7 +96,7 @@ class TestFindings:
         listed = list_groups(store, dataset_id(store, "demo"), f"finding:{TRACK_DISAGREES}")
         assert [row.id for row in listed.items] == [beside]
         with store.read() as session:
-            assert differing_rows(session)[1] == []
+            assert find_outdated_rows(session)[1] == []
 
     def test_offer_to_move_the_ball_or_to_leave_the_view_out(
         self, store: Store, beside: int
@@ -116,11 +116,11 @@ class TestFindings:
         after = submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
         assert told(store) == []
         with store.read() as session:
-            assert differing_rows(session)[1] == []
+            assert find_outdated_rows(session)[1] == []
         undo_group_edit(store, beside, if_match=after.etag, actor="ann")
         assert len(told(store)) == 1
         with store.read() as session:
-            assert differing_rows(session)[1] == []
+            assert find_outdated_rows(session)[1] == []
 
     def test_are_gone_when_the_track_is_made_without_a_reason_for_them(
         self, store: Store, beside: int

@@ -21,7 +21,7 @@ from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.json_text import canonical
 from app.tracking.ball_track import Correction
 from tests.databases import said_for_sqlite
@@ -76,7 +76,7 @@ class TestFreeze:
 class TestVerify:
     def test_a_track_comes_out_bit_for_bit(self, store, accepted) -> None:
         version = frozen(store)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert report.ok, report.values()
 
     def test_a_track_of_an_earlier_solver_is_named_and_not_called_damaged(
@@ -84,9 +84,9 @@ class TestVerify:
     ) -> None:
         version = frozen(store)
         monkeypatch.setattr(verify_module, "TRACK_VERSION", "later")
-        assert verify(store, version.id).ok
+        assert verify_version(store, version.id).ok
         monkeypatch.setattr(verify_module, "track_again", track_elsewhere)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert (report.ok, report.equal, report.groups) == (False, report.groups, len(accepted))
         assert [(item.place, item.frozen, item.now) for item in report.differences] == [
             ("track rig", f"made by version {TRACK_VERSION}", "version later makes another one")
@@ -102,7 +102,7 @@ class TestVerify:
     ) -> None:
         version = frozen(store)
         monkeypatch.setattr(verify_module, "track_again", lambda _: 1 / 0)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert (report.equal, report.different) == (report.groups, 1)
         assert report.differences[0].now == "ZeroDivisionError: division by zero"
 
@@ -117,7 +117,7 @@ class TestVerify:
                 text("UPDATE frozen SET body = :body WHERE key = :key"),
                 {"body": compress_text(canonical(value)), "key": key},
             )
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert (report.ok, report.different) == (False, 1)
         assert report.differences[0].place == "track rig"
         assert "1 value of the version itself came out differently" in report.sentence

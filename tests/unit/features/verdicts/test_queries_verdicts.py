@@ -3,14 +3,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.db.store import Store
-from app.features.solutions.queries import present_keys
+from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.queries import (
     StoredVerdict,
     count_by_judge,
-    inputs_judged,
     insert_verdicts,
-    judged_between,
-    newest_between,
+    list_groups_judged_between,
+    list_groups_with_newest_verdict_between,
+    read_judged_inputs,
     read_last_verdicts,
     read_verdicts,
 )
@@ -32,12 +32,16 @@ class TestRanges:
     def test_a_group_that_was_judged_again_is_not_of_the_earlier_range(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [FIRST, LATER], actor="ann", at="t")
-            assert newest_between(session, 1, 1) == []
-            assert newest_between(session, 1, 2) == newest_between(session, 2, 9) == [1]
-            assert judged_between(session, 1, 2) == [1, 1]
-            assert inputs_judged(session, 1, 1, [1, 9]) == {1: "a"}
-            assert inputs_judged(session, 2, 2, [1]) == {1: "b"}
-            assert inputs_judged(session, 1, 2, [9]) == {}
+            assert list_groups_with_newest_verdict_between(session, 1, 1) == []
+            assert (
+                list_groups_with_newest_verdict_between(session, 1, 2)
+                == list_groups_with_newest_verdict_between(session, 2, 9)
+                == [1]
+            )
+            assert list_groups_judged_between(session, 1, 2) == [1, 1]
+            assert read_judged_inputs(session, 1, 1, [1, 9]) == {1: "a"}
+            assert read_judged_inputs(session, 2, 2, [1]) == {1: "b"}
+            assert read_judged_inputs(session, 1, 2, [9]) == {}
 
 
 class TestCountByJudge:
@@ -58,5 +62,5 @@ class TestCountByJudge:
 class TestPresentKeys:
     def test_a_group_has_one_whether_it_is_solved_or_not(self, filled: Store) -> None:
         with filled.read() as session:
-            (key,) = present_keys(session, [1, 9]).values()
+            (key,) = read_current_solution_keys(session, [1, 9]).values()
         assert (key.group_id, key.policy_hash) == (1, "p")

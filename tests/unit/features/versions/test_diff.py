@@ -10,7 +10,7 @@ from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.diff import Setting, changelog_lines, diff_versions, version_changelog
+from app.features.versions.diff import Setting, describe_diff, diff_versions, make_version_changelog
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -71,7 +71,7 @@ class TestDiffVersions:
         assert (setting.name, setting.before) == ("split", {"kind": "given"})
 
     def test_settings_are_told_in_words(self, store, two) -> None:
-        lines = changelog_lines(diff_versions(store, two[0].id, two[1].id))
+        lines = describe_diff(diff_versions(store, two[0].id, two[1].id))
         (told,) = (line for line in lines if line.startswith("split"))
         assert told == "split: given before, camera (test cameras 9.png) now."
 
@@ -94,7 +94,7 @@ class TestDiffVersions:
             diff_versions(store, two[0].id, two[0].id),
             settings=(Setting("policy x", before, after),),
         )
-        assert changelog_lines(diff)[1] == f"policy x: {told}."
+        assert describe_diff(diff)[1] == f"policy x: {told}."
 
     def test_backwards_it_is_the_other_way_round(self, store, two) -> None:
         there, back = (
@@ -155,17 +155,19 @@ class TestOfWhateverPasses:
         metres = [item.metres for item in diff_versions(store, first.id, second.id).moved]
         assert metres == sorted(metres, reverse=True)
         assert metres[0] > 2 * metres[1]
-        lines = version_changelog(store, second.id)
+        lines = make_version_changelog(store, second.id)
         assert "1 group with another verdict." in lines
         assert any(line.endswith(f"{max(metres):.3f} m at most.") for line in lines)
 
 
 class TestChangelog:
     def test_the_first_version_says_so(self, store, two) -> None:
-        assert version_changelog(store, two[0].id) == ["First version: 3 groups, 6 balls in views."]
+        assert make_version_changelog(store, two[0].id) == [
+            "First version: 3 groups, 6 balls in views."
+        ]
 
     def test_the_next_one_says_what_changed(self, store, two) -> None:
-        lines = version_changelog(store, two[1].id)
+        lines = make_version_changelog(store, two[1].id)
         assert lines[0] == "Since v1:"
         assert "2 groups added (before: 1 not in the dataset, 1 unreviewed)." in lines
         assert "1 group dropped (now: 1 rejected: sides_confused)." in lines
@@ -174,4 +176,4 @@ class TestChangelog:
 
     def test_no_change_is_one_sentence(self, store, two) -> None:
         again = frozen(store, "v3", split=two[1].split)
-        assert version_changelog(store, again.id) == ["Nothing changed since v2."]
+        assert make_version_changelog(store, again.id) == ["Nothing changed since v2."]

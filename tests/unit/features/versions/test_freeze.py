@@ -17,7 +17,7 @@ from app.features.solutions.queries import SolutionModel
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
-from app.features.versions.membership import version_manifest
+from app.features.versions.membership import make_version_manifest
 from app.features.versions.queries import FrozenModel, VersionGroupModel, VersionModel, read_rows
 from app.features.versions.service import list_versions, read_frozen_groups
 from app.soccer.annotation import BallAnnotation
@@ -117,7 +117,7 @@ class TestFreeze:
         self, store, judged
     ) -> None:
         version = frozen(store, groups="passing", note="second try")
-        manifest = version_manifest(store, version.id)
+        manifest = make_version_manifest(store, version.id)
         assert manifest["verdicts"] == {"accepted": 2, "unreviewed": 1}
         (override,) = manifest["overrides"]
         assert override["group"].endswith("9.png")

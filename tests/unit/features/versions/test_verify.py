@@ -14,7 +14,7 @@ from app.features.groups.submit import load, submit
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_text
-from app.features.versions.verify import verify
+from app.features.versions.verify import verify_version
 from app.soccer.solution import Solution
 from app.solving.solve import NO_CALIBRATIONS, solve
 from tests.databases import said_for_sqlite
@@ -56,22 +56,22 @@ def tamper(store, prefix: str, change) -> None:
 class TestVerify:
     def test_everything_comes_out_as_it_was_frozen(self, store, version) -> None:
         seen = []
-        report = verify(store, version.id, progress=lambda *place: seen.append(place))
+        report = verify_version(store, version.id, progress=lambda *place: seen.append(place))
         assert report.ok, report.values()
         assert (report.equal, report.groups, seen[-1]) == (4, 4, (4, 4))
 
     def test_workers_find_the_same(self, store, version) -> None:
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
-            assert verify(store, version.id, executor).ok
+            assert verify_version(store, version.id, executor).ok
 
     def test_it_holds_after_the_group_was_edited(self, store, version) -> None:
         state = load(store, 1)
         submit(store, 1, set_ball("7.png", None), if_match=state.etag, actor="ben")
-        assert verify(store, version.id).ok
+        assert verify_version(store, version.id).ok
 
     def test_one_bit_is_a_difference_with_its_place(self, store, version, monkeypatch) -> None:
         monkeypatch.setattr(verify_module, "solve", one_bit_off)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert not report.ok
         assert (report.equal, report.groups) == (3, 4)
         places = {item.place for item in report.differences}
@@ -82,7 +82,7 @@ class TestVerify:
         self, store, version, monkeypatch
     ) -> None:
         monkeypatch.setattr(verify_module, "solve", broken)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert [item.now for item in report.differences] == ["ZeroDivisionError: "] * 4
 
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:", "calibration:"])
@@ -91,7 +91,7 @@ class TestVerify:
             return compress_text(read_text(body).replace(".5", ".6"))
 
         tamper(store, prefix, change)
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert not report.ok
         assert prefix == "calibration:" or "digest" in {item.place for item in report.differences}
 
@@ -99,17 +99,17 @@ class TestVerify:
         with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER version_group_refuses_update"))
             session.execute(text("UPDATE version_group SET split = 'test' WHERE position = 0"))
-        places = {item.place for item in verify(store, version.id).differences}
+        places = {item.place for item in verify_version(store, version.id).differences}
         assert places == {"hash", "split"}
 
     def test_missing_content_is_named(self, store, version) -> None:
         with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER frozen_refuses_delete"))
             session.execute(text("DELETE FROM frozen WHERE key LIKE 'solution:%'"))
-        report = verify(store, version.id)
+        report = verify_version(store, version.id)
         assert {item.place for item in report.differences} == {"missing"}
         assert report.equal == 0
 
     def test_an_unknown_version_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            verify(store, 12)
+            verify_version(store, 12)

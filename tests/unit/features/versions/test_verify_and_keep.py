@@ -52,7 +52,7 @@ class TestVerifyAndKeep:
         def broken(*_arguments, **_options):
             raise StorageError("the disk is full")
 
-        monkeypatch.setattr(verify_module, "verify", broken)
+        monkeypatch.setattr(verify_module, "verify_version", broken)
         with pytest.raises(StorageError):
             verify_and_keep(store, version.id, actor="ben")
         kept = get_version(store, version.id).verified
@@ -64,7 +64,7 @@ class TestVerifyAndKeep:
             store.note_damage(error)
             raise error
 
-        monkeypatch.setattr(verify_module, "verify", broken)
+        monkeypatch.setattr(verify_module, "verify_version", broken)
         with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
             verify_and_keep(store, version.id, actor="ben")
         assert get_version(store, version.id).verified is None
