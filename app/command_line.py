@@ -94,9 +94,9 @@ app.add_typer(people.commands, name="users")
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from app.formats.manifest import SOFTWARE, software_version
+        from app.formats.manifest import SOFTWARE, read_software_version
 
-        typer.echo(f"{SOFTWARE} {software_version()}")
+        typer.echo(f"{SOFTWARE} {read_software_version()}")
         raise typer.Exit
 
 

@@ -51,16 +51,16 @@ from app.features.verdicts import routes as verdicts
 from app.features.versions import routes as versions
 from app.features.webhooks import routes as webhooks
 from app.features.what_if import routes as what_if
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.http import event_routes as http_event
 from app.http import openapi
 from app.http.access import Access
 from app.http.deps import Services
-from app.http.errors import install_handlers
+from app.http.errors import install_error_handlers
 from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.metrics import SharedNumbers, install_metrics
-from app.http.openapi import describe
+from app.http.openapi import describe_errors_in_openapi
 from app.http.pages import STATIC, BrowserSite, install_pages
 from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
@@ -71,8 +71,8 @@ from app.http.requests import (
     OneRange,
     refuse_unknown_parameters,
 )
-from app.http.route import Gate, Route, answer_no_route, require_permissions
-from app.http.team import Team, allowed_hosts
+from app.http.route import Gate, Route, require_permissions, respond_to_unknown_route
+from app.http.team import Team, list_allowed_hosts
 
 PREFIX = "/api/v1"
 ROUTERS = (
@@ -155,7 +155,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     site = BrowserSite(static, team=settings.team)
     app = FastAPI(
         title="Touchline",
-        version=software_version(),
+        version=read_software_version(),
         summary="Multi-view soccer frames into a trusted 3D ball dataset.",
         openapi_url=None,
         # Both pages load scripts from elsewhere, which the content policy refuses.
@@ -172,8 +172,8 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         RequestLimits(team=team is not None),
         min(MAX_JSON_BYTES, settings.max_upload_bytes),
     )
-    install_handlers(app)
-    app.router.route_class, app.router.default = Route, answer_no_route
+    install_error_handlers(app)
+    app.router.route_class, app.router.default = Route, respond_to_unknown_route
     app.include_router(maintenance.health_router)
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     events = services.events
@@ -184,7 +184,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
             prefix=PREFIX,
             dependencies=[Depends(refuse_unknown_parameters)],
         )
-    describe(app)
+    describe_errors_in_openapi(app)
     require_permissions(app)
     _add_middleware(app, settings, site)
     return app
@@ -196,7 +196,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None
     app.add_middleware(HeadAsGet)
     app.add_middleware(OneLength)
     app.add_middleware(SameOrigin, url=settings.url, required=settings.team)
-    app.add_middleware(KnownHosts, allowed=allowed_hosts(settings))
+    app.add_middleware(KnownHosts, allowed=list_allowed_hosts(settings))
     install_metrics(app, app.state.gate.limits)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)

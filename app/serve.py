@@ -61,7 +61,7 @@ def serve(
     from app.db.locks import server_lock
     from app.features.maintenance.upkeep import read_database_file_sizes
     from app.features.people.service import require_no_people
-    from app.http.server import listen, run, serve_with
+    from app.http.server import open_listening_socket, run, serve_with
     from app.log import log_to_stderr
     from app.main import create_app
     from app.workers.executors import server_pool
@@ -75,7 +75,7 @@ def serve(
                 require_no_people(store)
         if with_sample:
             _make_sample(settings)
-        with listen(settings.host, settings.port) as (socket, address):
+        with open_listening_socket(settings.host, settings.port) as (socket, address):
             if settings.web_workers > 1:
                 _print_address(settings, address)
                 serve_with(settings.web_workers, _serve_part, settings, socket)

@@ -14,7 +14,7 @@ from app.paint.view_proposal import propose_lines_in_image
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
-from app.solving.solve import solve, warm_up
+from app.solving.solve import solve, warm_up_solver
 from app.tracking.ball_solve import track_ball
 from tests.bench.ball_track import frame_times, main
 from tests.bench.link import made_ball
@@ -49,7 +49,7 @@ def compile_tests() -> None:
 
 
 def _solve(scene: Scene) -> None:
-    warm_up()
+    warm_up_solver()
     assert solve(scene.group, PAPER).views[0].calibration
     ball = made_ball(2.0)
     times = frame_times(ball)

@@ -20,7 +20,7 @@ from app.features.tracks.stretches import gather_stretches
 from app.formats.export_formats import WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.output import output_tree
+from app.formats.output import open_output_folder
 from app.formats.tracks_writer import TrackRecord
 from app.json_text import canonical
 from app.soccer.annotation import BallAnnotation
@@ -99,7 +99,7 @@ def write_flight_export(out: Path) -> BallTrack:
     (stretch,) = gather_stretches(records, PAPER)
     track = make_track(TrackInputs.of(stretch))
     kept = [TrackRecord(stretch.key, track, stretch.pitch, stretch.rate, verdict="accepted")]
-    with output_tree(out) as root:
+    with open_output_folder(out) as root:
         counts = write_format(root, records, WriteOptions("parquet", kept=kept))
         stamp = {"frozen": {"hash": "6f1ed002ab559585" * 4}}
         manifest = Manifest("flight", "parquet", "2030-01-01", counts, version="v1", stamp=stamp)

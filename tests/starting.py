@@ -197,9 +197,9 @@ def _load() -> None:
     gc.disable()
     for module in pkgutil.walk_packages(app.__path__, "app."):
         importlib.import_module(module.name)
-    from app.solving.solve import warm_up
+    from app.solving.solve import warm_up_solver
 
-    warm_up()
+    warm_up_solver()
     gc.collect()
     gc.freeze()
     gc.enable()

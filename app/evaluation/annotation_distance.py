@@ -190,7 +190,7 @@ def compare_balls(a: tuple[BallAnnotation, ...], b: tuple[BallAnnotation, ...]) 
     The distance is that of the centres; the difference of diameters is ``b`` less ``a``, None
     where either is a point without a box.
     """
-    states = ball_state(a), ball_state(b)
+    states = classify_ball_state(a), classify_ball_state(b)
     places = [_only_visible_ball(a), _only_visible_ball(b)]
     first, second = places
     if first is None or second is None:
@@ -220,7 +220,7 @@ def compare_balls_3d(a: Ball3D | None, b: Ball3D | None) -> Ball3DDistance:
     return Ball3DDistance(True, True, float(np.linalg.norm(step)), sigmas, p_value)
 
 
-def ball_state(balls: tuple[BallAnnotation, ...]) -> BallState:
+def classify_ball_state(balls: tuple[BallAnnotation, ...]) -> BallState:
     """What a person says of the ball in a view: ``seen``, ``occluded``, ``out_of_view``, ..."""
     seen = [ball for ball in balls if not ball.out_of_view]
     if len(seen) > 1:
@@ -313,7 +313,7 @@ class DistanceFromTruth:
     ball_m: float | None
 
 
-def distance_from_truth(
+def measure_distance_from_truth(
     truth: Group, annotated: Group, ball: Point3 | None, own: Point3 | None
 ) -> DistanceFromTruth:
     """The error of an annotation; views are those of the truth that the annotation has, too.
@@ -350,7 +350,7 @@ class TrueView:
     center: ImagePoint
 
 
-def world_error(
+def measure_error_in_world(
     truth: Group,
     views: Mapping[str, TrueView],
     annotated: Group,

@@ -215,7 +215,7 @@ COLUMNS = (
 )
 
 
-def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Table:
+def make_detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Table:
     """AP with intervals by match."""
     hits = find_hits(judged)
     place = resamples.places([item.frame.match for item in judged])
@@ -249,7 +249,7 @@ def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Ta
     return Table("detection", "Detection", COLUMNS, (row,), note)
 
 
-def precision_recall(judged: Sequence[JudgedFrame]) -> Figure:
+def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Figure:
     """Precision against recall at IoU 0.5 and 0.75."""
     hits = find_hits(judged)
     balls = int(hits.balls.sum())

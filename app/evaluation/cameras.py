@@ -34,8 +34,8 @@ from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.calibrate import calibrate
 from app.solving.jaccard import (
     camera_jaccard,
+    classify_markings,
     jaccard,
-    marking_outcomes,
     measure_markings,
     project_markings,
 )
@@ -87,7 +87,7 @@ def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> 
     pitch = pitch.with_goal("inner")
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     jac = tuple(
-        jaccard(marking_outcomes(measured, lines, gamma / 100 * size.diagonal))
+        jaccard(classify_markings(measured, lines, gamma / 100 * size.diagonal))
         for gamma in GAMMAS_PERCENT
     )
     (challenge,) = camera_jaccard(camera, lines, pitch, size, (CHALLENGE_PX,), symmetric=True)
@@ -116,7 +116,7 @@ def score_frames(frames: Iterable[FrameScore | None]) -> CameraScore:
     )
 
 
-def leave_one_out(
+def measure_leave_one_out_errors(
     lines: Lines,
     pitch: Pitch,
     size: ImageSize,
@@ -136,10 +136,10 @@ def leave_one_out(
         Marking and pixels; None where the others do not give a camera.
     """
     for marking in lines:
-        yield marking, error_without(lines, marking, pitch, size, policy, others)
+        yield marking, measure_error_without_marking(lines, marking, pitch, size, policy, others)
 
 
-def error_without(
+def measure_error_without_marking(
     lines: Lines,
     marking: str,
     pitch: Pitch,

@@ -76,7 +76,7 @@ class FrameComparison:
     frames: tuple[FrameOfTwoRuns, ...]
 
 
-def differing_pins(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
+def list_differing_settings(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
     """Pins in which two runs differ that should be measured alike."""
     names = [name for name in _MEASURES if first.get(name) != second.get(name)]
     # Where one has no reference boxes, no two numbers come of different ones.

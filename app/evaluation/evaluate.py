@@ -13,10 +13,10 @@ from app.evaluation.average_precision import (
     DISTANCE,
     PARALLAX,
     SIZE,
-    detection_summary,
     detection_table,
     error_figure,
-    precision_recall,
+    make_detection_summary,
+    make_precision_recall_figure,
 )
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
@@ -28,7 +28,11 @@ from app.evaluation.frame import (
     judge_detections,
     size_error_percent,
 )
-from app.evaluation.localization import localization_table, measure_frame, precision_distance
+from app.evaluation.localization import (
+    localization_table,
+    make_precision_distance_figure,
+    measure_frame,
+)
 from app.evaluation.result import (
     Axis,
     Column,
@@ -328,7 +332,7 @@ def _detection_tables(
     inputs: EvaluationInputs,
     resamples: Resamples,
 ) -> Iterator[Table]:
-    yield detection_summary(judged, resamples)
+    yield make_detection_summary(judged, resamples)
     yield localization_table(results, resamples, predicted=inputs.cameras is not None)
     yield detection_table(judged, results, SIZE)
     yield detection_table(judged, results, DISTANCE)
@@ -337,8 +341,8 @@ def _detection_tables(
 def _detection_figures(
     judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: EvaluationInputs
 ) -> Iterator[Figure]:
-    yield precision_recall(judged)
-    yield precision_distance(results, predicted=inputs.cameras is not None)
+    yield make_precision_recall_figure(judged)
+    yield make_precision_distance_figure(results, predicted=inputs.cameras is not None)
     for bins in (DISTANCE, PARALLAX, SIZE):
         yield error_figure(results, bins)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from app.formats.fields import id_text
+from app.formats.fields import id_to_text
 from app.formats.frame_names import (
     frame_path_by_match,
     frame_path_in_split,
@@ -267,7 +267,7 @@ class FrameNames:
 
 def _parse_number(text: str) -> int | None:
     """A number as tables write it, ``4``, ``0004`` or ``4.0``."""
-    found = _DIGITS.fullmatch(id_text(text) or "")
+    found = _DIGITS.fullmatch(id_to_text(text) or "")
     return int(found[0]) if found else None
 
 

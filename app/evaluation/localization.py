@@ -72,7 +72,7 @@ def measure_frame(
     )
 
 
-def place_error(
+def measure_position_error(
     frame: Frame, camera: Camera | None, found: Detection | None, diameter_m: float
 ) -> float | None:
     """Metres between where one view puts a detection and the triangulated ball.
@@ -98,8 +98,8 @@ def _place_errors(
     diameter_m: float,
 ) -> tuple[float | None, float | None]:
     """Error of the hit, and of the surest detection, which mostly is the same."""
-    error = place_error(frame, camera, hit, diameter_m)
-    return error, error if best is hit else place_error(frame, camera, best, diameter_m)
+    error = measure_position_error(frame, camera, hit, diameter_m)
+    return error, error if best is hit else measure_position_error(frame, camera, best, diameter_m)
 
 
 def _distance_from_camera(frame: Frame) -> float | None:
@@ -162,7 +162,7 @@ def localization_table(
     return Table("localization", "3D from one view", COLUMNS, tuple(rows), note)
 
 
-def precision_distance(frames: Sequence[FrameResult], *, predicted: bool) -> Figure:
+def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: bool) -> Figure:
     """Share of frames within a distance, against the distance."""
     balls = [frame for frame in frames if frame.ball and frame.distance_m is not None]
     places = (np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)

@@ -41,11 +41,11 @@ from app.evaluation.prediction_table import is_ball_table, is_mot, read_table, r
 from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.cameras import read_cameras
-from app.formats.fields import IdIndex, id_text
+from app.formats.fields import IdIndex, id_to_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.formats.json_reader import describe_document, read_json, read_json_lines
 from app.formats.report import Report
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.geometry.camera import Camera
 from app.json_text import quoted
 from app.soccer.choices import PredictionFormat
@@ -110,7 +110,7 @@ def read_predictions(
         )
     kind = _kind_by_ending(path, limits) if format == AUTO else format
     run = PredictionRun(names, category, size)
-    with opened_tree(path, run.found.report, limits) as tree:
+    with open_tree_while_read(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
         run.found.format = kind
@@ -150,7 +150,7 @@ def _unused_option_error(option: str, what: str, kind: str) -> InputError:
 def _kind_by_ending(path: Path, limits: Limits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
     # What is wrong is reported by whoever reads them then.
-    with opened_tree(path, Report(), limits) as tree:
+    with open_tree_while_read(path, Report(), limits) as tree:
         names = [] if tree is None else tree.names()
         endings = {PurePosixPath(name).suffix.lower() for name in names}
         kind = next((kind for ending, kind in ENDINGS if ending in endings), "coco")
@@ -222,7 +222,7 @@ Documents = list[tuple[str, Any]]
 
 
 def _read_document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
-    with opened_tree(path, run.found.report, limits) as tree:
+    with open_tree_while_read(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
         return _json_documents(tree, path, run.found.report)
@@ -303,7 +303,7 @@ class _CocoImages:
                     with noted(report, shown, f"image {number}"):
                         if image.get("width") and image.get("height"):
                             sides = (
-                                read_field(image, side, fields.whole_number)
+                                read_field(image, side, fields.parse_whole_number)
                                 for side in ("width", "height")
                             )
                             sizes[name] = ImageSize(*sides)
@@ -331,7 +331,7 @@ def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
     value = item.get("id")
     if not index.add(value, name) and (known := index.find(value)) != name:
         known_as = (
-            None if known is None else f"is {id_text(value)}, which is {quoted(known)} already"
+            None if known is None else f"is {id_to_text(value)}, which is {quoted(known)} already"
         )
         raise FieldError(
             "id", f"{known_as or 'must be a number or a string'}; this entry is left out"
@@ -344,7 +344,7 @@ def _image_id_text(value: Any) -> str:
     Raises:
         ValueError: It is neither a number nor a name.
     """
-    text = id_text(value)
+    text = id_to_text(value)
     if text is None or (isinstance(value, float) and not value.is_integer()):
         raise ValueError("is missing or neither a number nor a name")
     return text
@@ -354,9 +354,9 @@ def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, 
     """The id of the class of a result, and what a document calls it."""
     if "category_id" not in value:
         return 1, known.classes.find(1) or ""
-    label, text = known.classes.find(value["category_id"]), id_text(value["category_id"])
+    label, text = known.classes.find(value["category_id"]), id_to_text(value["category_id"])
     try:
-        return read_field(value, "category_id", fields.whole_number), label or ""
+        return read_field(value, "category_id", fields.parse_whole_number), label or ""
     except FieldError:
         # A class may be called by a word, where the document lists it so.
         if label is None or text is None:
@@ -371,8 +371,8 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
     if not own or value.get("image_id") is not None:
         with in_field("image_id"):
             identity = _image_id_text(value.get("image_id"))
-    box = read_field(value, "bbox", lambda item: Box(*fields.number_list(item, 4)))
-    score = read_field(value, "score", fields.number) if "score" in value else None
+    box = read_field(value, "bbox", lambda item: Box(*fields.parse_numbers(item, 4)))
+    score = read_field(value, "score", fields.parse_number) if "score" in value else None
     if not run.wants(*_class_of(value, known)):
         return
     named = known.names.find(identity) or ""
@@ -465,11 +465,11 @@ def _add_yolo(
         raise ValueError(
             f"has {len(cells)} numbers, not class, cx, cy, w, h, and maybe a confidence and a track"
         )
-    category = fields.whole_number(cells[0])
-    x, y, width, height = (fields.number(cell) for cell in cells[1:5])
+    category = fields.parse_whole_number(cells[0])
+    x, y, width, height = (fields.parse_number(cell) for cell in cells[1:5])
     if not all(-1 <= value <= 2 for value in (x, y, width, height)):
         raise ValueError("is in pixels; YOLO's numbers are fractions of the image size")
-    score = fields.number(cells[5]) if len(cells) > 5 and not tracked else None
+    score = fields.parse_number(cells[5]) if len(cells) > 5 and not tracked else None
     if not run.wants(category) or frame is None:
         return
     across, down = frame.size.width, frame.size.height

@@ -166,7 +166,7 @@ class PredictionRun:
             ValueError: It cannot be a box of that image, or there are too many.
         """
         seen = size or self.size or frame.size
-        if problem := box_problem(box, seen):
+        if problem := find_box_problem(box, seen):
             raise ValueError(problem)
         if score is None:
             self.found.without_score += 1
@@ -228,7 +228,7 @@ class PredictionRun:
         )
 
 
-def box_problem(box: Box, size: ImageSize) -> str | None:
+def find_box_problem(box: Box, size: ImageSize) -> str | None:
     """Why a box cannot be a ball in an image, in words; None where it can."""
     if not (box.width > 0 and box.height > 0):
         return "needs a width and a height above zero"

@@ -29,7 +29,7 @@ from app.evaluation.prediction_run import (
 )
 from app.formats import fields
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
-from app.formats.fields import id_text
+from app.formats.fields import id_to_text
 from app.formats.file_tree import FileTree, Limits
 from app.formats.report import Report
 from app.json_text import quoted
@@ -155,7 +155,7 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
     if box is None:
         return
     score_name = next((name for name in SCORES if not is_missing(cells.get(name))), None)
-    score = read_field(cells, score_name, fields.number) if score_name else None
+    score = read_field(cells, score_name, fields.parse_number) if score_name else None
     if not _is_ball_row(run, cells):
         return
     frame = _row_frame(run, cells)
@@ -163,8 +163,8 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
         size = None
         if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
             size = ImageSize(
-                read_field(cells, "img_w", fields.whole_number),
-                read_field(cells, "img_h", fields.whole_number),
+                read_field(cells, "img_w", fields.parse_whole_number),
+                read_field(cells, "img_h", fields.parse_whole_number),
             )
         with in_field(where):
             run.add(frame, box, score, size)
@@ -180,7 +180,7 @@ def _is_ball_row(run: PredictionRun, cells: Mapping[str, str]) -> bool:
         (cells[name].strip() for name in _CLASS_NAMES if not is_missing(cells.get(name))), ""
     )
     try:
-        return run.wants(fields.whole_number(text), named)
+        return run.wants(fields.parse_whole_number(text), named)
     except ValueError:
         return run.wants(text, text)
 
@@ -202,7 +202,7 @@ def _row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
                 where = ", ".join(sides)
                 if all(is_missing(cells[side]) for side in sides):
                     return None, where
-                numbers = (read_field(cells, side, fields.number) for side in sides)
+                numbers = (read_field(cells, side, fields.parse_number) for side in sides)
                 return made(*numbers), where
     raise FieldError("ball_bbox", "is missing, and so are x, y, w and h")
 
@@ -211,21 +211,23 @@ def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | Non
     """The frame of a row; one that is none is counted."""
     number = next((name for name in _FRAME_NUMBERS if not is_missing(cells.get(name))), None)
     if not is_missing(cells.get("main_action")):
-        action = read_field(cells, "main_action", fields.whole_number)
+        action = read_field(cells, "main_action", fields.parse_whole_number)
         replay = cells.get("replay")
-        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole_number(replay)}"
+        image = (
+            f"{action}" if is_missing(replay) else f"{action}_{fields.parse_whole_number(replay)}"
+        )
         parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
         return run.frame("/".join([part for part in parts if part] + [image]))
     if number is not None and not is_missing(cells.get("camera")):
-        camera = id_text((cells["camera"] or "").strip().removeprefix("cam"))
-        return run.frame(f"cam{camera}/{id_text(cells[number])}")
+        camera = id_to_text((cells["camera"] or "").strip().removeprefix("cam"))
+        return run.frame(f"cam{camera}/{id_to_text(cells[number])}")
     # The name of a picture says more than a number, which tools count from where they like. Beside
     # a class, "name" is that of the class.
     named = any(name in cells for name in _CLASSES)
     for name in _NAMES:
         if not is_missing(cells.get(name)) and not (named and name == "name"):
             text = cells[name].strip()
-            return run.frame(id_text(text) or text if name == "image_id" else text)
+            return run.frame(id_to_text(text) or text if name == "image_id" else text)
     if number is not None:
         return run.numbered(cells[number].strip())
     raise FieldError("frame", "is missing, and so is every other column that can name the frame")
@@ -332,8 +334,12 @@ class _Balls:
 
 
 def _read_instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
-    frame = None if is_missing(row.get("frame")) else read_field(row, "frame", fields.whole_number)
-    time = None if is_missing(row.get("time_s")) else read_field(row, "time_s", fields.number)
+    frame = (
+        None
+        if is_missing(row.get("frame"))
+        else read_field(row, "frame", fields.parse_whole_number)
+    )
+    time = None if is_missing(row.get("time_s")) else read_field(row, "time_s", fields.parse_number)
     if frame is None and time is None:
         raise FieldError("frame", "is missing, and so is time_s")
     if frame is not None and not 0 <= frame < _MOST_FRAME:
@@ -342,7 +348,7 @@ def _read_instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
 
 
 def _read_metres(text: str) -> float:
-    value = fields.number(text)
+    value = fields.parse_number(text)
     if abs(value) > FARTHEST_M:
         raise ValueError(
             f"is {value:g} m, which is too far away; positions are in metres from the centre mark"
@@ -354,7 +360,7 @@ def _read_sigma(row: Mapping[str, str]) -> tuple[float, float, float] | None:
     names = _SIGMAS if not is_missing(row.get(_SIGMAS[0])) else ("sigma_m",) * 3
     if is_missing(row.get(names[0])):
         return None
-    x, y, z = (read_field(row, name, fields.number) for name in names)
+    x, y, z = (read_field(row, name, fields.parse_number) for name in names)
     if not min(x, y, z) > 0:
         raise FieldError(names[0], "is not above zero")
     return x, y, z

@@ -184,7 +184,7 @@ class Figure:
     note: str = ""
 
 
-def figure_csv(figure: Figure) -> str:
+def figure_to_csv(figure: Figure) -> str:
     """The curves of a figure; the header says what the axes show, with their units."""
     x, y = (
         _axes_name([panel.x for panel in figure.panels]),
@@ -197,7 +197,7 @@ def figure_csv(figure: Figure) -> str:
     )
 
 
-def table_csv(table: Table) -> str:
+def table_to_csv(table: Table) -> str:
     """A table, each number followed by its interval and its denominators."""
     header = ["row"]
     for column in table.columns:
@@ -339,7 +339,7 @@ MAX_LEGEND = 6
 _STYLED = Lock()
 
 
-def figure_png(figure: Figure) -> bytes:
+def figure_to_png(figure: Figure) -> bytes:
     """The bytes of a PNG, panels side by side, title above and note below.
 
     Raises:

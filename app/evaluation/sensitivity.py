@@ -31,8 +31,8 @@ class BallSample:
 
     Attributes:
         distance_m: From the camera.
-        by_size: Metres that the ball moves, at each of ``size_places()``.
-        by_shift: The same at ``shift_places()``.
+        by_size: Metres that the ball moves, at each of ``make_size_changes()``.
+        by_shift: The same at ``make_centre_shifts()``.
         size_slope: Derivative at zero, metres per per cent of the size.
         shift_slope: Metres per per cent of the diagonal.
     """
@@ -45,12 +45,12 @@ class BallSample:
     shift_slope: float
 
 
-def size_places() -> FloatArray:
+def make_size_changes() -> FloatArray:
     """Changes of the size, per cent."""
     return np.linspace(-SIZE_PERCENT, SIZE_PERCENT, STEPS)
 
 
-def shift_places() -> FloatArray:
+def make_centre_shifts() -> FloatArray:
     """Shifts of the centre, per cent of the diagonal."""
     return np.linspace(-SHIFT_PERCENT, SHIFT_PERCENT, STEPS)
 
@@ -87,8 +87,8 @@ def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
     return BallSample(
         frame,
         float(np.linalg.norm(origin - camera.position)),
-        np.array([moved(0.0, percent) for percent in size_places()]),
-        np.array([moved(shift, 0.0) for shift in shift_places()]),
+        np.array([moved(0.0, percent) for percent in make_size_changes()]),
+        np.array([moved(shift, 0.0) for shift in make_centre_shifts()]),
         size_slope * diameter / 100,
         shift_slope * frame.size.diagonal / 100,
     )
@@ -147,7 +147,7 @@ def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _curve_and_slope(item, size_places(), item.by_size, item.size_slope)
+            for line in _curve_and_slope(item, make_size_changes(), item.by_size, item.size_slope)
         ),
         color=color,
     )
@@ -158,7 +158,9 @@ def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _curve_and_slope(item, shift_places(), item.by_shift, item.shift_slope)
+            for line in _curve_and_slope(
+                item, make_centre_shifts(), item.by_shift, item.shift_slope
+            )
         ),
         color=color,
     )

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.formats.fields import IdIndex, id_text
+from app.formats.fields import IdIndex, id_to_text
 from app.formats.report import Report
 from app.wording import plural
 
@@ -182,7 +182,7 @@ class Categories:
     def _read_listed_categories(self, listed: Sequence[Any]) -> Iterable[tuple[Any, Category]]:
         for index, item in enumerate(listed):
             record = f"categories[{index}]"
-            if not isinstance(item, dict) or id_text(item.get("id")) is None:
+            if not isinstance(item, dict) or id_to_text(item.get("id")) is None:
                 self._report.note(
                     self._path, record, "id", "must be a number or a text; this entry is left out"
                 )
@@ -194,14 +194,16 @@ class Categories:
             yield item["id"], self._make_category(item["id"], name.strip(), item)
 
     def _make_category(self, value: Any, name: str, item: Mapping[str, Any]) -> Category:
-        text = id_text(value) or ""
+        text = id_to_text(value) or ""
         points = item.get("keypoints")
         keypoints = tuple(map(str, points)) if isinstance(points, list) else ()
         return Category(text, name, keypoints, self._is_ball(text, name))
 
     def _is_ball(self, text: str, name: str) -> bool:
         if self._named:
-            return id_text(self._named) == text or (bool(name) and is_same_name(name, self._named))
+            return id_to_text(self._named) == text or (
+                bool(name) and is_same_name(name, self._named)
+            )
         return is_ball(name)
 
     def _make_categories_from_ids(
@@ -210,10 +212,10 @@ class Categories:
         """A category for each id; the only one is the ball where no picture has two of it."""
         images: dict[str, Counter[str]] = {}
         for item in annotations:
-            text = id_text(item.get("category_id")) if isinstance(item, dict) else None
+            text = id_to_text(item.get("category_id")) if isinstance(item, dict) else None
             if text is not None:
-                images.setdefault(text, Counter())[id_text(item.get("image_id")) or ""] += 1
+                images.setdefault(text, Counter())[id_to_text(item.get("image_id")) or ""] += 1
         for text, counts in images.items():
             only = len(images) == 1 and max(counts.values()) == 1
-            named = id_text(self._named) == text if self._named else only
+            named = id_to_text(self._named) == text if self._named else only
             yield text, Category(text, "", (), named)

@@ -100,7 +100,7 @@ def covariance_from_json(
         raise ValueError(
             "is for a lens with one radial term, and this camera has another lens: leave it out"
         )
-    rows = [fields.number_list(row, PARAMETERS) for row in fields.require_list(found)]
+    rows = [fields.parse_numbers(row, PARAMETERS) for row in fields.require_list(found)]
     if len(rows) != PARAMETERS:
         raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
     known = np.reshape(camera_covariance(number for row in rows for number in row), (8, 8))
@@ -162,7 +162,7 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
                 reader.read_field("y_focal_length", _positive_number),
             ),
             principal_point=reader.read_field("principal_point", _two_numbers),
-            skew=reader.read_field("skew", fields.number) if "skew" in value else 0.0,
+            skew=reader.read_field("skew", fields.parse_number) if "skew" in value else 0.0,
             distortion=np.array(coefficients),
             lens=lens,
         )
@@ -187,7 +187,7 @@ class _CameraFields:
     def read_distortion(self, name: str, count: int) -> tuple[float, ...]:
         if self.value.get(name) is None:
             return (0.0,) * count
-        return self.read_field(name, lambda value: fields.number_list(value, count))
+        return self.read_field(name, lambda value: fields.parse_numbers(value, count))
 
     def error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self.path, self.record, name, problem)
@@ -213,7 +213,7 @@ def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
             )
     count = LENSES[name].count
     return name, reader.read_field(
-        LENS_COEFFICIENTS, lambda value: fields.number_list(value, count)
+        LENS_COEFFICIENTS, lambda value: fields.parse_numbers(value, count)
     )
 
 
@@ -222,7 +222,7 @@ def _list_lens_names() -> str:
 
 
 def _read_rotation(reader: _CameraFields) -> FloatArray:
-    pan, tilt, roll = (reader.read_field(name, fields.number) for name in _ANGLES)
+    pan, tilt, roll = (reader.read_field(name, fields.parse_number) for name in _ANGLES)
     rotation = rotation_from_pan_tilt_roll(*np.radians([pan, tilt, roll]))
     if reader.value.get("rotation_matrix") is None:
         return rotation
@@ -247,23 +247,23 @@ def _require_plausible_size(value: T) -> T:
 
 
 def _positive_number(value: Any) -> float:
-    result = fields.number(value)
+    result = fields.parse_number(value)
     if result <= 0:
         raise ValueError(f"is {result:g}; a focal length is positive")
     return result
 
 
 def _two_numbers(value: Any) -> tuple[float, float]:
-    x, y = fields.number_list(value, 2)
+    x, y = fields.parse_numbers(value, 2)
     return x, y
 
 
 def _three_numbers(value: Any) -> tuple[float, ...]:
-    return fields.number_list(value, 3)
+    return fields.parse_numbers(value, 3)
 
 
 def _three_by_three_matrix(value: Any) -> list[tuple[float, ...]]:
     rows = fields.require_list(value)
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")
-    return [fields.number_list(row, 3) for row in rows]
+    return [fields.parse_numbers(row, 3) for row in rows]

@@ -148,7 +148,7 @@ def _flatten_numbers(value: Any) -> list[float]:
                 raise ValueError(f"has more than {MAX_NUMBERS} numbers")
             pending.extend(reversed(item))
         else:
-            flat.append(fields.number(item))
+            flat.append(fields.parse_number(item))
             if abs(flat[-1]) > MAX_NUMBER:
                 raise ValueError(f"is larger than any camera has (at most {MAX_NUMBER:.0e})")
         if len(flat) + len(pending) > MAX_NUMBERS:
@@ -181,10 +181,10 @@ def _normalize_camera_matrix(matrix: FloatArray) -> FloatArray:
 
 def _camera_matrix_from_focal_length(value: Mapping[str, Any]) -> FloatArray:
     if "fx" in value:
-        fx, fy, cx, cy = (fields.number(value[name]) for name in _FOCAL[0])
+        fx, fy, cx, cy = (fields.parse_number(value[name]) for name in _FOCAL[0])
     else:
-        fx, fy = (fields.number(value[name]) for name in _FOCAL[1])
-        cx, cy = fields.number_list(value.get("principal_point"), 2)
+        fx, fy = (fields.parse_number(value[name]) for name in _FOCAL[1])
+        cx, cy = fields.parse_numbers(value.get("principal_point"), 2)
     return _normalize_camera_matrix(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]))
 
 
@@ -308,7 +308,7 @@ def read_camera_arrays(
     return [(None if count == 1 else f"{key}/{at}", item) for at, item in enumerate(objects)]
 
 
-def camera_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, FloatArray]:
+def cameras_to_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, FloatArray]:
     """Cameras over time as FIFA's skeletal kit has them: a row a frame, from frame 0 on.
 
     The world is x along the pitch, y across it away from the main stand, z up. Frames without a camera

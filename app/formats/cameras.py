@@ -23,14 +23,14 @@ from app.formats.camera_matrix import (
     read_opencv_storage,
 )
 from app.formats.export_record import ExportRecord
-from app.formats.fields import stated_size
+from app.formats.fields import parse_image_size
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import fold_file_name, frame_name_claims, view_file_path
 from app.formats.json_reader import describe_document, is_camera, read_json, read_json_lines
 from app.formats.report import Report
-from app.formats.sn_calibration import CAMERAS, LINES, original_frame_path, read_match_info
-from app.formats.synloc import camera_from_synloc, image_records_by_stem, is_synloc
-from app.formats.trees import opened_tree
+from app.formats.sn_calibration import CAMERAS, LINES, find_original_frame_path, read_match_info
+from app.formats.synloc import camera_from_synloc, index_image_records, is_synloc
+from app.formats.trees import open_tree_while_read
 from app.formats.view_files import PutText, write_to_disk
 from app.geometry.camera import Camera
 from app.json_text import json_text
@@ -89,7 +89,7 @@ def read_cameras(
     takes the size of the images of each camera whose file states it, ``covariances`` what a file
     says of how well its camera is known (for ``covariance_from_json``).
     """
-    with opened_tree(path, report, limits) as tree:
+    with open_tree_while_read(path, report, limits) as tree:
         if tree is None:
             return {}
         names = tree.names()
@@ -144,7 +144,7 @@ def _frame_places_of_export(tree: FileTree, names: list[str]) -> dict[str, str]:
     found = {}
     # What is wrong with the file is no matter of cameras.
     for image, record in read_match_info(tree, names, Report()).items():
-        lines, place = PurePosixPath(image), original_frame_path(record)
+        lines, place = PurePosixPath(image), find_original_frame_path(record)
         if place is not None and lines.parts[0] == LINES:
             file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
             found[str(file)] = place
@@ -202,7 +202,7 @@ def _read_file(
                 problem = f'is a second camera called "{called}"; the first one is used'
                 raise DatasetFormatError(shown, record, None, problem)
             cameras[called] = camera
-            if isinstance(item, dict) and (size := stated_size(item)) is not None:
+            if isinstance(item, dict) and (size := parse_image_size(item)) is not None:
                 stated.sizes[called] = size
             if covariance is not None:
                 stated.covariances[called] = covariance
@@ -270,7 +270,7 @@ def _named_cameras(value: Any, shown: str) -> _Items | None:
         not isinstance(value, (dict, list)) or is_camera(value) or is_camera(_unwrap_camera(value))
     ):
         return None
-    elif isinstance(value, dict) and (images := image_records_by_stem(value)) is not None:
+    elif isinstance(value, dict) and (images := index_image_records(value)) is not None:
         return list(images.items())
     if isinstance(value, list):
         if not any(map(is_camera, map(_unwrap_camera, value))):
@@ -381,7 +381,7 @@ def write_camera_files(
             )
             if camera is None:
                 continue
-            owner = camera_owner(record.group, view)
+            owner = find_camera_owner(record.group, view)
             first = written.setdefault(fold_file_name(name), owner)
             if first != owner:
                 raise InputError(
@@ -395,14 +395,14 @@ def write_camera_files(
     return counts
 
 
-def camera_owner(group: Group, view: View) -> tuple[str, ...]:
+def find_camera_owner(group: Group, view: View) -> tuple[str, ...]:
     """Whose camera a view has: the static camera's, or that of the view alone."""
     return (view.station.key,) if view.station.shared else (group.key, view.key)
 
 
 def camera_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``)."""
-    camera = {_camera_file_of_view(group, view): camera_owner(group, view)}
+    camera = {_camera_file_of_view(group, view): find_camera_owner(group, view)}
     return {**camera, **frame_name_claims(group, view, split)}
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.formats import fields
-from app.formats.fields import IdIndex, id_text
-from app.formats.picture_finder import picture_name_parts
+from app.formats.fields import IdIndex, id_to_text
+from app.formats.picture_finder import split_picture_name
 from app.formats.report import Report
 from app.json_text import quoted
 from app.soccer.annotation import BallAnnotation
@@ -55,7 +55,7 @@ class JoinedAnnotations:
             if isinstance(item.get("caption"), str) and "category_id" not in item:
                 captions += 1
                 continue
-            identity = id_text(item.get("id"))
+            identity = id_to_text(item.get("id"))
             other = item if identity is None else seen.setdefault(identity, item)
             if other is not item and other == item:
                 self._report_problem(
@@ -88,7 +88,7 @@ class JoinedAnnotations:
             self._names.setdefault(parts[-1], []).append(index)
         value = item.get("id")
         if not self._ids.add(value, index):
-            known = id_text(value) is not None
+            known = id_to_text(value) is not None
             problem = (
                 f"is {quote_value(value)}, which is also the id of another image"
                 if known
@@ -125,7 +125,7 @@ def quote_value(value: Any) -> str:
 
 
 def _name_parts(name: Any) -> tuple[str, ...]:
-    return picture_name_parts(name) if isinstance(name, str) else ()
+    return split_picture_name(name) if isinstance(name, str) else ()
 
 
 CENTERS = ("center", "centre", "ball", "middle", "point")
@@ -215,7 +215,7 @@ def _read_bbox(item: Mapping[str, Any]) -> Box | None:
     if value is None or value == []:
         return None
     try:
-        x, y, width, height = map(fields.pixel_coordinate, fields.number_list(value, 4))
+        x, y, width, height = map(fields.parse_pixel_coordinate, fields.parse_numbers(value, 4))
     except ValueError as error:
         raise MissingPositionError("bbox", str(error)) from error
     if width < 0 or height < 0:
@@ -235,10 +235,15 @@ def _read_labelled_keypoints(value: Any, names: Sequence[str]) -> list[Keypoint]
         for index in range(len(flat) // 3):
             x, y, label = flat[3 * index : 3 * index + 3]
             # 0: not annotated, whatever its numbers are; 1: annotated and hidden.
-            if (seen := fields.number(label)) > 0:
+            if (seen := fields.parse_number(label)) > 0:
                 name = names[index] if index < len(names) else ""
                 found.append(
-                    Keypoint(fields.pixel_coordinate(x), fields.pixel_coordinate(y), seen > 1, name)
+                    Keypoint(
+                        fields.parse_pixel_coordinate(x),
+                        fields.parse_pixel_coordinate(y),
+                        seen > 1,
+                        name,
+                    )
                 )
     except ValueError as error:
         raise MissingPositionError("keypoints", str(error)) from error
@@ -264,7 +269,7 @@ def _box_around_polygons(value: Any) -> Box:
     corners: list[tuple[float, float]] = []
     try:
         for polygon in value:
-            flat = list(map(fields.pixel_coordinate, fields.require_list(polygon)))
+            flat = list(map(fields.parse_pixel_coordinate, fields.require_list(polygon)))
             if len(flat) % 2 or len(flat) < 6:
                 raise ValueError("has a polygon of fewer than three points")
             corners += zip(flat[::2], flat[1::2], strict=True)

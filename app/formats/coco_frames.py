@@ -20,8 +20,8 @@ from app.formats.picture_finder import (
     PictureFinder,
     PictureSearchResult,
     assign_pictures,
-    picture_name_parts,
     split_of_word,
+    split_picture_name,
 )
 from app.formats.report import Report
 from app.geometry.camera import Camera
@@ -44,7 +44,7 @@ class Frame:
     Attributes:
         path: The file, for problems.
         record: The image in it.
-        parts: Its name as ``picture_name_parts`` gives it.
+        parts: Its name as ``split_picture_name`` gives it.
         key: Its name as a key; unlike ``parts`` without the folders of another machine.
         group: Its ``group_id``, or None.
         view: Name of the view in that group.
@@ -152,7 +152,7 @@ def _find_picture(
     found = finder.find_picture(parts, home)
     if found == PictureSearchResult() and any("%" in part for part in parts):
         # Written as a part of an address: a%20b.jpg.
-        return finder.find_picture(picture_name_parts(unquote("/".join(parts))), home)
+        return finder.find_picture(split_picture_name(unquote("/".join(parts))), home)
     return found
 
 

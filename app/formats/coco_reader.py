@@ -30,20 +30,20 @@ from app.formats.coco_annotation import (
     quote_value,
 )
 from app.formats.coco_frames import Frame, FrameFile, group_frames, split_of_folders
-from app.formats.fields import id_text
+from app.formats.fields import id_to_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import UNASSIGNED
 from app.formats.json_reader import describe_document, is_gamestate, read_json
 from app.formats.picture_finder import (
     LabelLocation,
     PictureFinder,
-    picture_name_parts,
+    split_picture_name,
     split_within_word,
 )
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.formats.view_state import PlacedView, StateReader, ViewGroups
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -82,7 +82,7 @@ def read_coco(
         limits: Caps on what is read.
         ball_category: Name or id of the category of others that is the ball; empty: by its name.
     """
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -283,11 +283,11 @@ class _CocoFile:
 
     def _find_own_media(self, name: str) -> Media | None:
         """The frame of an image of ours, where it lies in the tree."""
-        place = self._finder.find_picture(picture_name_parts(name), self._home).place
+        place = self._finder.find_picture(split_picture_name(name), self._home).place
         return None if place is None else self._tree.media(place)
 
     def _read_foreign_image(self, image: StateReader, index: int) -> Frame:
-        parts = picture_name_parts(image.text("file_name"))
+        parts = split_picture_name(image.text("file_name"))
         key = self._image_key(image, parts)
         group, view = self._group_and_view(image, key)
         split = self._home.split or split_of_folders(parts[:-1])
@@ -374,7 +374,7 @@ class _CocoFile:
 
 
 def _require_safe_path(image: StateReader, field: str, value: str | float) -> str:
-    text = value if isinstance(value, str) else id_text(value) or ""
+    text = value if isinstance(value, str) else id_to_text(value) or ""
     try:
         return str(PurePosixPath(require_safe_path(text)))
     except UnsafePathError as error:

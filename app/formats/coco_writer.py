@@ -14,7 +14,7 @@ from typing import IO, Any
 
 from app.formats.ball_names import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.formats.camera_json import camera_to_json
-from app.formats.export_record import ExportRecord, chosen_box, frame_name
+from app.formats.export_record import ExportRecord, choose_ball_box, find_export_frame_name
 from app.formats.frame_names import UNASSIGNED
 from app.formats.view_state import head_to_json, view_to_json
 from app.json_text import json_text
@@ -132,7 +132,7 @@ def _image_to_json(
     }
     return {
         "id": identity,
-        "file_name": frame_name(record, view),
+        "file_name": find_export_frame_name(record, view),
         "width": view.size.width,
         "height": view.size.height,
         "group_id": record.group.key,
@@ -158,7 +158,7 @@ def _jac_by_tolerance(jac: Sequence[float]) -> dict[str, float]:
 def _ball_annotation_to_json(
     record: ExportRecord, view: View, identity: int, everything: bool, boxes: str
 ) -> dict[str, Any] | None:
-    box = chosen_box(record, view, boxes)
+    box = choose_ball_box(record, view, boxes)
     if view.ball is None or box is None:
         return None
     fit, annotated = record.ball_fit(view, everything), view.ball.box

@@ -25,7 +25,7 @@ from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
 from app.formats.issia_3d import write_issia_3d
 from app.formats.issia_writer import write_issia
-from app.formats.manifest import SOFTWARE, software_version
+from app.formats.manifest import SOFTWARE, read_software_version
 from app.formats.parquet import write_parquet
 from app.formats.sn_calibration import line_frame_path, line_name_claims
 from app.formats.sn_calibration_writer import write_sn_calibration
@@ -164,7 +164,7 @@ def write_format(
         case "coco":
             info = {
                 "description": options.provenance.get("dataset"),
-                "software": f"{SOFTWARE} {software_version()}",
+                "software": f"{SOFTWARE} {read_software_version()}",
             }
             return write_coco(
                 root,
@@ -211,12 +211,12 @@ def _require_supported_lenses(
         yield record
 
 
-def options_used_by(format: str) -> list[str]:  # noqa: A002
+def list_options_of_format(format: str) -> list[str]:  # noqa: A002
     """The options that a format uses, of ``USERS``."""
     return [name for name in USERS if format in USERS[name]]
 
 
-def frame_path_rule(format: str) -> FrameName:  # noqa: A002
+def find_frame_path_rule(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
     return LAYOUTS.get(format, frame_path_by_match)
 
@@ -229,21 +229,25 @@ def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # no
     return ExportNames(CLAIMS.get(format, frame_name_claims), outlines, glue)
 
 
-def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
+def describe_box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
     """Which kind of ball box the files hold, for a format that has a choice."""
-    if "boxes" not in options_used_by(format):
+    if "boxes" not in list_options_of_format(format):
         return {}
     # optimized_d is defined around the centre of the annotated box.
     own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
     return {"boxes": boxes, **own}
 
 
-def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
+def describe_view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
     """Which views a detector learns from, for a format that leaves some out."""
-    return {"views": "all" if every_view else "valid"} if "views" in options_used_by(format) else {}
+    return (
+        {"views": "all" if every_view else "valid"}
+        if "views" in list_options_of_format(format)
+        else {}
+    )
 
 
-def missing_for_use(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
+def describe_missing_content(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
     """What the files of a format still lack before they can be used; None: nothing.
 
     YOLO trains on the pictures beside its labels; every other format is of use without them.
@@ -255,7 +259,7 @@ def missing_for_use(format: str, counts: Mapping[str, int]) -> str | None:  # no
     return f"{images} not in this export; frames.csv names their places"
 
 
-def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
+def describe_missing_frames(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
     """What a manifest says of frames that a format needs and that were not copied."""
-    sentence = missing_for_use(format, counts)
+    sentence = describe_missing_content(format, counts)
     return {} if sentence is None else {"missing_images": sentence}

@@ -104,13 +104,13 @@ class ExportRecord:
         return f"{self.verdict}: {self.reason}" if self.reason else self.verdict
 
 
-def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
+def choose_ball_box(record: ExportRecord, view: View, kind: str) -> Box | None:
     """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it."""
     boxes = ball_boxes(record.solution, view)
     return boxes.get(kind) or boxes.get("annotated")
 
 
-def frame_name(record: ExportRecord, view: View) -> str:
+def find_export_frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
     placed, called = record.frames.get(view.key), record.named(view)
     return placed or frame_path_by_match(

@@ -19,7 +19,7 @@ _DECIMAL = re.compile(r"([+-]?\d{1,40})\.0*", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,40}", re.ASCII)
 
 
-def id_text(value: Any) -> str | None:
+def id_to_text(value: Any) -> str | None:
     """The text of an id; None for what is none (null, a truth value, a list, an object).
 
     Example:
@@ -47,7 +47,7 @@ class IdIndex(Generic[T]):
 
     def add(self, value: Any, item: T) -> bool:
         """Add a record; False where the value is no id, or another record has it."""
-        text = id_text(value)
+        text = id_to_text(value)
         if text is None or text in self._texts:
             return False
         self._texts[text] = item
@@ -57,7 +57,7 @@ class IdIndex(Generic[T]):
 
     def find(self, value: Any) -> T | None:
         """The record of an id; None where there is none, or several are equal as numbers."""
-        text = id_text(value)
+        text = id_to_text(value)
         if text is None:
             return None
         if text in self._texts:
@@ -69,7 +69,7 @@ class IdIndex(Generic[T]):
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 
-def number(value: Any) -> float:
+def parse_number(value: Any) -> float:
     """A finite number; files also spell it as text.
 
     Raises:
@@ -103,31 +103,31 @@ def _number_of_text(text: str) -> float:
     return result
 
 
-def pixel_coordinate(value: Any) -> float:
+def parse_pixel_coordinate(value: Any) -> float:
     """A coordinate in an image, pixels; may lie outside the image, but not beyond reason.
 
     Raises:
         ValueError: Not a number, or more than a million pixels away.
     """
-    result = number(value)
+    result = parse_number(value)
     if abs(result) > MAX_PIXEL:
         raise ValueError(f"is {result:g} pixels, which is beyond any image")
     return result
 
 
-def whole_number(value: Any) -> int:
+def parse_whole_number(value: Any) -> int:
     """A whole number, also when spelt ``7.0`` or ``"7"``.
 
     Raises:
         ValueError: Anything else.
     """
-    result = number(value)
+    result = parse_number(value)
     if result != int(result):
         raise ValueError(f"is {result:g}, not a whole number")
     return int(result)
 
 
-def number_list(value: Any, count: int) -> tuple[float, ...]:
+def parse_numbers(value: Any, count: int) -> tuple[float, ...]:
     """A list of ``count`` finite numbers.
 
     Raises:
@@ -137,7 +137,7 @@ def number_list(value: Any, count: int) -> tuple[float, ...]:
         raise ValueError(f"is {_kind_of_value(value)}, not a list of {count} numbers")
     if len(value) != count:
         raise ValueError(f"has {len(value)} numbers, not {count}")
-    return tuple(number(item) for item in value)
+    return tuple(parse_number(item) for item in value)
 
 
 def require_object(value: Any) -> dict[str, Any]:
@@ -173,7 +173,7 @@ _SIDES = (("width", "height"), ("image_width", "image_height"), ("imageWidth", "
 _PAIRS = ("image_size", "img_size", "resolution")
 
 
-def stated_size(value: Mapping[str, Any]) -> ImageSize | None:
+def parse_image_size(value: Mapping[str, Any]) -> ImageSize | None:
     """Width and height in pixels; None where the record states none that an image can have.
 
     Example:
@@ -183,7 +183,7 @@ def stated_size(value: Mapping[str, Any]) -> ImageSize | None:
     pairs = [[value.get(width), value.get(height)] for width, height in _SIDES]
     for pair in (*pairs, *(value.get(name) for name in _PAIRS)):
         try:
-            width, height = map(whole_number, number_list(pair, 2))
+            width, height = map(parse_whole_number, parse_numbers(pair, 2))
         except ValueError:
             continue
         if min(width, height) >= 2 and max(width, height) <= MAX_SIDE:
@@ -194,7 +194,7 @@ def stated_size(value: Mapping[str, Any]) -> ImageSize | None:
 _STEPS = 4
 
 
-def exact_inverse(guess: float, target: float, read: Callable[[float], float]) -> float:
+def find_exact_inverse(guess: float, target: float, read: Callable[[float], float]) -> float:
     """The number next to ``guess`` from which ``read`` makes exactly ``target``.
 
     A reader that multiplies or subtracts rounds, and so does the writer's inverse; without this

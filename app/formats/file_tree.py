@@ -94,10 +94,10 @@ class FileTree(Protocol):
 
 def read_limited(file: IO[bytes], limit: int, shown: str) -> bytes:
     """All bytes of a stream; real bytes are counted, whatever a header declares."""
-    return b"".join(limited_chunks(file, limit, shown))
+    return b"".join(read_limited_chunks(file, limit, shown))
 
 
-def limited_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
+def read_limited_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
     """A stream in chunks.
 
     Raises:
@@ -118,7 +118,7 @@ def _read_chunk(file: IO[bytes], shown: str) -> bytes:
         raise DatasetFormatError(shown, None, None, "is damaged, or its zip file is") from error
 
 
-def files_inside(names: list[str], folder: str) -> set[str]:
+def list_files_in_folder(names: list[str], folder: str) -> set[str]:
     """The names below a folder among sorted ones, each without that folder."""
     first = bisect_left(names, folder)
     last = bisect_left(names, folder + chr(0x10FFFF))

@@ -17,7 +17,7 @@ from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_fi
 from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, require_safe_path
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.object_store.path import StoredPath, find_path, is_address, seal_address, target_path
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -86,7 +86,7 @@ def read_frames(
             of their names with ``{instant}`` and ``{camera}``, by instant and folder.
     """
     pattern = check_grouping(grouping)
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         pictures = []

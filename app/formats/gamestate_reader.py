@@ -11,14 +11,14 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.fields import IdIndex
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.frame_names import UNASSIGNED, view_stem
 from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -48,7 +48,7 @@ def sequence_folder(match: str, split: str) -> str:
 
 def frame_file_name(group: Group, view: View) -> str:
     """Name of the frame of a view: as its file called it, or made from its key."""
-    image = source_fields(view).get("image")
+    image = read_source_fields(view).get("image")
     if isinstance(image, dict) and isinstance(image.get("file_name"), str):
         return str(image["file_name"])
     stem = view_stem(view.key)
@@ -67,7 +67,7 @@ def sequence_name_claims(group: Group, view: View, split: str) -> Mapping[str, H
     return {f"{sequence_folder(group.match, '')}/{stem}": (group.key, view.key)}
 
 
-def source_fields(view: View) -> Mapping[str, Any]:
+def read_source_fields(view: View) -> Mapping[str, Any]:
     """What the file said that a view came from; empty for views of other formats."""
     kept = view.extras.metadata.get(METADATA)
     return kept if isinstance(kept, dict) else {}
@@ -94,7 +94,7 @@ def read_gamestate(
     People go to ``Extras.boxes`` with their whole annotation; whatever else the file holds is
     kept for the way back.
     """
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -142,7 +142,7 @@ class _LabelledSequence:
             raise DatasetFormatError(self.path, None, None, "is not an object")
         self._value = value
         self._folder = name[: -len(LABELS)]
-        self._inside = files_inside(names, self._folder)
+        self._inside = list_files_in_folder(names, self._folder)
         self.key = self._sequence_key()
         parts = PurePosixPath(name).parts
         self.split = next((part for part in reversed(parts) if part in SPLITS), "")
@@ -292,7 +292,7 @@ class _LabelledSequence:
 
 
 def _read_side_length(image: Mapping[str, Any], name: str) -> int:
-    side = fields.whole_number(image.get(name))
+    side = fields.parse_whole_number(image.get(name))
     if not 2 <= side <= MAX_SIDE:
         raise ValueError(f"has a {name} of {side} pixels, not of 2 to {MAX_SIDE:,}")
     return side
@@ -303,7 +303,7 @@ def _read_bbox_image(item: Mapping[str, Any]) -> Box:
     missing = [name for name in ("x", "y", "w", "h") if name not in place]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    return Box(*(fields.pixel_coordinate(place[name]) for name in ("x", "y", "w", "h")))
+    return Box(*(fields.parse_pixel_coordinate(place[name]) for name in ("x", "y", "w", "h")))
 
 
 def _read_ball(item: Mapping[str, Any]) -> BallAnnotation:

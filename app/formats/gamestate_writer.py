@@ -26,8 +26,8 @@ from app.formats.gamestate_reader import (
     METADATA,
     PITCH_ID,
     frame_file_name,
+    read_source_fields,
     sequence_folder,
-    source_fields,
 )
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import lines_to_json
@@ -186,7 +186,7 @@ def _compact_json(value: Any) -> str:
 
 
 def _add_view(file: _LabelsFile, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
-    kept = source_fields(view)
+    kept = read_source_fields(view)
     file.kept = file.kept or kept
     camera = record.camera(view)
     people = _people_of_view(file, record.group, view, camera)
@@ -215,7 +215,10 @@ def _image_to_json(
     camera: Camera | None,
     people: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    kept, name = source_fields(view).get("image"), frame_file_name(record.group, record.named(view))
+    kept, name = (
+        read_source_fields(view).get("image"),
+        frame_file_name(record.group, record.named(view)),
+    )
     if isinstance(kept, dict):
         return kept | ({"file_name": name} if view.key in record.names else {})
     return {
@@ -300,7 +303,7 @@ def _bbox_pitch(place: Sequence[float]) -> dict[str, float]:
 def _ball_annotations(
     file: _LabelsFile, record: ExportRecord, view: View
 ) -> Iterator[dict[str, Any]]:
-    rest = source_fields(view).get("balls") or []
+    rest = read_source_fields(view).get("balls") or []
     balls = [ball for ball in view.balls if ball.center is not None]
     for index, ball in enumerate(balls):
         kept = rest[index] if index < len(rest) else _new_ball_fields(file, record, view, index)
@@ -331,7 +334,7 @@ def _spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | Non
 
 def _other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
     """The lines, the camera, and what else there was."""
-    kept = source_fields(view)
+    kept = read_source_fields(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:
         lines = lines_to_json(view.station.lines, view.size, view.extras.lines)
         head = {"supercategory": "pitch", "category_id": PITCH_ID}
@@ -377,7 +380,7 @@ def _person_annotation(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
-        x1, y1, x2, y2 = [fields.number(corners[name]) for name in CORNERS]  # type: ignore[index]
+        x1, y1, x2, y2 = [fields.parse_number(corners[name]) for name in CORNERS]  # type: ignore[index]
     except (TypeError, KeyError, ValueError):
         return None
     role, team = _role_and_team(str(box.get("class") or ""))

@@ -125,7 +125,7 @@ _WRITTEN_HERE = re.compile(r"cam\d{1,3}", re.ASCII)
 """Name of the video in a file that ``issia_writer`` wrote, whose people are turned right."""
 
 
-def cameras_with_mirrored_people(
+def find_cameras_with_mirrored_people(
     tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], widths: Mapping[int, int]
 ) -> list[int]:
     """Numbers of the cameras whose people are to be turned.
@@ -155,7 +155,7 @@ def cameras_with_mirrored_people(
     return found
 
 
-def turn_people(track: ViperTrack, width: int) -> ViperTrack:
+def mirror_people(track: ViperTrack, width: int) -> ViperTrack:
     """The track with its people turned left to right.
 
     A box covers the columns from x to x + width - 1, as ViPER counts them: of a picture of W columns
@@ -176,13 +176,13 @@ def _median_person_distances(
     """How far the same person lies from where another camera puts it, as written and turned, metres,
     shape (N, 2)."""
     own, rows = tracks[number], []
-    back = turn_people(own, width)
+    back = mirror_people(own, width)
     others = [other for other in given if other in tracks and other not in MIRRORED]
     for other in others if number in given else ():
         common = sorted(own.persons.keys() & tracks[other].persons.keys())
         for frame in common[:: len(common) // MOST_FRAMES + 1]:
-            there = people_on_grass(given[other], tracks[other], frame)
-            here, turn = (people_on_grass(given[number], one, frame) for one in (own, back))
+            there = locate_people_on_grass(given[other], tracks[other], frame)
+            here, turn = (locate_people_on_grass(given[number], one, frame) for one in (own, back))
             rows += [
                 [float(np.hypot(*(place[name] - there[name]))) for place in (here, turn)]
                 for name in here.keys() & turn.keys() & there.keys()
@@ -190,7 +190,7 @@ def _median_person_distances(
     return np.array(rows).reshape(-1, 2)
 
 
-def people_on_grass(camera: Camera, track: ViperTrack, frame: int) -> dict[str, FloatArray]:
+def locate_people_on_grass(camera: Camera, track: ViperTrack, frame: int) -> dict[str, FloatArray]:
     """Where the people of a frame stand, metres from the centre mark, shape (2,) each, by id.
 
     That is where the camera sees the middle of the lower edge of their box on the grass; whose it

@@ -27,7 +27,7 @@ from app.formats.issia_reader import (
     count_annotations,
 )
 from app.formats.report import Report
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.formats.view_files import SortedSpill, open_spill
 from app.formats.viper_reader import ViperTrack
 from app.geometry.camera import Camera
@@ -50,7 +50,7 @@ def open_issia_3d(
     the table. Numbers of frames are those of the videos: ``options.frame_offset`` is not used.
     """
     found = IssiaFolder()
-    with opened_tree(folder, report, limits) as tree:
+    with open_tree_while_read(folder, report, limits) as tree:
         if tree is None:
             return found
         names = tree.names()
@@ -104,7 +104,7 @@ def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: Rep
 
 
 def _parse_frame_number(cells: Mapping[str, str]) -> int:
-    frame = fields.whole_number(cells.get("frame", ""))
+    frame = fields.parse_whole_number(cells.get("frame", ""))
     if abs(frame) >= 10**9:
         raise ValueError("is too large for a frame number")
     return frame
@@ -136,7 +136,7 @@ def _parse_ball_center(cells: Mapping[str, str], camera: str) -> ImagePoint | No
     x, y = cells.get(f"x_cam{camera}"), cells.get(f"y_cam{camera}")
     if x is None or y is None or (is_missing(x) and is_missing(y)):
         return None
-    return ImagePoint(fields.pixel_coordinate(x), fields.pixel_coordinate(y))
+    return ImagePoint(fields.parse_pixel_coordinate(x), fields.parse_pixel_coordinate(y))
 
 
 CAMERAS = (1, 2, 3, 4, 5, 6)

@@ -17,13 +17,13 @@ from app.formats.issia import (
     DEFAULT_SIZE,
     MATCH,
     FramePersons,
-    cameras_with_mirrored_people,
-    turn_people,
+    find_cameras_with_mirrored_people,
+    mirror_people,
 )
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
-from app.formats.trees import FolderTree, opened_tree
+from app.formats.trees import FolderTree, open_tree_while_read
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -153,7 +153,7 @@ def open_issia(
     ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
     """
     found = IssiaFolder()
-    with opened_tree(folder, report, limits) as tree:
+    with open_tree_while_read(folder, report, limits) as tree:
         if tree is None:
             return found
         names = tree.names()
@@ -190,9 +190,9 @@ def add_stations_and_media(
         station = _make_station(camera, given.get(camera), lines.get(camera), options, size)
         found.stations[camera] = station
     widths = {camera: size.width for camera, size in sizes.items()}
-    mirrored = cameras_with_mirrored_people(found.tracks, given, widths)
+    mirrored = find_cameras_with_mirrored_people(found.tracks, given, widths)
     for camera in mirrored:
-        found.tracks[camera] = turn_people(found.tracks[camera], widths[camera])
+        found.tracks[camera] = mirror_people(found.tracks[camera], widths[camera])
     if mirrored:
         report.remark(
             f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
@@ -212,7 +212,7 @@ def _report_unused(
             report.remark(f"{what} of {names} not used: there is no ground truth of that camera")
 
 
-def camera_number(name: str, *, strict: bool = False) -> int | None:
+def parse_camera_number(name: str, *, strict: bool = False) -> int | None:
     """Number of the camera that a file's name speaks of; ``strict``: not any last number.
 
     Example:
@@ -272,13 +272,13 @@ def _tracks_by_camera(
     the first is that of the file, and the others are reported.
     """
     named = [
-        camera_number(PurePosixPath(track.source.replace("\\", "/")).stem, strict=True)
+        parse_camera_number(PurePosixPath(track.source.replace("\\", "/")).stem, strict=True)
         for track in tracks
     ]
     if len(tracks) > 1 and None not in named and len(set(named)) == len(named):
         yield from zip(named, tracks, strict=True)
         return
-    yield camera_number(stem), tracks[0]
+    yield parse_camera_number(stem), tracks[0]
     for number, track in enumerate(tracks[1:], 2):
         balls, persons = track.ball_points, track.person_boxes
         report.note(
@@ -324,7 +324,7 @@ def _read_given_cameras(tree: FileTree, names: list[str], report: Report) -> dic
         report.skip(problem)
     shown, given = tree.shown(files[0]), dict[int, Camera]()
     for name, camera in cameras.items():
-        number = camera_number(name)
+        number = parse_camera_number(name)
         if number is None:
             report.note(shown, name[:80], None, "has no camera number in its name; left out")
         elif given.setdefault(number, camera) is not camera:
@@ -350,7 +350,7 @@ def _line_files_by_camera(
 ) -> dict[int, LineFile]:
     lines: dict[int, LineFile] = {}
     for file in files:
-        number = camera_number(PurePosixPath(file.stem).name)
+        number = parse_camera_number(PurePosixPath(file.stem).name)
         if number is None:
             sentence = "has no camera number in its name; left out"
             report.note(f"{file.place}.json", None, None, sentence)
@@ -392,12 +392,12 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
         place = PurePosixPath(name)
         suffix = place.suffix.lower()
         if suffix in VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
-            camera = camera_number(place.stem)
+            camera = parse_camera_number(place.stem)
             # A video is opened as a file of this machine.
             if camera is not None and isinstance(tree, FolderTree):
                 found.videos.setdefault(camera, tree.shown(name))
         elif suffix in IMAGE_SUFFIXES and _VIDEO.fullmatch(place.parent.name):
-            camera, number = camera_number(place.parent.name), _FRAME.fullmatch(place.stem)
+            camera, number = parse_camera_number(place.parent.name), _FRAME.fullmatch(place.stem)
             if camera is not None and number:
                 found.frames.setdefault((camera, int(number[1])), tree.media(name))
 

@@ -112,7 +112,7 @@ def _add_persons(
         if not isinstance(points, dict) or not set(CORNERS) <= points.keys():
             continue
         try:
-            x, y, right, bottom = (fields.number(points[corner]) for corner in CORNERS)
+            x, y, right, bottom = (fields.parse_number(points[corner]) for corner in CORNERS)
         except ValueError:
             # Kept as it came from a file that said something else.
             continue

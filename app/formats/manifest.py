@@ -62,7 +62,7 @@ class Manifest:
 
 
 @cache
-def software_version() -> str:
+def read_software_version() -> str:
     """Version of the installed package."""
     try:
         return version(SOFTWARE)
@@ -79,7 +79,7 @@ def write_manifest(root: Path, manifest: Manifest, progress: ReportProgress | No
         "format": manifest.format,
         "counts": dict(manifest.counts),
         "settings": dict(manifest.settings),
-        "software": {"name": SOFTWARE, "version": software_version()},
+        "software": {"name": SOFTWARE, "version": read_software_version()},
         "licence": manifest.licence,
         "files": list(_list_files_with_digests(root, progress)),
         "media": [dict(item) for item in manifest.media],
@@ -102,11 +102,11 @@ def _list_files_with_digests(
         if isinstance(file, bytes):
             size, digest = len(file), hashlib.sha256(file).hexdigest()
         else:
-            size, digest = file.stat().st_size, sha256_of(file)
+            size, digest = file.stat().st_size, compute_file_sha256(file)
         yield {"path": name, "bytes": size, "sha256": digest}
 
 
-def sha256_of(path: Path) -> str:
+def compute_file_sha256(path: Path) -> str:
     """Digest of a file's content, hexadecimal."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

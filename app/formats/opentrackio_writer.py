@@ -23,7 +23,7 @@ _BODY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the camera frame (x right, y down, z forward) to x right, y forward, z up."""
 
 
-def opentrackio_sample(
+def camera_to_opentrackio(
     camera: Camera,
     size: ImageSize,
     frame: int,
@@ -36,7 +36,7 @@ def opentrackio_sample(
     """One sample of OpenTrackIO 1.0.
 
     Args:
-        camera: Of the frame, with a lens that ``opentrackio_problem`` has nothing against.
+        camera: Of the frame, with a lens that ``find_opentrackio_problem`` has nothing against.
         size: Of its image.
         frame: Its number, which becomes the sequence number.
         source: Name of the recording; samples of one name have one source id.
@@ -96,7 +96,7 @@ def opentrackio_sample(
     return sample
 
 
-def opentrackio_problem(camera: Camera) -> str | None:
+def find_opentrackio_problem(camera: Camera) -> str | None:
     """What of a camera OpenTrackIO cannot say; None where it can say all of it."""
     if camera.is_wide:
         return f"has the lens {camera.lens}, which OpenTrackIO does not know"
@@ -122,7 +122,7 @@ def pan_tilt_roll_z_up(rotation: FloatArray) -> tuple[float, float, float]:
     return float(np.degrees(pan)), float(np.degrees(tilt)), float(np.degrees(roll))
 
 
-def frame_rate(times: Mapping[int, float]) -> Fraction | None:
+def estimate_frame_rate(times: Mapping[int, float]) -> Fraction | None:
     """Frames a second of frames at times, None where they are too few or stand still.
 
     Television's rates are over 1001, such as 30000/1001.

@@ -32,7 +32,7 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 @contextmanager
-def output_tree(
+def open_output_folder(
     out: Path, beside: Path | None = None, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
@@ -94,7 +94,7 @@ def _is_earlier_export(out: Path) -> bool:
     """Whether the folder holds what its manifest lists and nothing else."""
     present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
     try:
-        return present <= files_in_manifest((out / MANIFEST).read_bytes())
+        return present <= list_files_in_manifest((out / MANIFEST).read_bytes())
     except OSError:
         return False
 
@@ -105,13 +105,13 @@ def _is_earlier_zip(out: Path) -> bool:
         with zipfile.ZipFile(out) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
-            ours = files_in_manifest(archive.read(MANIFEST))
+            ours = list_files_in_manifest(archive.read(MANIFEST))
             return not out.is_symlink() and set(archive.namelist()) <= ours
     except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return False
 
 
-def files_in_manifest(manifest: bytes) -> set[str]:
+def list_files_in_manifest(manifest: bytes) -> set[str]:
     """The files that a manifest of ours lists; none where it is of somebody else."""
     try:
         value = json.loads(manifest)
@@ -192,7 +192,7 @@ _CHUNK = 1024 * 1024
 
 
 @contextmanager
-def output_in_store(
+def open_output_in_store(
     out: StoredPath, beside: Path, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
@@ -226,10 +226,10 @@ def output_in_store(
 
 
 @contextmanager
-def output_anywhere(
+def open_output(
     out: Root, exports: Path, beside: Path | None = None, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
-    """``output_tree`` on a disk, ``output_in_store`` in an object store.
+    """``open_output_folder`` on a disk, ``open_output_in_store`` in an object store.
 
     Args:
         out: Where it goes.
@@ -238,9 +238,9 @@ def output_anywhere(
         progress: See there.
     """
     if isinstance(out, StoredPath):
-        opened = output_in_store(out, beside or exports / "stored", progress)
+        opened = open_output_in_store(out, beside or exports / "stored", progress)
     else:
-        opened = output_tree(out, beside, progress)
+        opened = open_output_folder(out, beside, progress)
     with opened as folder:
         yield folder
 
@@ -297,7 +297,7 @@ def _is_earlier_zip_in_store(out: StoredPath) -> bool:
         with open_zip(present) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
-            return set(archive.namelist()) <= files_in_manifest(archive.read(MANIFEST))
+            return set(archive.namelist()) <= list_files_in_manifest(archive.read(MANIFEST))
     except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return False
 
@@ -308,7 +308,7 @@ def _is_earlier_export_in_store(out: StoredPath) -> bool:
     if not present:
         return True
     try:
-        return present <= files_in_manifest(
+        return present <= list_files_in_manifest(
             out.store.read_whole((out / MANIFEST).key, MAX_MANIFEST)[0]
         )
     except (NotFoundError, TooLargeError):

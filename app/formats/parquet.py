@@ -13,13 +13,13 @@ from typing import Any
 
 from app.errors import DatasetFormatError, InputError
 from app.formats.camera_json import covariance_to_json
-from app.formats.export_record import ExportRecord, chosen_box, frame_name
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, limited_chunks
+from app.formats.export_record import ExportRecord, choose_ball_box, find_export_frame_name
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, read_limited_chunks
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_reader import read_json
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.formats.report import Report
-from app.formats.trees import FolderTree, opened_tree
+from app.formats.trees import FolderTree, open_tree_while_read
 from app.formats.view_state import (
     PlacedView,
     StateReader,
@@ -210,7 +210,7 @@ def _annotated_box(row: ViewRow) -> Box | None:
 
 
 def _exported_box(row: ViewRow) -> Box | None:
-    return chosen_box(row.record, row.view, row.boxes) if row.view.ball else None
+    return choose_ball_box(row.record, row.view, row.boxes) if row.view.ball else None
 
 
 def _center_coordinate_column(axis: int) -> Getter:
@@ -270,7 +270,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("label", TEXT, lambda row: row.record.group.label),
     ("pitch_length", NUMBER, lambda row: float(row.record.group.pitch.length)),
     ("pitch_width", NUMBER, lambda row: float(row.record.group.pitch.width)),
-    ("file_name", TEXT, lambda row: frame_name(row.record, row.view)),
+    ("file_name", TEXT, lambda row: find_export_frame_name(row.record, row.view)),
     ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
@@ -338,7 +338,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver_version(row)),
-    ("software", TEXT, lambda row: software_version()),
+    ("software", TEXT, lambda row: read_software_version()),
 )
 """Name, type and value of every column; docs/formats.md explains them."""
 
@@ -383,7 +383,7 @@ def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS)
     Raises:
         InputError: pyarrow is not installed.
     """
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -448,7 +448,7 @@ def _file_on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
                 shutil.copyfileobj(source, file)
         else:
             with tree.open(name) as source:
-                for chunk in limited_chunks(source, limits.file_bytes, tree.shown(name)):
+                for chunk in read_limited_chunks(source, limits.file_bytes, tree.shown(name)):
                     file.write(chunk)
         file.flush()
         yield Path(file.name)

@@ -17,7 +17,7 @@ _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]{1,20})://([^/\\]*)")
 _DRIVE = re.compile(r"[A-Za-z]:(?=[/\\]|$)")
 
 
-def picture_name_parts(name: str) -> tuple[str, ...]:
+def split_picture_name(name: str) -> tuple[str, ...]:
     """Folders and file of a picture's name, in composed letters, without what no folder here has.
 
     Drives, roots, ``.``, ``..``, hosts and what follows a ``?`` of an address are left out.
@@ -69,7 +69,7 @@ LABEL_FOLDERS = frozenset({"annotations", "annotation", "labels", "coco", "json"
 """Folders of labels: the pictures lie beside them, not in them."""
 PICTURE_FOLDERS = ("images", "data", "img", "frames")
 Name = tuple[str, ...]
-"""Of a picture, as ``picture_name_parts`` gives it."""
+"""Of a picture, as ``split_picture_name`` gives it."""
 _MAX_RIVALS = 500
 """Pictures of one name that are compared."""
 
@@ -174,7 +174,7 @@ class PictureFinder:
         """The picture of a name.
 
         Args:
-            parts: As ``picture_name_parts`` gives them.
+            parts: As ``split_picture_name`` gives them.
             home: Of the file that names it.
         """
         if not parts:

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.formats.fields import stated_size
+from app.formats.fields import parse_image_size
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import (
     IMAGE_SUFFIXES,
@@ -148,7 +148,7 @@ class LineDocument:
 
 
 def read_line_documents(content: bytes, path: str, report: Report) -> list[LineDocument]:
-    """``line_documents`` of the text of a file, JSON or JSON lines.
+    """``read_lines_of_images`` of the text of a file, JSON or JSON lines.
 
     Raises:
         DatasetFormatError: It is neither, or holds something else.
@@ -159,10 +159,10 @@ def read_line_documents(content: bytes, path: str, report: Report) -> list[LineD
         value = read_json_lines(content, path, report)
         if value is None:
             raise
-    return line_documents(value, path, report)
+    return read_lines_of_images(value, path, report)
 
 
-def line_documents(value: Any, path: str, report: Report) -> list[LineDocument]:
+def read_lines_of_images(value: Any, path: str, report: Report) -> list[LineDocument]:
     """The images of a parsed file of lines.
 
     An object of markings, the same inside another object (``lines``), an object or a list of many
@@ -217,7 +217,7 @@ def _read_document(value: Any) -> LineDocument | None:
         if isinstance(lines, dict) and any(map(_is_line_name, lines)):
             named = _line_name(value)
             return LineDocument(
-                lines, None if named is None else _image_stem(named), stated_size(value)
+                lines, None if named is None else _image_stem(named), parse_image_size(value)
             )
     return None
 
@@ -298,7 +298,7 @@ def read_match_info(
     return found
 
 
-def original_frame_path(record: Mapping[str, Any]) -> str | None:
+def find_original_frame_path(record: Mapping[str, Any]) -> str | None:
     """Where the frame of one of our exports came from; None where nobody says so."""
     place = record.get(MATCH_INFO_PLACE)
     if not isinstance(place, str):

@@ -20,14 +20,14 @@ from app.formats.sn_calibration import (
     MATCH_INFO_PLACE,
     LineDocument,
     LineFile,
+    find_original_frame_path,
     match_of_record,
-    original_frame_path,
     read_line_documents,
     read_match_info,
     split_and_size,
 )
 from app.formats.soccernet_v3 import SPLITS
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
@@ -51,7 +51,7 @@ def read_line_files(
     Coordinates are normalised by (width - 1, height - 1), or pixels when at least half of a file's
     points lie beyond 2. Points outside the image are kept. Unknown markings and unreadable points
     are reported; the rest of the file is kept. A file may hold the lines of many images
-    (``line_documents``).
+    (``read_lines_of_images``).
 
     Args:
         path: Folder, zip or JSON file.
@@ -61,7 +61,7 @@ def read_line_files(
         by_folder: Whether a folder that is called as in our exports (``test-1280x720``), or a file
             itself, says the size of its images; else all lines are in pixels of ``size``.
     """
-    with opened_tree(path, report, limits) as tree:
+    with open_tree_while_read(path, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -133,7 +133,9 @@ def _path_without_suffix(name: str) -> str:
 
 
 def _original_frame_paths(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    return {whole: place for whole, info in infos.items() if (place := original_frame_path(info))}
+    return {
+        whole: place for whole, info in infos.items() if (place := find_original_frame_path(info))
+    }
 
 
 def _sizes_by_folder(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
@@ -265,13 +267,13 @@ def _read_points(value: Any, path: str, name: str, report: Report) -> _Numbered:
 def _parse_point(item: Any) -> tuple[float, float]:
     """A point as ``{"x", "y"}`` or ``[x, y]``."""
     if isinstance(item, (list, tuple)):
-        x, y = fields.number_list(item, 2)
+        x, y = fields.parse_numbers(item, 2)
     else:
         point = fields.require_object(item)
         if "x" not in point or "y" not in point:
             raise ValueError("has a point without x or y")
         x, y = point["x"], point["y"]
-    return fields.pixel_coordinate(x), fields.pixel_coordinate(y)
+    return fields.parse_pixel_coordinate(x), fields.parse_pixel_coordinate(y)
 
 
 def _read_marking_name(name: str, path: str, report: Report) -> str | None:
@@ -304,7 +306,7 @@ def read_sn_calibration(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    with opened_tree(path, report, limits) as tree:
+    with open_tree_while_read(path, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()

@@ -8,9 +8,9 @@ from typing import Any
 
 from app.errors import InputError
 from app.formats import fields
-from app.formats.cameras import camera_file_name, camera_file_text, camera_owner
+from app.formats.cameras import camera_file_name, camera_file_text, find_camera_owner
 from app.formats.export_record import ExportRecord
-from app.formats.fields import exact_inverse
+from app.formats.fields import find_exact_inverse
 from app.formats.frame_names import fold_file_name, view_file_path
 from app.formats.sn_calibration import (
     CAMERAS,
@@ -70,7 +70,7 @@ def lines_to_json(
 
 def _normalized_coordinate(pixel: float, extent: int) -> float:
     """The normalised number that is read as this pixel, where the nearest one is not."""
-    return exact_inverse(pixel / extent, pixel, lambda unit: unit * extent)
+    return find_exact_inverse(pixel / extent, pixel, lambda unit: unit * extent)
 
 
 def line_file_text(
@@ -88,7 +88,11 @@ def _flat_coordinates(line: Mapping[str, Any]) -> list[float]:
     """Coordinates of a line that is no marking; none where they are not all numbers."""
     points = line.get("points")
     try:
-        return [fields.number(item) for item in points] if isinstance(points, (list, tuple)) else []
+        return (
+            [fields.parse_number(item) for item in points]
+            if isinstance(points, (list, tuple))
+            else []
+        )
     except ValueError:
         return []
 
@@ -139,7 +143,7 @@ def write_sn_calibration(
                 camera = record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
-                owner = camera_owner(record.group, view)
+                owner = find_camera_owner(record.group, view)
                 name = names.name_frame(place, record.split(view), view.size, owner)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines

@@ -13,7 +13,7 @@ from typing import Any
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
 from app.formats.ball_names import is_ball
-from app.formats.fields import exact_inverse
+from app.formats.fields import find_exact_inverse
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.report import Report
@@ -56,7 +56,7 @@ def group_label(match: str, action: str, metadata: dict[str, Any]) -> str:
     return " · ".join(part for part in (teams, time[2], half) if part)
 
 
-def image_numbers(image: str) -> tuple[int, int | None] | None:
+def parse_image_numbers(image: str) -> tuple[int, int | None] | None:
     """Action and replay number of an image name (``7_1.png``); None for any other name."""
     found = IMAGE_NAME.fullmatch(image)
     if found is None:
@@ -216,7 +216,7 @@ def _read_image_size(metadata: Mapping[str, Any], path: str, record: str) -> Ima
         if name not in metadata:
             raise DatasetFormatError(path, record, where, "is missing")
         try:
-            side = fields.whole_number(metadata[name])
+            side = fields.parse_whole_number(metadata[name])
         except ValueError as error:
             raise DatasetFormatError(path, record, where, str(error)) from error
         if not 2 <= side <= MAX_SIDE:
@@ -264,7 +264,7 @@ def _ball_from_box(item: Mapping[str, Any]) -> BallAnnotation:
     missing = [corner for corner in CORNERS if corner not in points]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    x1, y1, x2, y2 = (fields.pixel_coordinate(points[corner]) for corner in CORNERS)
+    x1, y1, x2, y2 = (fields.parse_pixel_coordinate(points[corner]) for corner in CORNERS)
     box = Box(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1))
     occluded = item.get("occluded") is True
     if box.width == 0 or box.height == 0:
@@ -298,7 +298,7 @@ def _add_line(item: Any, where: str, builder: _RecordBuilder) -> None:
 
 
 def _pair_coordinates(value: Any) -> list[ImagePoint]:
-    flat = [fields.pixel_coordinate(item) for item in fields.require_list(value)]
+    flat = [fields.parse_pixel_coordinate(item) for item in fields.require_list(value)]
     if len(flat) % 2:
         raise ValueError(f"has {len(flat)} numbers, which make no pairs of x and y")
     return [ImagePoint(x, y) for x, y in zip(flat[::2], flat[1::2], strict=True)]
@@ -334,7 +334,7 @@ def _image_metadata(kept: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_same_length(value: Any, side: int) -> bool:
     try:
-        return fields.whole_number(value) == side
+        return fields.parse_whole_number(value) == side
     except ValueError:
         return False
 
@@ -364,6 +364,6 @@ def _ball_corners(ball: BallAnnotation) -> dict[str, float] | None:
     return {
         "x1": box.x,
         "y1": box.y,
-        "x2": exact_inverse(box.x + box.width, box.width, lambda x2: x2 - box.x),
-        "y2": exact_inverse(box.y + box.height, box.height, lambda y2: y2 - box.y),
+        "x2": find_exact_inverse(box.x + box.width, box.width, lambda x2: x2 - box.x),
+        "y2": find_exact_inverse(box.y + box.height, box.height, lambda y2: y2 - box.y),
     }

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
@@ -26,7 +26,7 @@ from app.formats.soccernet_v3 import (
     group_label,
     record_from_json,
 )
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.soccer.group import Group, Station, View
 from app.wording import plural
 
@@ -44,7 +44,7 @@ def read_soccernet_v3(
         report: Takes what had to be left out.
         limits: Caps on what is read.
     """
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -84,7 +84,7 @@ class MatchReader:
             self.report.skip(error)
             return
         self.seen[match] = path
-        inside = files_inside(self.names, folder)
+        inside = list_files_in_folder(self.names, folder)
         frames = MatchFrames(self.tree, folder, inside, self.report)
         yield from _MatchLabels(match, labels, path, frames, self.report).groups()
 

@@ -15,7 +15,7 @@ from typing import Any, TextIO
 from app.errors import InputError
 from app.formats.camera_json import camera_to_json
 from app.formats.csv_text import CsvTable, Value, list_text
-from app.formats.export_record import ExportRecord, chosen_box
+from app.formats.export_record import ExportRecord, choose_ball_box
 from app.formats.frame_names import fold_file_name, frame_path_by_match
 from app.formats.safe_path import resolve_inside
 from app.formats.soccernet_v3 import (
@@ -28,7 +28,7 @@ from app.formats.soccernet_v3 import (
     REST,
     SPLIT_FILES,
     TABLE,
-    image_numbers,
+    parse_image_numbers,
     record_to_json,
 )
 from app.json_text import finite, json_text
@@ -45,7 +45,7 @@ def split_key(group: Group) -> tuple[str, str, str]:
     """
     parts = group.key.split("/")
     if len(parts) != MATCH_DEPTH + 1 or any(
-        image_numbers(view.key) is None for view in group.views
+        parse_image_numbers(view.key) is None for view in group.views
     ):
         raise InputError(
             f"group {group.key} is not from SoccerNet (league/season/match/7.png)",
@@ -107,7 +107,7 @@ class LabelsWriter:
         for group in groups:
             for view in group.views:
                 whose = f"{group.key}, {view.key}"
-                first = self._images.setdefault((match, image_numbers(view.key)), whose)
+                first = self._images.setdefault((match, parse_image_numbers(view.key)), whose)
                 if first != whose:
                     raise InputError(
                         f"the images of two frames ({first} and {whose}) would have the same"
@@ -241,7 +241,7 @@ def _add_rows(
 
 
 def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
-    numbers = image_numbers(view.key)
+    numbers = parse_image_numbers(view.key)
     assert numbers is not None, "split_key has checked it"
     action, replay = numbers
     camera = record.camera(view)
@@ -249,7 +249,7 @@ def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterat
     yield from split_key(record.group)
     yield from (action, replay is None, None if replay is None else float(replay))
     yield from (view.size.width, view.size.height, view.ball is not None)
-    yield box_text(box) if box else None
+    yield format_box(box) if box else None
     yield repr(finite(camera_to_json(camera))) if camera else None
     yield from _jac_of_view(record, view) or (None,) * len(JAC_NAMES)
     yield f"[array({list_text(record.point)})]" if fit and record.point else None
@@ -258,7 +258,7 @@ def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterat
     yield record.split(view) or None
 
 
-def box_text(box: Box) -> str:
+def format_box(box: Box) -> str:
     """``[x, y, w, h]`` with every digit."""
     return list_text((box.x, box.y, box.width, box.height))
 
@@ -294,7 +294,7 @@ def _with_exported_boxes(record: ExportRecord, kind: str) -> Group:
         # A view that fell out says nothing about the ball: its fit can lie anywhere.
         if view.ball is None or record.ball_fit(view, everything=False) is None:
             continue
-        box = chosen_box(record, view, kind)
+        box = choose_ball_box(record, view, kind)
         if box is not None and box != view.ball.box:
             chosen = replace(view.ball, box=box, point=None)
             balls = tuple(chosen if ball is view.ball else ball for ball in view.balls)

@@ -11,14 +11,14 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.formats import fields
 from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.json_reader import parse_literal
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrames, group_label
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3_reader import MatchReader
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.geometry.camera import Camera
 from app.json_text import quoted
 from app.soccer.annotation import BallAnnotation
@@ -174,7 +174,7 @@ class _RowCells:
 
     def _whole_number(self, name: str) -> int:
         try:
-            number = fields.whole_number(self._cells.get(name, ""))
+            number = fields.parse_whole_number(self._cells.get(name, ""))
         except ValueError as error:
             raise self._cell_error(name, str(error)) from error
         if number < 0:
@@ -198,7 +198,7 @@ class _RowCells:
         if not text:
             return None
         try:
-            x, y, width, height = map(fields.pixel_coordinate, parse_number_list(text, 4))
+            x, y, width, height = map(fields.parse_pixel_coordinate, parse_number_list(text, 4))
             if width <= 0 or height <= 0:
                 raise ValueError("is a box whose width or height is not positive")
         except ValueError as error:
@@ -285,7 +285,7 @@ def read_soccernet_v3d(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    with opened_tree(root, report, limits) as tree:
+    with open_tree_while_read(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -364,7 +364,7 @@ class _DatasetReader:
             if not new:
                 continue
             folder = f"{self._table.folder}{match}/"
-            inside = files_inside(names, folder)
+            inside = list_files_in_folder(names, folder)
             frames = MatchFrames(tree, folder, inside, self._report)
             for main in new:
                 self._report.read += 1

@@ -34,7 +34,7 @@ def is_synloc(value: Any) -> bool:
     return isinstance(value, dict) and MATRIX in value and POLYNOMIAL in value
 
 
-def image_records_by_stem(value: Mapping[str, Any]) -> dict[str, Any] | None:
+def index_image_records(value: Mapping[str, Any]) -> dict[str, Any] | None:
     """The records of a COCO file by stem; None where it has no cameras."""
     images = value.get("images")
     if not isinstance(images, list) or not any(map(is_synloc, images)):
@@ -59,7 +59,7 @@ def camera_from_synloc(value: Mapping[str, Any], path: str, record: str | None) 
     """
     name = MATRIX
     try:
-        matrix = np.array([fields.number_list(row, 4) for row in _three_rows(value.get(MATRIX))])
+        matrix = np.array([fields.parse_numbers(row, 4) for row in _three_rows(value.get(MATRIX))])
         rotation, position = _rotation_and_position(matrix)
         name = POLYNOMIAL
         terms = _polynomial_terms(value.get(POLYNOMIAL))
@@ -109,12 +109,12 @@ def _polynomial_terms(value: Any) -> FloatArray:
     if not 2 <= len(listed) <= TERMS:
         raise ValueError(f"has {len(listed)} terms, not 2 to {TERMS}")
     terms = np.zeros(TERMS)
-    terms[: len(listed)] = fields.number_list(listed, len(listed))[::-1]
+    terms[: len(listed)] = fields.parse_numbers(listed, len(listed))[::-1]
     return terms
 
 
 def _read_side_length(value: Any) -> int:
-    side = fields.whole_number(value)
+    side = fields.parse_whole_number(value)
     if not 2 <= side <= MAX_SIDE:
         raise ValueError(f"is {side} pixels, not 2 to {MAX_SIDE:,}")
     return side

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from app.errors import InputError
-from app.formats.camera_matrix import camera_arrays
+from app.formats.camera_matrix import cameras_to_arrays
 from app.formats.csv_text import csv_line
 from app.formats.parquet import import_pyarrow
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -195,7 +195,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
         }
         for view, cameras in sorted(record.cameras.items()):
             placed = {rows[frame]: camera for frame, camera in cameras.items() if frame in rows}
-            found = camera_arrays(placed, f"{NPZ}/{view}")
+            found = cameras_to_arrays(placed, f"{NPZ}/{view}")
             for name, values in found.items():
                 whole = np.full((len(rows), *values.shape[1:]), np.nan)
                 whole[: len(values)] = values

@@ -133,7 +133,7 @@ class ZipTree:
             )
             report.note(str(self.path), None, None, damage)
         # Names that differ in case alone are one file on some disks: which one is meant?
-        names = [member_name(member) for member in members]
+        names = [decode_member_name(member) for member in members]
         folded = Counter(name.rstrip("/").casefold() for name in names)
         checked = {}
         for name, member in zip(names, members, strict=True):
@@ -184,7 +184,7 @@ class ZipTree:
         return None
 
 
-def member_name(member: zipfile.ZipInfo) -> str:
+def decode_member_name(member: zipfile.ZipInfo) -> str:
     """The name of a member with forward slashes, in the letters that its writer meant.
 
     Windows' own programs wrote backslashes. Names without the mark for UTF-8 are read as cp437,
@@ -402,7 +402,7 @@ def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
 
 
 @contextmanager
-def opened_tree(
+def open_tree_while_read(
     path: Root, report: Report, limits: Limits = DEFAULT_LIMITS
 ) -> Iterator[FileTree | None]:
     """``open_tree`` for as long as somebody reads from it."""

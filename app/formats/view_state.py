@@ -129,7 +129,7 @@ class StateReader:
         sides = []
         for name in ("width", "height"):
             try:
-                side = fields.whole_number(self.value.get(name))
+                side = fields.parse_whole_number(self.value.get(name))
             except ValueError as error:
                 raise self.error(name, str(error)) from error
             if not 2 <= side <= MAX_SIDE:
@@ -140,7 +140,7 @@ class StateReader:
     def head(self) -> GroupHead:
         """Back from ``head_to_json``."""
         try:
-            length, width = fields.number_list(self.value.get("pitch") or [105.0, 68.0], 2)
+            length, width = fields.parse_numbers(self.value.get("pitch") or [105.0, 68.0], 2)
             pitch = Pitch(length, width)
         except (ValueError, InputError) as error:
             raise self.error("pitch", str(error)) from error
@@ -157,7 +157,7 @@ class StateReader:
     def count(self, name: str) -> int:
         """A whole number from 0; 0 where there is none."""
         try:
-            return max(fields.whole_number(self.value.get(name) or 0), 0)
+            return max(fields.parse_whole_number(self.value.get(name) or 0), 0)
         except ValueError as error:
             raise self.error(name, str(error)) from error
 
@@ -199,7 +199,7 @@ class StateReader:
                     "is the covariance of a given camera, but the view has none: add `given`, or"
                     " leave the covariance out"
                 )
-            return camera_covariance(fields.number_list(found, 64))
+            return camera_covariance(fields.parse_numbers(found, 64))
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error
 
@@ -210,9 +210,9 @@ class StateReader:
             return None
         try:
             value = fields.require_object(found)
-            aspect = fields.number_list([value.get("aspect")], 1)[0]
-            right, down = fields.number_list(value.get("shift"), 2)
-            sigma = fields.number_list(value.get("sigma"), 3)
+            aspect = fields.parse_numbers([value.get("aspect")], 1)[0]
+            right, down = fields.parse_numbers(value.get("shift"), 2)
+            sigma = fields.parse_numbers(value.get("sigma"), 3)
             return PictureGeometry(aspect, (right, down), (sigma[0], sigma[1], sigma[2]))
         except (ValueError, InputError) as error:
             raise self.error("picture", str(error)) from error
@@ -283,7 +283,7 @@ class StateReader:
             ValueError: Anything else, or a box without area.
         """
         x, y, width, height = (
-            fields.pixel_coordinate(item) for item in fields.number_list(value, 4)
+            fields.parse_pixel_coordinate(item) for item in fields.parse_numbers(value, 4)
         )
         if width <= 0 or height <= 0:
             raise ValueError("has a box without area")
@@ -291,7 +291,7 @@ class StateReader:
 
     @staticmethod
     def _read_point(value: Any) -> ImagePoint:
-        x, y = (fields.pixel_coordinate(item) for item in fields.number_list(value, 2))
+        x, y = (fields.parse_pixel_coordinate(item) for item in fields.parse_numbers(value, 2))
         return ImagePoint(x, y)
 
 

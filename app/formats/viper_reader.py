@@ -250,7 +250,7 @@ class _ViperFileReader:
         if not text:
             return
         try:
-            side = fields.whole_number(text)
+            side = fields.parse_whole_number(text)
         except ValueError:
             side = 0
         if not 1 <= side <= _MAX_SIDE:
@@ -316,7 +316,7 @@ def _parse_pixel(item: Element, name: str) -> float:
     if name not in item.attrib:
         raise ValueError(f"{name} is missing")
     try:
-        return fields.pixel_coordinate(item.get(name))
+        return fields.parse_pixel_coordinate(item.get(name))
     except ValueError as error:
         raise ValueError(f"{name} {error}") from error
 

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from app.formats.csv_text import CsvTable
-from app.formats.export_record import ExportRecord, chosen_box
+from app.formats.export_record import ExportRecord, choose_ball_box
 from app.formats.frame_names import expected_frame_suffix, frame_path_in_split, split_folder
 from app.formats.view_files import PutText, write_to_disk
 from app.json_text import json_text
@@ -201,8 +201,8 @@ def _write_label_file(
         group, view, split, expected_frame_suffix(view)
     )
     label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
-    box = chosen_box(record, view, boxes) if view.ball else None
-    line = None if box is None else yolo_label_line(box_to_corner(box), view.size)
+    box = choose_ball_box(record, view, boxes) if view.ball else None
+    line = None if box is None else format_yolo_label(box_to_corner(box), view.size)
     put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
@@ -213,7 +213,7 @@ def _write_label_file(
     return image
 
 
-def yolo_label_line(box: Box, size: ImageSize) -> str | None:
+def format_yolo_label(box: Box, size: ImageSize) -> str | None:
     """``0 cx cy w h`` in parts of the image; None where the box lies outside.
 
     Args:

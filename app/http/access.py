@@ -23,12 +23,12 @@ from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins
 from app.features.people.roles import DatasetRoles, require_scope
 from app.features.people.visibility_queries import EVERYTHING, READER, Visibility
-from app.http.headers import bearer_token, read_cookie
+from app.http.headers import read_bearer_token, read_cookie
 from app.http.permissions import (
     OwnedMention,
     RequestSubject,
+    find_missing_error,
     is_hidden,
-    missing_error,
     needs_database,
     require_allowed,
 )
@@ -46,27 +46,27 @@ THREADS = 8
 """So many sessions are looked up at a time."""
 
 
-def current_login(scope: Mapping[str, Any]) -> Login | None:
+def get_current_login(scope: Mapping[str, Any]) -> Login | None:
     """Who is logged in; None on a server that somebody runs alone."""
     found: Login | None = scope.get(LOGIN)
     return found
 
 
-def actor_name(scope: Mapping[str, Any], otherwise: str) -> str:
+def find_actor_name(scope: Mapping[str, Any], otherwise: str) -> str:
     """What the log calls who asks, or another name where nobody has to be logged in."""
-    login = current_login(scope)
+    login = get_current_login(scope)
     return otherwise if login is None else login.actor
 
 
-def current_visibility(scope: Mapping[str, Any]) -> Visibility:
+def get_current_visibility(scope: Mapping[str, Any]) -> Visibility:
     """What whoever asks sees; everything on a server that somebody runs alone."""
-    login = current_login(scope)
+    login = get_current_login(scope)
     return EVERYTHING if login is None else login.visibility
 
 
-def current_whole_visibility(scope: Mapping[str, Any]) -> Visibility:
+def get_current_visibility_without_hidden(scope: Mapping[str, Any]) -> Visibility:
     """The same without the datasets of which some groups are hidden from whoever asks."""
-    login = current_login(scope)
+    login = get_current_login(scope)
     return EVERYTHING if login is None else login.whole_visibility
 
 
@@ -90,7 +90,7 @@ class Access:
             NotLoggedInError: Nobody's.
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
-        if bearer_token(scope) is None and not read_cookie(scope, self._team.cookie):
+        if read_bearer_token(scope) is None and not read_cookie(scope, self._team.cookie):
             raise _not_logged_in_error()
         login = self._login_at_once(scope)
         if login is None:
@@ -119,7 +119,7 @@ class Access:
     async def require_there(self, owned: list[OwnedMention]) -> None:
         """Raise NotFoundError where something is not there, or not for whoever asks."""
         if any(item.ownership is None for item in owned):
-            error = await run_sync(missing_error, self._store, owned, limiter=self._threads)
+            error = await run_sync(find_missing_error, self._store, owned, limiter=self._threads)
             if error is not None:
                 raise error
 
@@ -156,14 +156,14 @@ class Access:
 
         On a busy machine the way to a thread and back takes longer than the answer.
         """
-        if bearer_token(scope) is not None:
+        if read_bearer_token(scope) is not None:
             return None
         with suppress(StorageError):
             return self._team.logins.find(read_cookie(scope, self._team.cookie) or "", at_once=True)
         return None
 
     def _find_login(self, scope: Scope) -> Login:
-        bearer = bearer_token(scope)
+        bearer = read_bearer_token(scope)
         if bearer is not None:
             return self._team.login_with(bearer, Request(scope))
         login = self._team.logins.find(read_cookie(scope, self._team.cookie) or "")

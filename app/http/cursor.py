@@ -29,11 +29,11 @@ def parse_cursor(cursor: str | None) -> int | None:
     if cursor is None:
         return None
     if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= MAX_DIGITS):
-        raise foreign_cursor()
+        raise foreign_cursor_error()
     return int(cursor)
 
 
-def first_below(cursor: str | None, before: int | None) -> int | None:
+def parse_descending_cursor(cursor: str | None, before: int | None) -> int | None:
     """The number below which a page of a list that goes down begins; None for the first page.
 
     Args:
@@ -46,7 +46,7 @@ def first_below(cursor: str | None, before: int | None) -> int | None:
     return before if cursor is None else parse_cursor(cursor)
 
 
-def foreign_cursor() -> InputError:
+def foreign_cursor_error() -> InputError:
     """What to raise for a cursor that no list gave."""
     return InputError(
         "this is not a cursor of this list",
@@ -89,7 +89,9 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
         ) -> Any:
             if not isinstance(whole, ListDocument):
                 return whole
-            items, following = page_of(whole.items, limit, cursor, _list_identity(whose, arguments))
+            items, following = slice_page(
+                whole.items, limit, cursor, _list_identity(whose, arguments)
+            )
             return whole.model_copy(update={"items": items, "next": following})
 
         if inspect.iscoroutinefunction(route):
@@ -115,7 +117,7 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
     return decorate
 
 
-def page_of(
+def slice_page(
     items: Sequence[Any], limit: int | None, cursor: str | None, whose: str
 ) -> tuple[list[Any], str | None]:
     """The items of a page, and the cursor of the next one.
@@ -139,7 +141,7 @@ def page_of(
 def _start_of_page(items: Sequence[Any], cursor: str, whose: str) -> int:
     found = _CURSOR.fullmatch(cursor)
     if found is None or found[3] != whose:
-        raise foreign_cursor()
+        raise foreign_cursor_error()
     place = int(found[1])
     if place < len(items) and _item_identity(items[place]) == found[2]:
         return place + 1

@@ -45,13 +45,17 @@ from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsCache
-from app.http.access import current_login, current_visibility, current_whole_visibility
+from app.http.access import (
+    get_current_login,
+    get_current_visibility,
+    get_current_visibility_without_hidden,
+)
 from app.http.errors import PreconditionRequiredError
 from app.http.events import Events
 from app.json_text import MAX_ID
 from app.media.frames import Frames
 from app.soccer.actors import LOCAL_USER, script_name
-from app.solving.solve import warm_up
+from app.solving.solve import warm_up_solver
 
 log = structlog.get_logger("touchline.api")
 
@@ -154,7 +158,7 @@ class Services:
 
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
-        Thread(target=warm_up, daemon=True).start()
+        Thread(target=warm_up_solver, daemon=True).start()
         Thread(target=self._refresh_large_datasets, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
@@ -258,7 +262,7 @@ async def get_actor(
     Raises:
         InputError: The name cannot be one, or a person is known who would hide behind it.
     """
-    login = current_login(request.scope)
+    login = get_current_login(request.scope)
     if login is not None:
         if name is not None:
             raise InputError(
@@ -272,12 +276,12 @@ async def get_actor(
 
 async def get_visibility(request: Request) -> Visibility:
     """What whoever asks sees."""
-    return current_visibility(request.scope)
+    return get_current_visibility(request.scope)
 
 
 async def get_whole_visibility(request: Request) -> Visibility:
     """What whoever asks sees and nothing of which is hidden from them."""
-    return current_whole_visibility(request.scope)
+    return get_current_visibility_without_hidden(request.scope)
 
 
 async def require_if_match(
@@ -318,7 +322,7 @@ SeesWhole = Annotated[Visibility, Depends(get_whole_visibility)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 
 
-def etag_matches(request: Request, etag: str) -> bool:
+def is_not_modified(request: Request, etag: str) -> bool:
     """Whether If-None-Match says that the caller already has this state."""
     sent = request.headers.get("if-none-match", "")
     return etag in [tag.strip().removeprefix("W/") for tag in sent.split(",")]

@@ -46,7 +46,7 @@ class Document(BaseModel):
             cls.__annotations__ = shown | get_annotations(cls)
 
 
-def json_of(value: Any) -> bytes:
+def encode_document(value: Any) -> bytes:
     """The JSON of a document, or of a frozen dataclass, which is its own; no number is infinite or NaN."""
     kind: Any = type(value)
     return _adapter_of_type(kind).dump_json(value)
@@ -98,7 +98,7 @@ class IdentityCache(Generic[T, R]):
         return made
 
 
-def responds(
+def respond_with(
     make: Callable[Concatenate[Outcome, ...], Response], *names: str
 ) -> Callable[[Callable[P, Outcome | Response]], Callable[P, Response]]:
     """Let a route return what its work came to, of which the response is made.
@@ -118,7 +118,7 @@ def responds(
         @wraps(route)
         def respond(*, keyed_request: KeyedRequest | None = None, **given: Any) -> Response:
             made = partial(make, **{name: given[name] for name in names})
-            pending = PendingResponse(keyed_request, made, stored_form)
+            pending = PendingResponse(keyed_request, made, response_to_stored)
             with pending.open():
                 outcome: Any = route(**given)  # type: ignore[call-arg]
             return outcome if isinstance(outcome, Response) else pending.response_to(outcome)
@@ -129,7 +129,7 @@ def responds(
     return decorate
 
 
-def stored_form(response: Response, digest: str) -> StoredResponse:
+def response_to_stored(response: Response, digest: str) -> StoredResponse:
     """What is stored of a response; ``digest`` is that of its request."""
     headers = {name: response.headers[name] for name in STORED_HEADERS if name in response.headers}
     return StoredResponse(digest, response.status_code, headers, bytes(response.body))
@@ -137,15 +137,17 @@ def stored_form(response: Response, digest: str) -> StoredResponse:
 
 def document(content: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
     """A document, or a frozen value that is its own, as it is sent."""
-    return Response(json_of(content), status, headers, "application/json")
+    return Response(encode_document(content), status, headers, "application/json")
 
 
-def as_document(show: Callable[[Outcome], Any], status: int = 200) -> Callable[[Outcome], Response]:
+def respond_with_document(
+    show: Callable[[Outcome], Any], status: int = 200
+) -> Callable[[Outcome], Response]:
     """How an outcome is sent of which ``show`` makes a document."""
     return lambda outcome: document(show(outcome), status)
 
 
-def no_content(_outcome: object) -> Response:
+def make_empty_response(_outcome: object) -> Response:
     """The response of what leaves nothing to say: 204."""
     return Response(status_code=204)
 

@@ -33,9 +33,9 @@ from app.errors import (
     TooManyPointsError,
     TooManyTriesError,
 )
-from app.http.access import current_visibility
+from app.http.access import get_current_visibility
 from app.http.headers import SCHEME as BEARER
-from app.http.headers import bearer_token
+from app.http.headers import read_bearer_token
 from app.http.problem import (
     SCHEME,
     TITLES,
@@ -44,7 +44,7 @@ from app.http.problem import (
     make_problem,
     problem_response,
 )
-from app.http.requests import UNKNOWN, sentence_about
+from app.http.requests import UNKNOWN, describe_unknown_name
 
 log = structlog.get_logger("touchline.api")
 
@@ -118,7 +118,7 @@ class StaleStateError(ReviewError):
         self.etag = error.current_etag
 
 
-def http_status(error: ReviewError) -> int:
+def find_http_status(error: ReviewError) -> int:
     """The HTTP status of an error of the tree."""
     special = {PreconditionRequiredError: 428, StaleStateError: 412}
     if type(error) in special:
@@ -137,7 +137,7 @@ def _is_full(error: StorageError) -> bool:
     return name.startswith(("SQLITE_FULL", "53100")) or full
 
 
-def install_handlers(app: FastAPI) -> None:
+def install_error_handlers(app: FastAPI) -> None:
     """Make the application answer every known error with a problem."""
     app.add_exception_handler(ReviewError, _review_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
@@ -146,10 +146,10 @@ def install_handlers(app: FastAPI) -> None:
 
 async def _review_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ReviewError)
-    status = http_status(error)
+    status = find_http_status(error)
     hint = error.hint
     if isinstance(error, NotFoundError) and error.known:
-        hint = hint or error.nearest(current_visibility(request.scope).sees)
+        hint = hint or error.nearest(get_current_visibility(request.scope).sees)
     problem = make_problem(
         status,
         error.message,
@@ -164,7 +164,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, TooManyTriesError):
         headers["Retry-After"] = str(error.seconds)
     if status == 401:
-        headers["WWW-Authenticate"] = SCHEME if bearer_token(request.scope) is None else BEARER
+        headers["WWW-Authenticate"] = SCHEME if read_bearer_token(request.scope) is None else BEARER
     current = None
     if isinstance(error, StaleStateError):
         headers["ETag"], current = error.etag, error.current
@@ -212,7 +212,7 @@ def _most_telling_problem(errors: Sequence[FieldProblem]) -> FieldProblem:
 def _problem_sentence(request: Request, detail: dict[str, Any]) -> str:
     """Pydantic's message without the prefix that it gives to our own validators."""
     if detail["type"] == UNKNOWN:
-        return sentence_about(request, detail["loc"])
+        return describe_unknown_name(request, detail["loc"])
     if detail["type"] in ("literal_error", "enum"):
         return f"must be {detail['ctx']['expected'].replace(chr(39), '')}"
     plain = _PLAIN.get(detail["type"])
@@ -240,7 +240,7 @@ async def _http_exception(request: Request, error: Exception) -> Response:
 
 
 @contextmanager
-def current_state(load: Callable[[], BaseModel]) -> Iterator[None]:
+def add_current_state_to_conflicts(load: Callable[[], BaseModel]) -> Iterator[None]:
     """Turn a ``StaleRevisionError`` into one that carries the present document.
 
     Args:

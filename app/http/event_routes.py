@@ -12,7 +12,7 @@ from fastapi.responses import StreamingResponse
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import hides_groups_from_reader
 from app.http.deps import AppServices, SeesWhole, Services
-from app.http.events import EVENTS, Listener, first_event
+from app.http.events import EVENTS, Listener, make_first_event
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.requests import is_head
@@ -40,7 +40,7 @@ STREAM: Responses = {
 }
 
 
-async def admit_listener(services: AppServices) -> Services:
+async def require_free_listener(services: AppServices) -> Services:
     """The services, unless as many listen as may: who is turned away costs the database nothing."""
     services.events.require_room()
     return services
@@ -51,7 +51,7 @@ class StreamStart:
 
     def __init__(
         self,
-        services: Annotated[Services, Depends(admit_listener)],
+        services: Annotated[Services, Depends(require_free_listener)],
         dataset: Annotated[
             str | None, Query(max_length=200, description="Name or id; default: all datasets.")
         ] = None,
@@ -92,7 +92,7 @@ class StreamStart:
             self.position, self.solution, self.resumed = 0, 0, False
 
 
-async def begin(
+async def open_event_feed(
     services: AppServices, visibility: SeesWhole, start: Annotated[StreamStart, Depends()]
 ) -> AsyncIterator[Listener]:
     """A feed for as long as the request lasts."""
@@ -110,11 +110,11 @@ async def begin(
         services.events.unsubscribe(feed)
 
 
-def under_way(
+def read_current_events(
     services: AppServices,
     visibility: SeesWhole,
     start: Annotated[StreamStart, Depends()],
-    feed: Annotated[Listener, Depends(begin)],
+    feed: Annotated[Listener, Depends(open_event_feed)],
 ) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
     jobs = services.events.open_jobs(start.dataset_id, visibility)
@@ -133,8 +133,8 @@ def under_way(
 async def listen(
     request: Request,
     start: Annotated[StreamStart, Depends()],
-    feed: Annotated[Listener, Depends(begin)],
-    first: Annotated[list[bytes], Depends(under_way)],
+    feed: Annotated[Listener, Depends(open_event_feed)],
+    first: Annotated[list[bytes], Depends(read_current_events)],
 ) -> StreamingResponse:
     """What changes, as it changes: by anybody, in a browser or on the command line.
 
@@ -144,7 +144,7 @@ async def listen(
     """
 
     async def told() -> AsyncIterator[bytes]:
-        yield b"".join([first_event(start.position), *first])
+        yield b"".join([make_first_event(start.position), *first])
         if is_head(request.scope):
             return
         async for events in feed.read():

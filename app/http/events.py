@@ -36,7 +36,7 @@ from app.features.queue.changes import (
     read_position,
     read_solved_since,
 )
-from app.http.documents import json_of
+from app.http.documents import encode_document
 from app.http.problem import PresenceDocument
 
 log = structlog.get_logger("touchline.events")
@@ -204,7 +204,7 @@ class Events:
     def banner(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""
         banner = read_banner(self._store)
-        return "" if banner is None else json_of(banner).decode()
+        return "" if banner is None else encode_document(banner).decode()
 
     def solved_since(self, solution: int, feed: Listener) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
@@ -364,7 +364,7 @@ def _deliver_events(queued: Mapping[Listener, list[bytes]], *, ended: bool = Fal
             loop.call_soon_threadsafe(take, loop)
 
 
-def first_event(position: int) -> bytes:
+def make_first_event(position: int) -> bytes:
     """What a listener gets first: where it stands, should it have to come back."""
     return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
 

@@ -42,7 +42,7 @@ _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::([0-9]{1,5}))?")
 _ORIGIN = re.compile(r"(https?)://([^/?#@\\\s]+)")
 
 
-def content_security_policy(script_hashes: tuple[str, ...] = ()) -> str:
+def make_content_security_policy(script_hashes: tuple[str, ...] = ()) -> str:
     """The Content-Security-Policy; the hashes admit inline scripts, which is the import map."""
     scripts = " ".join(["'self'", *(f"'{digest}'" for digest in script_hashes)])
     return "; ".join(
@@ -84,7 +84,7 @@ class SecurityHeaders:
         await self.app(scope, receive, send_with_headers)
 
 
-def bearer_token(scope: Scope) -> str | None:
+def read_bearer_token(scope: Scope) -> str | None:
     """The token of a request: None without one, empty where it is not clear which one is meant.
 
     Another scheme than Bearer is between a browser and the proxy before us: it is not looked at. A
@@ -97,7 +97,7 @@ def bearer_token(scope: Scope) -> str | None:
     return tokens[0] if len(tokens) == 1 else ""
 
 
-def content_disposition(name: str, how: str = "attachment") -> str:
+def make_content_disposition(name: str, how: str = "attachment") -> str:
     """The header Content-Disposition of a file, whatever letters its name has (RFC 6266)."""
     plain = re.sub(r'[^\x20-\x7e]|["\\%]', "_", name)
     exact = "" if plain == name else f"; filename*=UTF-8''{quote(name, safe='')}"
@@ -117,7 +117,7 @@ def read_cookie(scope: Scope, name: str) -> str | None:
     return None if morsel is None else morsel.value
 
 
-def cookie_name(name: str, secure: bool) -> str:
+def make_cookie_name(name: str, secure: bool) -> str:
     """The name in full. Over TLS it has a prefix with which browsers refuse cookies of other names."""
     return f"__Host-{name}" if secure else name
 
@@ -131,11 +131,11 @@ def cookie_values(name: str, value: str, seconds: int, secure: bool) -> dict[str
         seconds: How long; 0 deletes it.
         secure: Whether people come by TLS.
     """
-    full = {"key": cookie_name(name, secure), "value": value, "path": "/", "httponly": True}
+    full = {"key": make_cookie_name(name, secure), "value": value, "path": "/", "httponly": True}
     return {**full, "samesite": "strict", "secure": secure, "max_age": seconds}
 
 
-def host_name(host: str) -> str:
+def parse_host_name(host: str) -> str:
     """The name in a Host header, without the port, in lower case; brackets of IPv6 stay.
 
     Empty where it is no host with a port from 1 to 65535 or without one (RFC 9110, 7.2).
@@ -146,7 +146,7 @@ def host_name(host: str) -> str:
     return found[1]
 
 
-def same_origin(origin: str, host: str, scheme: str) -> bool:
+def is_same_origin(origin: str, host: str, scheme: str) -> bool:
     """Whether an Origin header names the very scheme, host and port that the request was sent to."""
     match = _ORIGIN.fullmatch(origin.lower())
     if match is None or match[1] != scheme:
@@ -177,7 +177,7 @@ class KnownHosts:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
             hosts = Headers(scope=scope).getlist("host")
-            if len(hosts) != 1 or host_name(hosts[0]) not in self.allowed:
+            if len(hosts) != 1 or parse_host_name(hosts[0]) not in self.allowed:
                 problem = make_problem(
                     400,
                     "the Host of this request is not a name of this server",
@@ -202,7 +202,7 @@ class SameOrigin:
     def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
         self.app = app
         self.url, self.required = url and _without_default_port(url.lower()), required
-        self._name = "" if self.url is None else host_name(self.url.partition("://")[2])
+        self._name = "" if self.url is None else parse_host_name(self.url.partition("://")[2])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http" and not self._is_same_origin(scope):
@@ -219,10 +219,10 @@ class SameOrigin:
             return False
         host = headers.get("host", "")
         origins = headers.getlist("origin")
-        if self.required and not origins and bearer_token(scope) is None:
+        if self.required and not origins and read_bearer_token(scope) is None:
             return False
-        if self._name and host_name(host) == self._name:
+        if self._name and parse_host_name(host) == self._name:
             return all(origin.lower() == self.url for origin in origins)
         return all(
-            same_origin(origin, host, scheme) or origin.lower() == self.url for origin in origins
+            is_same_origin(origin, host, scheme) or origin.lower() == self.url for origin in origins
         )

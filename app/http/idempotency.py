@@ -33,7 +33,7 @@ from app.db.idempotency import (
 from app.db.store import Store
 from app.errors import BusyError, OverloadedError, StorageError
 from app.http.deps import ACTOR_HEADER
-from app.http.documents import KEYED_REQUEST, stored_form
+from app.http.documents import KEYED_REQUEST, response_to_stored
 from app.http.problem import make_problem, problem_response
 from app.http.requests import TimedBody
 from app.json_text import canonical
@@ -197,7 +197,7 @@ class Idempotency:
         response = await work()
         if not (keyed and keyed.stored) and _is_storable(response):
             try:
-                sent = stored_form(response, await digest.whole())
+                sent = response_to_stored(response, await digest.whole())
                 await run_sync(store_sent, store, key, actor, sent, limiter=self._storing)
             except StorageError as error:
                 # The work is done; a repetition is answered with the state as it is then.

@@ -61,7 +61,9 @@ NUMBERS: Mapping[str, float] = {
 """Of numbers that are none of the usual ones."""
 
 
-def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", deep: int = 0) -> Any:
+def make_example(
+    schema: Schema, schemas: Mapping[str, Schema], name: str = "", deep: int = 0
+) -> Any:
     """A value that fits a schema.
 
     Args:
@@ -72,7 +74,7 @@ def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", de
     """
     if "$ref" in schema:
         found = schemas[schema["$ref"].rpartition("/")[2]]
-        return example_of({**found, **_given_example(schema)}, schemas, name, deep + 1)
+        return make_example({**found, **_given_example(schema)}, schemas, name, deep + 1)
     for word in ("examples", "enum"):
         if schema.get(word):
             return schema[word][0]
@@ -85,7 +87,7 @@ def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", de
             # What may be null is null where answers would hold themselves without an end.
             if len(choices) < len(schema[word]) and deep > _DEEP:
                 return None
-            return example_of(choices[0], schemas, name, deep)
+            return make_example(choices[0], schemas, name, deep)
     kind = schema.get("type")
     if kind == "object":
         return _example_object(schema, schemas, deep)
@@ -102,12 +104,12 @@ def _given_example(schema: Schema) -> dict[str, Any]:
 
 def _example_object(schema: Schema, schemas: Mapping[str, Schema], deep: int) -> dict[str, Any]:
     found = {
-        key: example_of(one, schemas, key, deep + 1)
+        key: make_example(one, schemas, key, deep + 1)
         for key, one in schema.get("properties", {}).items()
     }
     more = schema.get("additionalProperties")
     if not found and isinstance(more, dict):
-        return {"accepted": example_of(more, schemas, "", deep + 1)}
+        return {"accepted": make_example(more, schemas, "", deep + 1)}
     return found
 
 
@@ -115,9 +117,9 @@ def _example_array(
     schema: Schema, schemas: Mapping[str, Schema], name: str, deep: int
 ) -> list[Any]:
     if "prefixItems" in schema:
-        return [example_of(one, schemas, name, deep + 1) for one in schema["prefixItems"]]
+        return [make_example(one, schemas, name, deep + 1) for one in schema["prefixItems"]]
     count = schema.get("minItems", 1 if deep <= _DEEP else 0)
-    return [example_of(schema.get("items", {}), schemas, name, deep + 1)] * count
+    return [make_example(schema.get("items", {}), schemas, name, deep + 1)] * count
 
 
 def _example_number(schema: Schema, kind: str, name: str) -> int | float:
@@ -201,7 +203,7 @@ async def get_document(request: Request) -> JSONResponse:
     return JSONResponse(request.app.openapi())
 
 
-def describe(app: FastAPI) -> None:
+def describe_errors_in_openapi(app: FastAPI) -> None:
     """Replace the framework's own description of errors by ours."""
 
     def openapi() -> dict[str, Any]:
@@ -301,7 +303,7 @@ def _add_examples(document: dict[str, Any]) -> None:
                 for kind, content in answer.get("content", {}).items():
                     is_given = {"example", "examples"} & set(content)
                     if status.startswith("2") and kind == "application/json" and not is_given:
-                        content["example"] = example_of(content.get("schema", {}), schemas)
+                        content["example"] = make_example(content.get("schema", {}), schemas)
 
 
 def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) -> None:

@@ -22,7 +22,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.config import own_folder
 from app.errors import StorageError
-from app.http.headers import content_security_policy
+from app.http.headers import make_content_security_policy
 from app.http.permissions import open_to_all
 from app.http.request_limits import limit
 from app.http.route import Route
@@ -150,7 +150,7 @@ def _module_paths(folder: Path) -> Iterator[str]:
                 yield Path(place, name).relative_to(folder).as_posix()
 
 
-def script_hashes(html: bytes) -> tuple[str, ...]:
+def hash_import_maps(html: bytes) -> tuple[str, ...]:
     """CSP sources of the import maps in a page; no other inline script is admitted."""
     return tuple(
         "sha256-" + base64.b64encode(hashlib.sha256(found["text"]).digest()).decode()
@@ -205,7 +205,9 @@ class IndexPage:
         if team:
             html = html.replace(b"<html ", b"<html data-team ", 1)
         etag = f'"{digest_of(html)}"'
-        return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
+        return IndexPage(
+            html, etag, make_content_security_policy(hash_import_maps(html)), styles, modules
+        )
 
 
 class BrowserSite:
@@ -245,7 +247,7 @@ class BrowserSite:
 
     def policy(self) -> str:
         """The Content-Security-Policy of every response."""
-        return self._page.policy if self._page else content_security_policy()
+        return self._page.policy if self._page else make_content_security_policy()
 
 
 class ModuleFiles(StaticFiles):

@@ -201,7 +201,7 @@ def require_allowed(store: Store, subject: RequestSubject, login: Login) -> list
     return owned
 
 
-def missing_error(store: Store, owned: list[OwnedMention]) -> NotFoundError | None:
+def find_missing_error(store: Store, owned: list[OwnedMention]) -> NotFoundError | None:
     """That something is not there of what a request names, or not for its reader; both sound alike."""
     for item in owned:
         named = item.mention.named
@@ -267,7 +267,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = find_role_at(item.ownership, roles, login.owner)
             require_permission(role, action, here)
-            if reads_hidden_work_of(subject):
+            if query_of_request_reveals_hidden_work(subject):
                 require_permission(role, Action.REVIEW, here)
             whole = item.mention.named.kind in WHOLE or permission.whole
             if whole and item.ownership.dataset in roles.blind:
@@ -277,7 +277,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
                 )
 
 
-def reads_hidden_work_of(subject: RequestSubject) -> bool:
+def query_of_request_reveals_hidden_work(subject: RequestSubject) -> bool:
     """Whether a query of groups asks what others made of them: annotators are not to know.
 
     Queries are parameters, and fields of bodies, named ``q`` or ``query``.

@@ -17,7 +17,7 @@ from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
 from starlette.types import Scope
 
-from app.http.access import current_login
+from app.http.access import get_current_login
 from app.http.headers import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
 
@@ -195,7 +195,7 @@ class RequestLimits:
         if request_class in (READ, WRITE) and is_large(scope):
             # An edit or preview of hundreds of points is solved for as long as dozens of those that people draw.
             request_class = COMPUTE
-        login = current_login(scope)
+        login = get_current_login(scope)
         async with self._of[request_class].admit("" if login is None else login.name) as admitted:
             yield None if admitted else _busy_response(scope)
 

@@ -74,7 +74,7 @@ class RefusalBound:
         self._untold = 0
 
 
-def address_of(scope: Scope) -> str:
+def find_client_address(scope: Scope) -> str:
     """Where a request comes from: behind a proxy of ours, the address that it forwards."""
     team: Team | None = getattr(scope["app"].state, "team", None)
     if team is not None:
@@ -83,14 +83,14 @@ def address_of(scope: Scope) -> str:
     return client[0] if client else ""
 
 
-def person_of_request(scope: Scope) -> str | None:
+def find_person_of_request(scope: Scope) -> str | None:
     """Who asks, as the log of changes calls them; None for a stranger on a team's server."""
     is_team = getattr(scope["app"].state, "team", None) is not None
     found: str | None = scope.get(ASKS, None if is_team else LOCAL_USER)
     return found
 
 
-def new_request_id() -> str:
+def make_request_id() -> str:
     """An id that no other request has."""
     return uuid.uuid4().hex[:16]
 
@@ -115,7 +115,7 @@ class RequestLog:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        name, start = new_request_id(), time.perf_counter()
+        name, start = make_request_id(), time.perf_counter()
         status, etag = 0, None
 
         async def watch(message: Message) -> None:
@@ -148,8 +148,8 @@ class RequestLog:
                 "request answered",
                 method=scope["method"],
                 path=scope["path"],
-                person=person_of_request(scope),
-                address=address_of(scope),
+                person=find_person_of_request(scope),
+                address=find_client_address(scope),
                 status=status,
                 milliseconds=round(1000 * (time.perf_counter() - start), 1),
                 key=Headers(scope=scope).get("idempotency-key"),

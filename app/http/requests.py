@@ -146,7 +146,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
         raise RequestValidationError(problems)
 
 
-def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:
+def describe_unknown_name(request: Request, location: tuple[int | str, ...]) -> str:
     """What to say of a name that nobody knows, at its place in the request."""
     place, name = location[0], str(location[-1])
     route = request.scope["route"]

@@ -21,7 +21,7 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from app.features.people.logins import Login
-from app.http.access import Access, actor_name
+from app.http.access import Access, find_actor_name
 from app.http.headers import SAFE_METHODS
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
@@ -57,7 +57,7 @@ class Gate:
     max_json_bytes: int
 
 
-def gate_of(scope: Scope) -> Gate:
+def get_gate(scope: Scope) -> Gate:
     """That of the application that a request came to."""
     gate: Gate = scope["app"].state.gate
     return gate
@@ -93,7 +93,7 @@ class Route(APIRoute):
         await super().handle(scope, receive, send)
 
     async def _answer(self, handler: Handler, request: Request) -> Response:
-        gate, access, login = gate_of(request.scope), None, None
+        gate, access, login = get_gate(request.scope), None, None
         if self.permission.action is not None and (access := gate.access) is not None:
             login = await access.log_in(request.scope)
         try:
@@ -155,7 +155,7 @@ class Route(APIRoute):
         return await gate.idempotency.answer(
             request,
             digest,
-            actor_name(request.scope, LOCAL_USER),
+            find_actor_name(request.scope, LOCAL_USER),
             hidden or _hides_nothing,
             partial(self._answer_within_limits, gate, read, handler),
         )
@@ -214,12 +214,12 @@ class ReadRequest(StarletteRequest):
 
 async def require_somebody(scope: Scope) -> None:
     """Raise NotLoggedInError where a stranger asks a server of a team."""
-    access = gate_of(scope).access
+    access = get_gate(scope).access
     if access is not None:
         await access.log_in(scope)
 
 
-async def answer_no_route(scope: Scope, receive: Receive, send: Send) -> None:
+async def respond_to_unknown_route(scope: Scope, receive: Receive, send: Send) -> None:
     """Answer where there is no route: that is nothing that a stranger is told.
 
     Raises:

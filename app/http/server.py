@@ -26,7 +26,7 @@ from prometheus_client.multiprocess import mark_process_dead
 from app.config import Settings
 from app.errors import InputError
 from app.http.metrics import MULTIPROCESS
-from app.solving.solve import warm_up
+from app.solving.solve import warm_up_solver
 
 MAX_CONNECTIONS = 1000
 SPARE_FILES = 128
@@ -60,7 +60,7 @@ STOP_SECONDS = 30.0
 
 
 @contextmanager
-def listen(host: str, port: int) -> Iterator[tuple[socket.socket, str]]:
+def open_listening_socket(host: str, port: int) -> Iterator[tuple[socket.socket, str]]:
     """A listening socket and the address that a browser opens.
 
     Raises:
@@ -96,22 +96,22 @@ def _bind_socket(host: str, port: int) -> socket.socket:
 
 def run(app: FastAPI, server: socket.socket) -> None:
     """Serve until the process is told to stop."""
-    Thread(target=settle, daemon=True).start()
+    Thread(target=warm_up_process, daemon=True).start()
     make_server(app).run(sockets=[server])
 
 
-def settle() -> None:
+def warm_up_process() -> None:
     """Load the solver, and then count what is there among what stays; what comes now is as ``GC_THRESHOLDS``.
 
     A full collection would walk through all of it: 0.12 s in which nobody is answered, each time.
     """
-    warm_up()
+    warm_up_solver()
     gc.collect()
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)
 
 
-def connection_limit() -> int:
+def find_connection_limit() -> int:
     """How many connections fit; the process is given as many descriptors as it may have."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = MAX_CONNECTIONS + SPARE_FILES
@@ -130,7 +130,7 @@ def make_server(app: FastAPI) -> Server:
         # The parser that bounds a head; clients that are slow with theirs are the business of the proxy.
         http="h11",
         h11_max_incomplete_event_size=HEAD_BYTES,
-        limit_concurrency=connection_limit(),
+        limit_concurrency=find_connection_limit(),
         ws="none",
         # What a stranger sends must not fill the log: malformed bytes are answered, not logged.
         log_level="error",

@@ -31,8 +31,8 @@ from app.http.headers import (
     PASSKEY,
     SESSION,
     SIGN_ON,
-    cookie_name,
     cookie_values,
+    make_cookie_name,
     read_cookie,
 )
 from app.mail import MailServer, read_mail_server
@@ -265,7 +265,7 @@ class Team:
         )
 
     def _cookie_name(self, name: str) -> str:
-        return cookie_name(name, self.secure)
+        return make_cookie_name(name, self.secure)
 
     def _cookie_arguments(self, name: str, value: str, age: int) -> dict[str, Any]:
         return cookie_values(name, value, age, self.secure)
@@ -314,7 +314,7 @@ def _is_ip_address(name: str) -> bool:
     return True
 
 
-def allowed_hosts(settings: Settings) -> list[str]:
+def list_allowed_hosts(settings: Settings) -> list[str]:
     """Names that the server answers to."""
     own = urlsplit(settings.url).hostname if settings.url else None
     name = f"[{own}]" if own and ":" in own else own

@@ -96,7 +96,7 @@ WIDE = Library(
 """Replays: any side; the half turn of the pitch makes y >= 0 of every stand."""
 
 
-def known_library(known: Sequence[Camera]) -> Library:
+def make_library_of_known_cameras(known: Sequence[Camera]) -> Library:
     """Where cameras of the same match stand, and with which lenses.
 
     Args:
@@ -141,7 +141,7 @@ def candidate_cameras(
             np.ascontiguousarray(library.stands),
             library.focals(width),
             np.ascontiguousarray(pieces, dtype=np.float64),
-            straight_markings(pitch),
+            list_straight_markings(pitch),
             SLACK_M,
             low,
             high,
@@ -149,7 +149,7 @@ def candidate_cameras(
     )
 
 
-def straight_markings(pitch: Pitch) -> FloatArray:
+def list_straight_markings(pitch: Pitch) -> FloatArray:
     """Ends of the straight markings on the grass: x, y, x, y, metres, shape (M, 4)."""
     shapes = (pitch.shapes[name] for name in MARKINGS if not name.startswith("Goal"))
     return np.array(

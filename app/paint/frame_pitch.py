@@ -17,7 +17,7 @@ from app.paint.evidence import (
     to_paint_evidence,
     trace_visible_markings,
 )
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -47,7 +47,7 @@ def make_pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
         pitch: On which the camera was found.
     """
     height, width = image.shape[:2]
-    reading = read_picture(image, field_of_play(image))
+    reading = read_picture(image, find_field_of_play(image))
     window = WINDOW_PX * max(width / 960, 0.6)
     evidence = find_paint(reading, trace_visible_markings(reading, camera, pitch), window)
     return PitchFrame(to_paint_evidence(evidence, camera).some_points(), ImageSize(width, height))
@@ -71,7 +71,7 @@ def group_by_position(
     return found
 
 
-def agreed_pitch(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
+def find_agreed_pitch(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
     """The size that all frames certainly show where it is another one; None otherwise.
 
     Args:

@@ -78,7 +78,7 @@ class GoalHeight:
         return seen and self.contrast >= max(SURE_CONTRAST, SURE_RATIO * self.planned)
 
 
-def goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
+def find_goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
     """Points on the parts of the goals that a picture shows, pixels of the picture.
 
     Args:
@@ -102,7 +102,7 @@ def goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
     return make_lines(found)
 
 
-def goal_height(image: Image, camera: Camera, pitch: Pitch) -> GoalHeight | None:
+def measure_goal_height(image: Image, camera: Camera, pitch: Pitch) -> GoalHeight | None:
     """How high a goal looks, as a share of what the camera shows; None where none is seen.
 
     Paint alone hardly tells a squeezed picture from one that was taken from farther up: both

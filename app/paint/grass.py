@@ -59,14 +59,14 @@ GREY_SPREAD, DARK_LEVEL, PALE_LEVEL = 12.0, 28.0, 215.0
 """Grey levels: mean distance of the channels, brightness of a night and of a snow picture."""
 
 
-def field_of_play(image: Image) -> BoolArray:
+def find_field_of_play(image: Image) -> BoolArray:
     """Where the picture shows the field of play, lines and people on it included.
 
     Args:
         image: Red green blue, shape (H, W, 3).
 
     Returns:
-        Shape (H, W); nowhere true where there is too little grass, see ``why_no_field``.
+        Shape (H, W); nowhere true where there is too little grass, see ``explain_missing_field``.
     """
     height, width = image.shape[:2]
     small = _downscale(image)
@@ -91,12 +91,12 @@ def field_of_play(image: Image) -> BoolArray:
     return chosen.astype(np.bool_)
 
 
-def why_no_field(image: Image, field: BoolArray) -> str | None:
+def explain_missing_field(image: Image, field: BoolArray) -> str | None:
     """Why a picture has no field of play, as a sentence; None where it has one.
 
     Args:
         image: Red green blue, shape (H, W, 3).
-        field: What ``field_of_play`` found in it, shape (H, W).
+        field: What ``find_field_of_play`` found in it, shape (H, W).
     """
     if field.any():
         return None

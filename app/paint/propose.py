@@ -32,14 +32,14 @@ from app.geometry.resection import (
 )
 from app.paint.agreement import (
     PaintAgreement,
-    explained_strength,
     measure_agreement,
     measure_clear_agreement,
+    measure_explained_strength,
 )
-from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
+from app.paint.candidates import KNOWN, MAIN, WIDE, Library, make_library_of_known_cameras
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace_visible_markings
-from app.paint.goal import goal_height
-from app.paint.grass import field_of_play, why_no_field
+from app.paint.goal import measure_goal_height
+from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.ridges import Strength, find_straight_pieces, measure_line_strength
 from app.paint.search import (
     KAPPA_MEAN,
@@ -150,7 +150,7 @@ class RankedCamera:
     """A camera on the paint, and how well it agrees with all of it.
 
     Attributes:
-        weakest: As of ``weakest_marking``.
+        weakest: As of ``measure_weakest_marking``.
         policy: Prior of the distortion with which it was snapped.
         known: Covariance of where it started, shape (8, 8), where the match knows the position.
     """
@@ -219,17 +219,17 @@ def propose_for_frame(
         libraries: Where it is looked for after the positions of ``known``.
     """
     ranked: list[RankedCamera] = []
-    match = known_library(known) if known else None
+    match = make_library_of_known_cameras(known) if known else None
     for library in [*([match] if match else []), *libraries]:
         found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
             found = [_move_to_known_position(frame, item, match, pitch) for item in found]
         ranked = merge_ranked(frame, ranked, found)
-        if why_unsure(ranked) is None:
+        if explain_uncertain_camera(ranked) is None:
             break
     else:
         closer = _rank_in_own_size(image, frame, ranked, pitch)
-        if why_unsure(closer) is None:
+        if explain_uncertain_camera(closer) is None:
             return _choose_proposal(image, frame, closer, pitch)
     return _choose_proposal(image, frame, ranked, pitch)
 
@@ -240,7 +240,7 @@ def enlarge_small_picture(image: Image) -> Image:
     return np.asarray(cv2.resize(image, None, fx=ENLARGED, fy=ENLARGED, interpolation=cubic))
 
 
-def why_too_small(image: Image) -> str | None:
+def explain_too_small_picture(image: Image) -> str | None:
     """Why no line can be followed in a picture of that size; None where lines can."""
     height, width = image.shape[:2]
     if min(height, width) >= LEAST_SIDE:
@@ -250,7 +250,7 @@ def why_too_small(image: Image) -> str | None:
 
 def read_frame(image: Image) -> SearchedFrame | str:
     """A frame ready to be searched, or why there is nothing to search for."""
-    if (small := why_too_small(image)) is not None:
+    if (small := explain_too_small_picture(image)) is not None:
         return small
     height, width = image.shape[:2]
     if width < ENLARGED_WIDTH:
@@ -258,14 +258,16 @@ def read_frame(image: Image) -> SearchedFrame | str:
     elif width > WORK_WIDTH:
         size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
-    field = field_of_play(image)
-    reason = why_no_field(image, field)
+    field = find_field_of_play(image)
+    reason = explain_missing_field(image, field)
     if reason is not None:
         return reason
-    return frame_to_search(image, field, line_strength(image, field), read_picture(image, field))
+    return prepare_frame_to_search(
+        image, field, line_strength(image, field), read_picture(image, field)
+    )
 
 
-def frame_to_search(
+def prepare_frame_to_search(
     image: Image, field: BoolArray, strength: Strength, reading: Reading
 ) -> SearchedFrame | str:
     """A frame that is read, ready to be searched, or why there is nothing to search for.
@@ -314,15 +316,15 @@ def _rank_in_own_size(
             strength=line_strength(image, field),
             reading=read_picture(image, field),
         )
-        drawn = kernel_threads().map(
+        drawn = get_kernel_executor().map(
             lambda item: _snap_in_own_size(looked, item, factor, pitch), again
         )
         again = [item for item in drawn if item is not None]
     if not again:
         return []
     best = max(again, key=lambda item: item.score).snapped.camera
-    paint = explained_strength(best, looked.field, looked.strength, pitch)
-    seen = kernel_threads().map(
+    paint = measure_explained_strength(best, looked.field, looked.strength, pitch)
+    seen = get_kernel_executor().map(
         lambda item: measure_clear_agreement(
             item.snapped.camera, looked.field, looked.strength, pitch, paint
         ),
@@ -346,7 +348,7 @@ def _snap_in_own_size(
         )
         if snapped.reason is None:
             seen = measure_agreement(snapped.camera, looked.field, looked.paint, pitch)
-            weakest = weakest_marking(looked.reading, snapped, pitch, VISIBLE_PX * factor)
+            weakest = measure_weakest_marking(looked.reading, snapped, pitch, VISIBLE_PX * factor)
             found.append(replace(item, snapped=snapped, agreement=seen, weakest=weakest))
     return max(found, key=lambda item: item.score, default=None)
 
@@ -371,11 +373,11 @@ def rank_cameras(
         sigma = min(KNOWN_KAPPA_SIGMA, policy.distortion_sigma)
         policy = replace(policy, distortion_mean=kappa, distortion_sigma=sigma)
     found = search_cameras(
-        frame.picture, frame.pieces, library, pitch, kernel_threads(), *amount, kappa
+        frame.picture, frame.pieces, library, pitch, get_kernel_executor(), *amount, kappa
     )
     if not found:
         return []
-    drawn = kernel_threads().map(
+    drawn = get_kernel_executor().map(
         lambda item: _snap_from_search(frame, item.camera, library, pitch, policy), found
     )
     known = _start_covariance(library) if library.name == KNOWN else None
@@ -396,7 +398,7 @@ def _rank_snapped(
 ) -> RankedCamera:
     seen = measure_agreement(snapped.camera, frame.field, frame.paint, pitch)
     return RankedCamera(
-        snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known
+        snapped, seen, measure_weakest_marking(frame.reading, snapped, pitch), policy, known
     )
 
 
@@ -479,7 +481,7 @@ def _snap_with_known_position(
     )  # fmt: skip
 
 
-def weakest_marking(
+def measure_weakest_marking(
     reading: Reading, snapped: SnappedCamera, pitch: Pitch, visible_px: float = VISIBLE_PX
 ) -> float:
     """The lowest share of a marking's places that have paint; short markings do not count.
@@ -515,18 +517,18 @@ def merge_ranked(
     return kept
 
 
-def lead_over_second(ranked: Sequence[RankedCamera]) -> float | None:
+def measure_lead_over_second(ranked: Sequence[RankedCamera]) -> float | None:
     """How far the second camera lies behind the first, in supported x explained."""
     if len(ranked) < 2:
         return None
     return ranked[0].score - ranked[1].score
 
 
-def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
+def explain_uncertain_camera(ranked: Sequence[RankedCamera]) -> str | None:
     """Why the best camera cannot be proposed; None where it can."""
     if not ranked:
         return "no camera was found that fits the paint"
-    best, lead = ranked[0], lead_over_second(ranked)
+    best, lead = ranked[0], measure_lead_over_second(ranked)
     if best.is_contradicted:
         return "the best camera shows a marking where there is no paint"
     supported = best.agreement.supported
@@ -547,7 +549,7 @@ def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
     return None
 
 
-def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
+def explain_non_square_pixels(image: Image, camera: Camera, pitch: Pitch) -> str | None:
     """Why the pixels of a picture may not be square; None where nothing speaks against it.
 
     Args:
@@ -555,7 +557,7 @@ def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
         camera: On its paint, pixels of it.
         pitch: The pitch.
     """
-    seen = goal_height(image, camera, pitch)
+    seen = measure_goal_height(image, camera, pitch)
     if seen is not None and seen.is_square:
         return None
     if seen is not None and seen.is_certain:
@@ -575,17 +577,17 @@ def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
 def _choose_proposal(
     image: Image, frame: SearchedFrame, ranked: list[RankedCamera], pitch: Pitch
 ) -> FrameProposal:
-    reason = why_unsure(ranked)
+    reason = explain_uncertain_camera(ranked)
     if not ranked:
         return FrameProposal("unsure", reason)
-    best, lead = ranked[0], lead_over_second(ranked)
+    best, lead = ranked[0], measure_lead_over_second(ranked)
     snapped = best.snapped
     height, width = image.shape[:2]
     rows, columns = frame.field.shape
     small = snapped.camera
     if snapped.size != (rows, columns):
         small = small.scaled(columns / width, rows / height)
-    reason = reason or why_not_square(frame.image, small, pitch)
+    reason = reason or explain_non_square_pixels(frame.image, small, pitch)
     if width < ENLARGED_WIDTH:
         snapped = scale_snapped(snapped, height, width)
     elif (height, width) != snapped.size:
@@ -629,6 +631,6 @@ def scale_snapped(snapped: SnappedCamera, height: int, width: int) -> SnappedCam
 
 
 @cache
-def kernel_threads() -> Executor:
+def get_kernel_executor() -> Executor:
     """Threads for the compiled kernels, which let go of the GIL."""
     return ThreadPoolExecutor(os.cpu_count() or 1, "propose")

@@ -49,7 +49,7 @@ class Markings:
 
 
 @lru_cache(maxsize=8)
-def markings_of(pitch: Pitch) -> Markings:
+def painted_markings_of_pitch(pitch: Pitch) -> Markings:
     """The painted markings of a pitch; goals are not painted."""
     names = [name for name in MARKINGS if not name.startswith("Goal")]
     shapes = np.array([_marking_row(pitch, name) for name in names])
@@ -157,7 +157,7 @@ def _unexplained_share(
     reach: float,
     executor: Executor,
 ) -> FloatArray:
-    m = markings_of(pitch)
+    m = painted_markings_of_pitch(pitch)
     cost = np.empty(len(parameters))
 
     def run(part: slice) -> None:
@@ -177,7 +177,7 @@ def score_fully(
 
     Shape (B, 4).
     """
-    m = markings_of(pitch)
+    m = painted_markings_of_pitch(pitch)
     result = np.empty((len(parameters), 3))
 
     def run(part: slice) -> None:
@@ -216,7 +216,7 @@ def refine_cameras(
     Returns:
         Shape (B, 8).
     """
-    m = markings_of(pitch)
+    m = painted_markings_of_pitch(pitch)
     moved = np.ascontiguousarray(parameters).copy()
     pixels = np.asarray(scales) * picture.unit
 

@@ -16,7 +16,7 @@ from app.geometry.resection import PARAMETERS
 from app.media.files import decode_frame
 from app.paint.agreement import measure_agreement
 from app.paint.evidence import Image, to_paint_evidence, visible_field
-from app.paint.grass import field_of_play, why_no_field
+from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.propose import LEAST_SIDE
 from app.paint.ridges import find_line_like
 from app.paint.snap import SnappedCamera, snap_camera
@@ -71,7 +71,7 @@ class PictureScale:
         return tuple(self.sentence(x, y) for x, y in places)
 
 
-def why_unreadable(image: Image, size: ImageSize) -> str | None:
+def explain_unreadable_picture(image: Image, size: ImageSize) -> str | None:
     """Why nothing can be read from a picture at all; None: something may."""
     height, width = image.shape[:2]
     if min(height, width) < LEAST_SIDE:
@@ -157,15 +157,15 @@ def read_paint_of_image(
             are is looked into all the same.
     """
     pitch = policy.fitted(pitch)
-    why = why_unreadable(image, size)
+    why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewPaint("nothing", sentence=why)
-    grass = field_of_play(image)
-    why = why_no_field(image, grass)
+    grass = find_field_of_play(image)
+    why = explain_missing_field(image, grass)
     if why is not None:
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
-    hidden = [scale.box(box) for box in hiding_boxes(people, size)]
+    hidden = [scale.box(box) for box in choose_hiding_boxes(people, size)]
     seen_grass = visible_field(grass, hidden)
     paint = find_line_like(image, grass) & seen_grass
     nothing = ViewPaint("nothing", line_like=scale.line_like(paint))
@@ -199,7 +199,7 @@ def read_paint_of_image(
     )
 
 
-def hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
+def choose_hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
     """Those that can be of somebody on the field, and not of the field or a goal."""
     largest = LARGEST_PERSON * size.width * size.height
     return [box for box in people if box.width * box.height <= largest]

@@ -14,9 +14,9 @@ from app.errors import GeometryError
 from app.geometry.camera import Camera
 from app.media.files import decode_frame
 from app.paint.evidence import Image
-from app.paint.goal import goal_lines
+from app.paint.goal import find_goal_lines
 from app.paint.propose import propose_camera
-from app.paint.view_paint import PictureScale, why_unreadable
+from app.paint.view_paint import PictureScale, explain_unreadable_picture
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
@@ -69,7 +69,7 @@ def propose_lines_in_image(
         policy: Prior of the distortion, and which line of the paint its markings are.
     """
     pitch = policy.painted(pitch)
-    why = why_unreadable(image, size)
+    why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewProposal("nothing", why, {})
     try:
@@ -81,7 +81,7 @@ def propose_lines_in_image(
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
     if found.outcome == "proposed" and snapped is not None:
         lines = dict(scale.evidence(snapped).some_points())
-        goals = goal_lines(image, snapped.camera, pitch)
+        goals = find_goal_lines(image, snapped.camera, pitch)
         lines |= {name: tuple(scale.sentence(*place) for place in goals[name]) for name in goals}
     return ViewProposal(
         found.outcome,

@@ -9,7 +9,7 @@ from typing import IO, Any
 
 from app.errors import DatasetFormatError
 from app.formats.camera_json import camera_from_json, camera_to_json
-from app.formats.fields import whole_number
+from app.formats.fields import parse_whole_number
 from app.formats.json_reader import read_json
 from app.geometry.camera import Camera
 from app.json_text import json_text
@@ -198,7 +198,7 @@ def _fault_from_json(value: dict[str, Any]) -> PlantedFault:
         view=value["view"],
         marking=value.get("marking"),
         true_marking=value.get("true_marking"),
-        index=None if index is None else whole_number(index),
+        index=None if index is None else parse_whole_number(index),
         amount=None if amount is None else float(amount),
     )
 

@@ -84,7 +84,7 @@ class PaintReading:
 
     Attributes:
         frame: Digest of the picture's bytes; empty where there are none.
-        sought_for: Key of the camera of the clicks that it was sought from (``paint_search_key``): of
+        sought_for: Key of the camera of the clicks that it was sought from (``compute_paint_search_key``): of
             other clicks it says nothing.
         evidence: Places of paint, pixels of the annotated size.
         reason: Why it is not solved with, ``no_paint``, ``paint_disagrees`` or ``no_frame``; None

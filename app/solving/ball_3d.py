@@ -34,10 +34,10 @@ def is_plausible_position(point: tuple[float, float, float], pitch: Pitch, polic
         pitch: The pitch.
         policy: Holds the limits.
     """
-    return not implausible_reasons(point, pitch, policy)
+    return not list_implausible_reasons(point, pitch, policy)
 
 
-def implausible_reasons(
+def list_implausible_reasons(
     point: tuple[float, float, float], pitch: Pitch, policy: Policy
 ) -> list[tuple[float, float, str]]:
     """What is wrong with a place: number and limit, metres, and the words for it.
@@ -63,7 +63,7 @@ def implausible_reasons(
     ]
 
 
-def judged_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tuple[Pair, ...]:
+def judge_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tuple[Pair, ...]:
     """Every pair of views with its point, and the gate that makes it invalid."""
     return tuple(
         Pair(
@@ -80,7 +80,7 @@ def judged_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tupl
     )
 
 
-def mean_ball(
+def compute_mean_ball(
     keys: Sequence[str],
     facts: Facts,
     judgement: Judgement,
@@ -114,7 +114,9 @@ def mean_ball(
     )
 
 
-def exported_ball(mean: Ball3D | None, best: BestBall | None, policy: Policy) -> Ball3D | None:
+def choose_exported_ball(
+    mean: Ball3D | None, best: BestBall | None, policy: Policy
+) -> Ball3D | None:
     """The ball that leaves: the mean of pairs, or the most likely point where the policy says so.
 
     Its views and its parallax are those of the valid pairs in either case: they are what the
@@ -149,7 +151,7 @@ class _BallEstimate:
         return bool((self.distances <= MAX_MAHALANOBIS).all())
 
 
-def best_ball(
+def find_best_ball(
     pairs: Sequence[Pair], usable: Sequence[BallObservation], policy: Policy
 ) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.

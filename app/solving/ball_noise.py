@@ -127,7 +127,9 @@ class BallNoise:
     share_interval: tuple[float, float] | None = None
 
 
-def ray_residuals(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[RayResidual, ...]:
+def compute_ray_residuals(
+    ball: Ball3D, observations: Sequence[BallObservation]
+) -> tuple[RayResidual, ...]:
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
     Given cameras with a covariance are left aside: those of one rig err together, and a

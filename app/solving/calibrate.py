@@ -30,12 +30,12 @@ from app.soccer.solution import (
 )
 from app.solving.camera_positions import PositionPrior, position_prior_of_match
 from app.solving.jaccard import (
-    as_evaluator_markings,
+    classify_markings,
+    find_unannotated_not_missing,
     jaccard,
-    marking_outcomes,
     measure_markings,
     project_markings,
-    unannotated_not_missing,
+    project_markings_like_evaluator,
 )
 from app.solving.labels import find_suspects
 from app.solving.lone_frame import LoneFrame, estimate_lone_frame
@@ -46,13 +46,13 @@ from app.solving.picture_camera import (
     PictureProblem,
     estimate_picture,
     find_picture,
-    warp_of,
+    picture_to_warp,
 )
 from app.solving.resect import (
     REFERENCE_DIAGONAL,
     Resection,
     ResectionProblem,
-    measurement_count,
+    count_measurements,
 )
 from app.solving.tripod_pitch import second_moment_about_plan
 from app.wording import plural
@@ -86,7 +86,7 @@ def calibrate(
     """
     pitch = policy.fitted(pitch)
     observations = observations_of_lines(lines, pitch, size)
-    measurements = measurement_count(observations)
+    measurements = count_measurements(observations)
     if measurements < MIN_MEASUREMENTS:
         count = len(observations.markings)
         reason = (
@@ -154,7 +154,7 @@ def calibrate_picture(
     """
     problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
     observations = observations_of_lines(lines, pitch, size)
-    if measurement_count(observations) < MIN_MEASUREMENTS:
+    if count_measurements(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
     try:
         found = estimate_picture(problem, observations, picture)
@@ -185,7 +185,7 @@ def calibrate_picture(
     )
 
 
-def lone_frame_of(
+def analyse_lone_frame(
     found: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> LoneFrame | None:
     """What nobody says of the pitch and the picture of a frame that was calibrated from its lines.
@@ -222,7 +222,7 @@ def _picture_covariance(
     """Covariance of a camera's parameters with what is not known of its picture, shape (8, 8), and
     that of camera and picture together, shape (11, 11)."""
     search = PictureProblem.of(problem, observations, prior)
-    unknowns = np.append(problem.parameters(camera), warp_of(found))
+    unknowns = np.append(problem.parameters(camera), picture_to_warp(found))
     try:
         whole = search.covariance(unknowns)
     except DegenerateGeometryError:
@@ -348,14 +348,14 @@ def calibrate_view(
         policy: What a calibration depends on.
         known: Calibrations by key; that of the clicks is not computed again where it is there.
     """
-    key = click_calibration_key(group, view, policy)
+    key = compute_click_calibration_key(group, view, policy)
     clicked = known.get(key) or calibrate_from_clicks(group, view, policy)
-    reading = usable_paint_reading(group, view, policy)
-    if reading is None or reading.sought_for != paint_search_key(group, view, policy):
+    reading = find_usable_paint_reading(group, view, policy)
+    if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return clicked
         station = view.station
-        alone = lone_frame_of(clicked, station.lines, group.pitch, station.size, policy)
+        alone = analyse_lone_frame(clicked, station.lines, group.pitch, station.size, policy)
         return with_lone_covariance(clicked, alone)
     return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
 
@@ -367,16 +367,16 @@ def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -
     )
 
 
-def view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+def compute_view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """Key of what ``calibrate_view`` makes."""
-    return view_keys(group, view, policy)[0]
+    return compute_view_keys(group, view, policy)[0]
 
 
-def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str, ...]:
+def compute_view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str, ...]:
     """The same, and after it the key of the clicks that it starts from where it is another."""
-    key = click_calibration_key(group, view, policy)
-    reading = usable_paint_reading(group, view, policy)
-    if reading is None or reading.sought_for != paint_search_key(group, view, policy):
+    key = compute_click_calibration_key(group, view, policy)
+    reading = find_usable_paint_reading(group, view, policy)
+    if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return (key,)
         return digest_of(f"{key} lone {policy.lone_frames}".encode()), key
@@ -384,14 +384,14 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     return painted, key
 
 
-def click_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
-    """``calibration_key`` of what ``calibrate_from_clicks`` makes."""
-    return calibration_key(
+def compute_click_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+    """``compute_calibration_key`` of what ``calibrate_from_clicks`` makes."""
+    return compute_calibration_key(
         view.station, group.pitch, policy, _usable_shared_position(group, view, policy)
     )
 
 
-def paint_search_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+def compute_paint_search_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """Digest of what the camera depends on from which the paint of a view's picture is sought.
 
     How that camera is measured has no part in it, nor how noisy its clicks are: neither what counts
@@ -416,7 +416,7 @@ def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:
     return not (is_exact or is_said or is_given) and len(group.views) == 1
 
 
-def usable_paint_reading(
+def find_usable_paint_reading(
     group: Group, view: View, policy: CalibrationPolicy
 ) -> PaintReading | None:
     """What was read for a view, as far as the policy wants it; perhaps for other clicks."""
@@ -450,17 +450,17 @@ def measure_calibration(
     """The calibration with JaC and the distances of the annotated points filled in.
 
     Without lines there is no JaC; the projected markings are there all the same, but for those that
-    nobody drew and that are ``unannotated_not_missing``. Distances are those to the goals and lines of ``pitch``,
+    nobody drew and that are ``find_unannotated_not_missing``. Distances are those to the goals and lines of ``pitch``,
     JaC and the outcomes that it counts are told by the evaluator's.
     """
     if calibration.camera is None:
         return calibration
     measured = measure_markings(project_markings(calibration.camera, pitch, size), lines)
-    judged = as_evaluator_markings(calibration.camera, pitch, size, lines, measured)
-    for marking in unannotated_not_missing(judged, lines, not_visible, shortest_px):
+    judged = project_markings_like_evaluator(calibration.camera, pitch, size, lines, measured)
+    for marking in find_unannotated_not_missing(judged, lines, not_visible, shortest_px):
         del judged[marking]
     by_gamma = [
-        marking_outcomes(judged, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT
+        classify_markings(judged, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT
     ]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
@@ -487,7 +487,7 @@ def measure_calibration(
     )
 
 
-def calibration_key(
+def compute_calibration_key(
     station: Station,
     pitch: Pitch,
     policy: CalibrationPolicy,

@@ -14,7 +14,7 @@ from app.soccer.picture import size_centred_on_principal_point
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, ViewSolution
-from app.solving.calibrate import MAX_POSITION_SIGMA_M, usable_paint_reading
+from app.solving.calibrate import MAX_POSITION_SIGMA_M, find_usable_paint_reading
 from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrame
 from app.solving.picture_camera import BELIEVED, MIN_SHIFT, MIN_STRETCH
 from app.wording import format_metres, format_pixels
@@ -33,7 +33,7 @@ UNANNOTATED_PERCENT = 5.0
 of the diagonal."""
 
 
-def calibration_findings(
+def find_calibration_findings(
     calibration: Calibration, size: ImageSize, view: str | None = None
 ) -> Iterator[Finding]:
     """What the calibration of one view (or line file) has to say.
@@ -198,7 +198,7 @@ def _picture_geometry_findings(
     )
 
 
-def lone_findings(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
+def find_pitch_findings_of_lone_frame(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
     """What the lines of a frame alone say of its pitch.
 
     Args:
@@ -301,7 +301,7 @@ SENTENCES = {
 }
 
 
-def paint_findings(
+def find_paint_findings(
     group: Group, view: View, solved: ViewSolution, policy: CalibrationPolicy
 ) -> Iterator[Finding]:
     """Why the camera of a view is not that of its paint; nothing where it is, or cannot be.
@@ -312,7 +312,7 @@ def paint_findings(
     if policy.source != "paint" or not view.can_use_paint or solved.calibration.camera is None:
         return
     fit = solved.calibration.paint
-    if usable_paint_reading(group, view, policy) is None:
+    if find_usable_paint_reading(group, view, policy) is None:
         return
     if fit is None:
         yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=Fix(READ_PAINT, view.key))

@@ -19,7 +19,7 @@ from app.solving.chi_square import (
     untestable_groups,
 )
 from app.solving.facts import Facts
-from app.solving.judgement import Judgement, views_in_pairs
+from app.solving.judgement import Judgement, find_views_in_pairs
 from app.solving.triangulate import BallObservation
 
 SURE = 0.9
@@ -69,7 +69,7 @@ class Contradiction:
         return least is not None and least <= SPEEDS[1] * LONGEST_S
 
 
-def chi_square_of(
+def compute_chi_square(
     keys: Sequence[str], facts: Facts, judgement: Judgement, policy: Policy
 ) -> ChiSquare | None:
     """The test of a group's residuals; None where no ball lies in front of all views.
@@ -80,7 +80,7 @@ def chi_square_of(
         judgement: What the policy makes of them.
         policy: How noisy a click is.
     """
-    used = views_in_pairs(facts, judgement.valid)
+    used = find_views_in_pairs(facts, judgement.valid)
     found = chi_square_residuals(facts, used, judgement.point, policy)
     if not np.isfinite(found.p_value[0]):
         return None

@@ -39,20 +39,20 @@ from app.solving.ball_noise import (
     TRIMMED,
     BallNoise,
     RayResidual,
+    compute_ray_residuals,
     estimate_ball_noise,
-    ray_residuals,
 )
 from app.solving.line_noise import (
     NORMAL_95,
     LineEstimate,
     LineEvidence,
     LineNoise,
+    collect_line_evidence,
     estimate_line_noise,
-    line_evidence,
 )
 from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
-from app.solving.triangulate import BallObservation, ball_observations
+from app.solving.triangulate import BallObservation, collect_ball_observations
 
 
 def view_line_noise(
@@ -77,7 +77,7 @@ def view_line_evidence(
     """
     problem, parameters = _resection_at_calibration(calibration, size, policy)
     rows = problem.noise_rows(parameters, observations_of_lines(lines, policy.fitted(pitch), size))
-    return line_evidence(*rows).rescaled_to_pixels(problem.unit)
+    return collect_line_evidence(*rows).rescaled_to_pixels(problem.unit)
 
 
 def view_line_covariance(
@@ -136,11 +136,15 @@ class NoiseGroup:
 
     def misses(self, policy: Policy) -> tuple[RayResidual, ...]:
         """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
-        return () if self.ball is None else ray_residuals(self.ball, self._observations(policy))
+        return (
+            ()
+            if self.ball is None
+            else compute_ray_residuals(self.ball, self._observations(policy))
+        )
 
     def _observations(self, policy: Policy) -> list[BallObservation]:
         found = [self._calibration(view, policy) for view in self.views]
-        return ball_observations(self.group.views, found)
+        return collect_ball_observations(self.group.views, found)
 
     def _calibration(self, seen: NoiseView, policy: Policy) -> Calibration:
         # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.

@@ -29,8 +29,8 @@ from app.solving.triangulate import (
     WHOLE,
     CameraNumbers,
     PairPoint,
-    arrays_of_pairs,
-    ball_observations,
+    collect_ball_observations,
+    stack_pairs,
     triangulate_observation_pairs,
 )
 
@@ -240,12 +240,12 @@ def _row_offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> Int
 def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> Facts:
     """The facts of one group, from what was said of its views and the calibration of each."""
     pair_points = triangulate_observation_pairs(
-        combinations(ball_observations(views, calibrations), 2)
+        combinations(collect_ball_observations(views, calibrations), 2)
     )
-    return facts_of(views, calibrations, pair_points)
+    return collect_facts(views, calibrations, pair_points)
 
 
-def facts_of(
+def collect_facts(
     views: Sequence[View], calibrations: Sequence[Calibration], pair_points: Sequence[PairPoint]
 ) -> Facts:
     """The facts of one group.
@@ -352,7 +352,7 @@ def _moved_pair_points(pair_points: Sequence[PairPoint]) -> FloatArray:
     slopes = None
     if any(observation.camera.is_wide for observation in (*a, *b)):
         slopes = np.array([s.ideal_slope for s in a]), np.array([s.ideal_slope for s in b])
-    return triangulation_shifts(*arrays_of_pairs(a, b), STEP_PX, slopes)
+    return triangulation_shifts(*stack_pairs(a, b), STEP_PX, slopes)
 
 
 def _to_table(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:

@@ -9,11 +9,11 @@ from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Pair, ViewSolution
-from app.solving.ball_3d import implausible_reasons
-from app.solving.calibration_findings import calibration_findings, paint_findings
+from app.solving.ball_3d import list_implausible_reasons
+from app.solving.calibration_findings import find_calibration_findings, find_paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
-from app.solving.gates import odds_text
+from app.solving.gates import describe_odds
 from app.solving.sides import SwappedView, find_swaps
 from app.solving.triangulate import BallObservation
 from app.wording import format_degrees, format_metres, format_pixels, plural
@@ -59,14 +59,14 @@ def find_group_findings(
     swaps = {swap.view: swap for swap in _swapped_views(group, views, observations, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
-        noticed = calibration_findings(solved.calibration, view.size, view.key)
+        noticed = find_calibration_findings(solved.calibration, view.size, view.key)
         # A static camera would say in every frame what nobody annotated in any.
         found.extend(
             item
             for item in noticed
             if not (view.station.shared and item.kind == "visible_not_annotated")
         )
-        found.extend(paint_findings(group, view, solved, policy.calibration))
+        found.extend(find_paint_findings(group, view, solved, policy.calibration))
         found.extend(_several_balls_findings(view))
         if view.key in swaps:
             found.append(_sides_swapped_finding(swaps[view.key]))
@@ -154,12 +154,12 @@ def _view_disagrees_findings(
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
     letters = {other.key: view_letter(place) for place, other in enumerate(group.views)}
-    yield view_disagrees_finding(
-        view.key, closest_pair(judged), letters, policy.tau_px(view.size.diagonal)
+    yield make_view_disagrees_finding(
+        view.key, find_closest_pair(judged), letters, policy.tau_px(view.size.diagonal)
     )
 
 
-def view_disagrees_finding(
+def make_view_disagrees_finding(
     view: str, best: Pair, letters: Mapping[str, str], tau_px: float
 ) -> Finding:
     """What is said of a view that misses the others' ball in its closest pair.
@@ -200,10 +200,10 @@ def _misses_ball_findings(solved: ViewSolution, tau_px: float) -> Iterator[Findi
     """A view in a valid pair that the 3D ball does not fit: it is the mean of several pairs."""
     error_px = solved.ball.error_px if solved.ball is not None and solved.included else None
     if error_px is not None and error_px > tau_px:
-        yield misses_ball_finding(solved.view, error_px, tau_px)
+        yield make_misses_ball_finding(solved.view, error_px, tau_px)
 
 
-def misses_ball_finding(view: str, error_px: float, tau_px: float) -> Finding:
+def make_misses_ball_finding(view: str, error_px: float, tau_px: float) -> Finding:
     """What is said of a view that counts and that the 3D ball misses by so many pixels."""
     return Finding(
         "view_disagrees",
@@ -241,7 +241,7 @@ def _not_synchronous_findings(
     judged = [pair for pair in pairs if pair.failed == "reprojection"]
     if not judged or all(view.station.shared for view in group.views):
         return
-    best = closest_pair(judged)
+    best = find_closest_pair(judged)
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
     error_px, tau_px = max(best.errors_px), policy.tau_px(max(sizes))
     apart = f"{format_pixels(best.errors_px[0])} and {format_pixels(best.errors_px[1])} apart"
@@ -261,7 +261,7 @@ def _not_synchronous_findings(
     )
 
 
-def closest_pair(pairs: Sequence[Pair]) -> Pair:
+def find_closest_pair(pairs: Sequence[Pair]) -> Pair:
     """The pair whose larger error is the smallest."""
     return min(pairs, key=lambda pair: max(pair.errors_px))
 
@@ -273,7 +273,7 @@ def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | 
     sentences = [
         f"{one} not agree on one ball: consistent views have residuals as large as these "
         f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in "
-        f"{odds_text(found.p_value)}."
+        f"{describe_odds(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:
         sentences.append(
@@ -380,7 +380,7 @@ def _describe_sigma(ball: Ball3D) -> str:
 
 def _implausible_ball_findings(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
-    wrong = implausible_reasons(ball.point, pitch, policy)
+    wrong = list_implausible_reasons(ball.point, pitch, policy)
     if wrong:
         number, threshold, _ = wrong[0]
         sentence = (

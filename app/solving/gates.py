@@ -262,10 +262,10 @@ def _letters_by_view(group: _JudgedGroup) -> dict[str, str]:
 
 def _reprojection_gate(group: _JudgedGroup, pairs: Sequence[Pair], policy: Policy) -> Gate:
     tau_px = {view.key: view.tau_px for view in group.remaining_views}
-    return reprojection_gate_of_pairs(pairs, _letters_by_view(group), tau_px, policy.tau_percent)
+    return make_reprojection_gate(pairs, _letters_by_view(group), tau_px, policy.tau_percent)
 
 
-def reprojection_gate_of_pairs(
+def make_reprojection_gate(
     pairs: Sequence[Pair],
     letters: Mapping[str, str],
     tau_px: Mapping[str, float],
@@ -355,11 +355,11 @@ def _chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Polic
     ):
         sentence = "not judged: a camera has no known uncertainty"
         return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
-    sentence = f"{consistency_word(found.p_value)} ({_format_p_value(found.p_value)})"
+    sentence = f"{describe_consistency(found.p_value)} ({_format_p_value(found.p_value)})"
     return _make_gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
 
 
-def consistency_word(p_value: float) -> str:
+def describe_consistency(p_value: float) -> str:
     """How well the residuals agree with their uncertainty, in a word.
 
     Args:
@@ -387,7 +387,7 @@ def _format_p_value(p_value: float) -> str:
     return f"p = {p_value:.{digits}f}"
 
 
-def odds_text(p_value: float) -> str:
+def describe_odds(p_value: float) -> str:
     """How often something happens, for people.
 
     Example:

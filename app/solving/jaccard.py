@@ -88,7 +88,7 @@ def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str
     return measured
 
 
-def as_evaluator_markings(
+def project_markings_like_evaluator(
     camera: Camera,
     pitch: Pitch,
     size: ImageSize,
@@ -114,7 +114,7 @@ def as_evaluator_markings(
     return {name: both[name] for name in MARKINGS if name in both}
 
 
-def marking_outcomes(
+def classify_markings(
     measured: dict[str, ProjectedMarking], lines: Lines, gamma_px: float
 ) -> dict[str, str]:
     """What each marking counts as at a threshold: ``tp``, ``fp`` or ``fn``."""
@@ -129,7 +129,7 @@ def marking_outcomes(
     return result
 
 
-def unannotated_not_missing(
+def find_unannotated_not_missing(
     measured: dict[str, ProjectedMarking],
     lines: Lines,
     not_visible: Collection[str],
@@ -181,12 +181,12 @@ def camera_jaccard(
     """
     projected = project_markings(camera, pitch.with_goal("inner"), size)
     measured = measure_markings(projected, lines)
-    values = tuple(jaccard(marking_outcomes(measured, lines, gamma)) for gamma in gammas_px)
+    values = tuple(jaccard(classify_markings(measured, lines, gamma)) for gamma in gammas_px)
     if not symmetric:
         return values
     turned: Lines = {opposite_marking(marking): points for marking, points in lines.items()}
     measured = measure_markings(projected, turned)
-    twins = (jaccard(marking_outcomes(measured, turned, gamma)) for gamma in gammas_px)
+    twins = (jaccard(classify_markings(measured, turned, gamma)) for gamma in gammas_px)
     return tuple(max(pair) for pair in zip(values, twins, strict=True))
 
 

@@ -88,12 +88,12 @@ def judge_groups(
         facts: The groups.
         policy: The thresholds.
         uncertainty: Of the same facts, kept where several policies are tried one after the other.
-        jac: ``view_jac`` at the policy's gamma, where it is known, shape (V,).
+        jac: ``compute_view_jac`` at the policy's gamma, where it is known, shape (V,).
     """
     if jac is None:
-        jac = view_jac(facts, policy.jac_gamma_percent)
+        jac = compute_view_jac(facts, policy.jac_gamma_percent)
     return judge_known_failures(
-        facts, policy, uncertainty, jac, first_failed_gates(facts, jac, policy)
+        facts, policy, uncertainty, jac, find_first_failed_gates(facts, jac, policy)
     )
 
 
@@ -112,8 +112,8 @@ def judge_known_failures(
         facts: The groups.
         policy: The thresholds.
         uncertainty: Of the same facts.
-        jac: ``view_jac`` at the policy's gamma, shape (V,).
-        standing: ``first_failed_gates`` of them.
+        jac: ``compute_view_jac`` at the policy's gamma, shape (V,).
+        standing: ``find_first_failed_gates`` of them.
         first_alone: Only the first gate that a group fails matters: what is dear is not judged
             where one before it fails.
     """
@@ -138,12 +138,12 @@ def judge_known_failures(
         within = is_covariance_within(covariances, limit_m)
         candidates, covariances = candidates[within], covariances[within]
         found = np.zeros(facts.groups, bool)
-        widened = widened_covariances(facts, valid, candidates, covariances, point, policy)
+        widened = widen_covariances(facts, valid, candidates, covariances, point, policy)
         found[candidates] = is_covariance_within(widened, limit_m)
         return found
 
     def p_value() -> FloatArray:
-        used = views_in_pairs(facts, valid)
+        used = find_views_in_pairs(facts, valid)
         if first_alone:
             used &= ~fails_earlier_gate()[facts.view_group]
         return p_values(facts, used, point, policy)
@@ -208,7 +208,7 @@ def _apply_group_gates(
         failed[_CHI_SQUARE] = ~(p_value() >= policy.min_p_value)
 
 
-def widened_covariances(
+def widen_covariances(
     facts: Facts,
     valid: BoolArray,
     groups: IntArray,
@@ -228,26 +228,28 @@ def widened_covariances(
     """
     wanted = np.zeros(facts.groups, bool)
     wanted[groups] = True
-    used = views_in_pairs(facts, valid) & wanted[facts.view_group]
+    used = find_views_in_pairs(facts, valid) & wanted[facts.view_group]
     widening = chi_square_residuals(facts, used, point, policy).widening[groups]
     widened: FloatArray = covariances * (widening**2)[:, None, None]
     return widened
 
 
-def first_failed_gates(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:
+def find_first_failed_gates(
+    facts: Facts, jac: FloatArray, policy: Policy
+) -> tuple[IntArray, IntArray]:
     """First gate that drops each view, shape (V,), and each pair, (P,), or ``PASSES``."""
     view_failed = _first_failed_view_gates(facts, jac, policy)
     return view_failed, _first_failed_pair_gates(facts, view_failed, policy)
 
 
-def views_in_pairs(facts: Facts, pairs: BoolArray) -> BoolArray:
+def find_views_in_pairs(facts: Facts, pairs: BoolArray) -> BoolArray:
     """Views in any of the pairs, shape (V,)."""
     found = np.zeros(len(facts.view_group), bool)
     found[facts.pair_view[pairs]] = True
     return found
 
 
-def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
+def compute_view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
     """JaC of each view, NaN where it cannot be measured, shape (V,)."""
     gamma_px = gamma_percent / 100 * facts.view_diagonal
     close = facts.mark_px < gamma_px[facts.mark_view]

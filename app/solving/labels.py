@@ -17,7 +17,7 @@ from app.geometry.arrays import FloatArray
 from app.soccer.pitch import CIRCLES, MARKINGS
 from app.soccer.solution import Suspect
 from app.solving.observations import Observations
-from app.solving.resect import Resection, ResectionProblem, measurement_count
+from app.solving.resect import Resection, ResectionProblem, count_measurements
 
 GAMMA_SHARE = 0.005
 """Gamma as a share of the diagonal; the distances below are in units of it."""
@@ -174,7 +174,7 @@ class _LabelSearch:
     ) -> _RemovalTrial | None:
         """The camera without some markings; None when too little would be left."""
         rest = observations.without(*markings)
-        if measurement_count(rest) < MIN_MEASUREMENTS_LEFT:
+        if count_measurements(rest) < MIN_MEASUREMENTS_LEFT:
             return None
         fit = self.problem.search(rest)
         doubts = tuple(

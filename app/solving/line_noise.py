@@ -242,7 +242,7 @@ class _ScaledFit:
         )
 
 
-def line_evidence(
+def collect_line_evidence(
     residuals: FloatArray, jacobian: FloatArray, marking: IntArray, prior: FloatArray
 ) -> LineEvidence:
     """What a least-squares fit leaves says of the noise, for each of ``SHARES``.

@@ -37,7 +37,7 @@ from app.solving.labels import GAMMA_SHARE, RELABELLED
 from app.solving.line_noise import line_noise
 from app.solving.observations import Observations, pitch_curves
 from app.solving.picture_camera import undo_warp
-from app.solving.pitch_size import size_moves
+from app.solving.pitch_size import derive_points_by_pitch_size
 from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
 
 SIZE_SIGMA_M = np.array([2.0, 1.0])
@@ -303,7 +303,7 @@ class _Frame:
         slopes[:, :, 0] /= np.exp(warp[0])
         # A line's normal turns and shrinks when the picture is stretched.
         length = np.maximum(np.hypot(slopes[..., 0], slopes[..., 1]), 0.25)
-        moves = size_moves(self.problem, camera, seen, offsets[:, 1] != 0)
+        moves = derive_points_by_pitch_size(self.problem, camera, seen, offsets[:, 1] != 0)
         foot = np.exp(warp[0]) * seen.pixels[:, None, 0]
         jacobian = (
             np.concatenate(

@@ -22,15 +22,15 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import Observations, observations_of_lines
-from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
+from app.solving.picture_camera import PictureProblem, undo_warp, warp_to_picture
 from app.solving.pitch_size import (
     CERTAIN_SIGMAS,
     MAX_FRAMES,
     Share,
     eliminate_camera,
     eliminate_own_numbers,
-    frames_with_enough_measurements,
-    sigmas_of_shared_numbers,
+    estimate_sigmas_of_shared_numbers,
+    find_frames_with_enough_measurements,
 )
 from app.solving.resect import ResectionProblem
 
@@ -98,13 +98,13 @@ def estimate_match_picture(
         )
     warp, pull, informations = _adjust_picture(seen)
     information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
-    aspect, right, down = sigmas_of_shared_numbers(pull, information, spent=1).tolist()
-    return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
+    aspect, right, down = estimate_sigmas_of_shared_numbers(pull, information, spent=1).tolist()
+    return PictureEstimate(warp_to_picture(warp, (aspect, right, down)), len(seen))
 
 
 def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
     """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
-    order = frames_with_enough_measurements(
+    order = find_frames_with_enough_measurements(
         observations_of_lines(frame.lines, frame.pitch, frame.size) for frame in frames
     )
     return sorted(order[:MAX_FRAMES])

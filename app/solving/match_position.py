@@ -132,7 +132,7 @@ SCATTER, GIVE_UP = 3.0, 12.0
 frames are not of one match."""
 
 
-def place_of(calibration: Calibration, size: ImageSize) -> FramePlace | None:
+def find_camera_place(calibration: Calibration, size: ImageSize) -> FramePlace | None:
     """The place of a main camera; None for other cameras, and where the lines leave it open."""
     if calibration.camera is None or calibration.covariance is None:
         return None
@@ -145,7 +145,7 @@ def place_of(calibration: Calibration, size: ImageSize) -> FramePlace | None:
     return FramePlace(position, covariance, float(parameters[PAN]))
 
 
-def pan_of(calibration: Calibration) -> float | None:
+def find_pan(calibration: Calibration) -> float | None:
     """Where a main camera looks, radians; None for other cameras."""
     if calibration.camera is None or not is_main_position(calibration.camera.position):
         return None

@@ -18,8 +18,12 @@ from app.soccer.group import Group
 from app.soccer.paint_evidence import PaintReading, TripodCamera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import calibrate_view, paint_search_key, usable_paint_reading
-from app.solving.paint_camera import WORST_PX, curve_points_of
+from app.solving.calibrate import (
+    calibrate_view,
+    compute_paint_search_key,
+    find_usable_paint_reading,
+)
+from app.solving.paint_camera import WORST_PX, collect_curve_points
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import LEAST_FRAMES, PaintSightings, find_tripod_pitch
 
@@ -41,7 +45,7 @@ class _MainFrame:
         return float(np.sqrt(off @ np.linalg.solve(self.covariance[X : Z + 1, X : Z + 1], off)))
 
 
-def readings_of_one_tripod(
+def solve_readings_of_one_tripod(
     groups: Mapping[int, Group], policy: CalibrationPolicy
 ) -> dict[int, PaintReading]:
     """What was read of main cameras, each with what the frames of its match know together.
@@ -58,10 +62,10 @@ def readings_of_one_tripod(
     found: dict[int, PaintReading] = {}
     for number, group in groups.items():
         view = group.views[0]
-        reading = usable_paint_reading(group, view, policy)
+        reading = find_usable_paint_reading(group, view, policy)
         if reading is None or reading.reason or not view.included:
             continue
-        if reading.sought_for != paint_search_key(group, view, policy):
+        if reading.sought_for != compute_paint_search_key(group, view, policy):
             continue
         alone = replace(reading, tripod=None)
         calibration = calibrate_view(
@@ -72,7 +76,7 @@ def readings_of_one_tripod(
             continue
         found[number] = alone
         problem = ResectionProblem.of(view.size, policy)
-        points, sigmas = curve_points_of(reading.evidence, view.size)
+        points, sigmas = collect_curve_points(reading.evidence, view.size)
         frame = PaintSightings(problem.parameters(calibration.camera), points, sigmas)
         at = (view.size, policy.fitted(group.pitch))
         frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))

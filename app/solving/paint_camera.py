@@ -29,8 +29,8 @@ from app.solving.observations import pitch_curves, principal_point
 from app.solving.paint_noise import (
     PaintNoise,
     PaintOffsets,
+    estimate_paint_noise,
     marking_weights,
-    paint_noise,
     pitch_terms,
 )
 from app.solving.resect import ResectionProblem
@@ -136,7 +136,7 @@ class PaintProblem:
         robust = self.robust(seen.offsets, seen.sigmas)
         prior = self.prior(parameters).sigma ** -2.0
         terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
-        return paint_noise(seen, robust, prior, self.information, terms)
+        return estimate_paint_noise(seen, robust, prior, self.information, terms)
 
     def prior(self, parameters: FloatArray) -> Prior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
@@ -174,7 +174,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         None where the paint does not determine it, does not lie on the markings in the end, or
         moves the camera farther than its start allows.
     """
-    curve_points, sigmas = curve_points_of(evidence, problem.resection.size)
+    curve_points, sigmas = collect_curve_points(evidence, problem.resection.size)
     if not len(sigmas):
         return None
     parameters = problem.first
@@ -219,7 +219,9 @@ def measure_offsets(
     return PaintOffsets(offsets[:, 0], sigmas, curve_points.curve, -jacobians[:, 0], radii)
 
 
-def curve_points_of(evidence: PaintEvidence, size: ImageSize) -> tuple[CurvePoints, FloatArray]:
+def collect_curve_points(
+    evidence: PaintEvidence, size: ImageSize
+) -> tuple[CurvePoints, FloatArray]:
     """Places of paint by marking, pixels from the principal point, and their sigmas."""
     rows = [
         (index, *point)

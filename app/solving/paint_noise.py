@@ -107,7 +107,7 @@ def _shares_in_common(sigmas: FloatArray) -> FloatArray:
     return shares
 
 
-def paint_noise(
+def estimate_paint_noise(
     seen: PaintOffsets,
     robust: FloatArray,
     prior: FloatArray,

@@ -45,13 +45,13 @@ _PROBE_PX = 0.01
 _ROTATION_AND_LENS = [PAN, TILT, ROLL, LOG_FOCAL, KAPPA]
 
 
-def warp_of(picture: PictureGeometry) -> FloatArray:
+def picture_to_warp(picture: PictureGeometry) -> FloatArray:
     """The three unknowns of a picture, shape (3,)."""
     return np.array([np.log(picture.aspect), *picture.shift])
 
 
-def picture_of(warp: FloatArray, sigma: tuple[float, float, float]) -> PictureGeometry:
-    """Back from ``warp_of``; what no picture can be is cut off."""
+def warp_to_picture(warp: FloatArray, sigma: tuple[float, float, float]) -> PictureGeometry:
+    """Back from ``picture_to_warp``; what no picture can be is cut off."""
     stretch = float(np.clip(warp[0], *np.log(ASPECTS) * 0.999))
     right, down = np.clip(warp[1:], -MAX_SHIFT, MAX_SHIFT).tolist()
     return PictureGeometry(float(np.exp(stretch)), (right, down), sigma)
@@ -105,7 +105,7 @@ class PictureProblem:
     ) -> PictureProblem:
         """With what is known of the picture as prior."""
         sigma = np.maximum(np.array(picture.sigma), 1e-6)
-        return PictureProblem(problem, observations, warp_of(picture), sigma)
+        return PictureProblem(problem, observations, picture_to_warp(picture), sigma)
 
     def rows(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distance of each point to its marking in the picture as it is, and its derivatives.
@@ -272,14 +272,14 @@ def estimate_picture(
     """
     if not is_open(picture):
         return picture
-    seen = undo_warp(problem, observations, warp_of(picture))
+    seen = undo_warp(problem, observations, picture_to_warp(picture))
     search = PictureProblem.of(problem, observations, picture)
     unknowns = search.fit(problem.resect(seen).parameters)
     covariance = search.covariance(unknowns)
     if not np.isfinite(covariance).all():
         raise DegenerateGeometryError("the lines do not determine the camera")
     sigma = np.sqrt(np.diag(covariance))[PARAMETERS:]
-    return picture_of(unknowns[PARAMETERS:], tuple(sigma.tolist()))
+    return warp_to_picture(unknowns[PARAMETERS:], tuple(sigma.tolist()))
 
 
 PRIOR = np.array([0.12, 0.2, 0.2])

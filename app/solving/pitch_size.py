@@ -34,7 +34,7 @@ from app.solving.observations import (
     pitch_curves,
     principal_point,
 )
-from app.solving.resect import Resection, ResectionProblem, measurement_count
+from app.solving.resect import Resection, ResectionProblem, count_measurements
 
 MAX_FRAMES = 30
 """More frames say little more; those that say most are taken."""
@@ -47,9 +47,9 @@ Share = tuple[FloatArray, FloatArray]
 """Pull, shape (K,), and information, shape (K, K), of one frame about the K shared numbers."""
 
 
-def frames_with_enough_measurements(seen: Iterable[Observations]) -> list[int]:
+def find_frames_with_enough_measurements(seen: Iterable[Observations]) -> list[int]:
     """Indices of the frames with enough independent measurements, those with the most first."""
-    counts = [measurement_count(observations) for observations in seen]
+    counts = [count_measurements(observations) for observations in seen]
     rich = sorted((-count, at) for at, count in enumerate(counts) if count >= MIN_MEASUREMENTS)
     return [at for _, at in rich]
 
@@ -81,7 +81,9 @@ def eliminate_own_numbers(share: Share, sigma: FloatArray) -> Share:
     return shrunk @ pull, shrunk @ information
 
 
-def sigmas_of_shared_numbers(pulls: FloatArray, information: FloatArray, spent: int) -> FloatArray:
+def estimate_sigmas_of_shared_numbers(
+    pulls: FloatArray, information: FloatArray, spent: int
+) -> FloatArray:
     """Standard deviations of the shared numbers, shape (K,).
 
     The larger of two: from the clicks' variance, and from how much the frames disagree.
@@ -228,7 +230,7 @@ def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
     A frame tells the length when it shows something of the middle and something of an end, and
     the width when it shows a touchline and something whose width is fixed.
     """
-    order = frames_with_enough_measurements(
+    order = find_frames_with_enough_measurements(
         observations_of_lines(frame.lines, Pitch(), frame.size) for frame in frames
     )
     length = [index for index in order if _determines_length(frames[index].lines)]
@@ -291,7 +293,9 @@ class _FittedFrame:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        moves = size_moves(self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0)
+        moves = derive_points_by_pitch_size(
+            self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0
+        )
         length, width = moves.T
         by_length = -by_camera[:, :, X] * length[:, None]
         by_width = -by_camera[:, :, Y] * width[:, None]
@@ -308,7 +312,7 @@ class _FittedFrame:
         return gradient, information
 
 
-def size_moves(
+def derive_points_by_pitch_size(
     problem: ResectionProblem,
     parameters: FloatArray,
     observations: Observations,
@@ -351,7 +355,7 @@ def _sigmas_of_size(shares: Sequence[Share]) -> FloatArray:
     """Standard deviations of length and width, metres, shape (2,)."""
     pulls = np.array([pull for pull, _ in shares])
     information = np.sum([part for _, part in shares], axis=0)
-    return sigmas_of_shared_numbers(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
+    return estimate_sigmas_of_shared_numbers(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
 
 
 def _frames_disagree(shares: Sequence[Share]) -> bool:

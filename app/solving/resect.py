@@ -39,7 +39,7 @@ from app.solving.camera_positions import (
     STANDS,
     PositionPrior,
     is_main_position,
-    starts_from_stands,
+    make_starts_from_stands,
 )
 from app.solving.line_noise import LineNoise, LinePrior, line_noise
 from app.solving.observations import (
@@ -197,7 +197,7 @@ class ResectionProblem:
         straight = observations.without(*CIRCLES)
         if (
             len(straight.pixels) < len(observations.pixels)
-            and measurement_count(straight) >= PARAMETERS
+            and count_measurements(straight) >= PARAMETERS
         ):
             fits.append(self.refine(observations, self.search(straight).parameters[None]))
         return min(fits, key=lambda item: item.cost)
@@ -209,18 +209,22 @@ class ResectionProblem:
 
     def _search_all_stages(self, observations: Observations, plan: SearchPlan) -> Resection:
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
-        starts = starts_from_stands(observations, self.size.diagonal)
+        starts = make_starts_from_stands(observations, self.size.diagonal)
         scouted = self._run_stage(thinned, starts, plan.scout, damping=1e-2)
-        searched = self._run_stage(thinned, best_starts(scouted, plan.search.starts), plan.search)
-        return self.refine(observations, best_starts(searched, plan.narrow.starts), plan)
+        searched = self._run_stage(
+            thinned, choose_best_starts(scouted, plan.search.starts), plan.search
+        )
+        return self.refine(observations, choose_best_starts(searched, plan.narrow.starts), plan)
 
     def refine(
         self, observations: Observations, starts: FloatArray, plan: SearchPlan = QUICK
     ) -> Resection:
         """The best camera from some starts near a minimum, shape (B, 8)."""
         narrowed = self._run_stage(observations, starts, plan.narrow)
-        fit = self._run_stage(observations, best_starts(narrowed, plan.final.starts), plan.final)
-        return Resection(best_starts(fit, 1)[0], float(fit.cost.min()))
+        fit = self._run_stage(
+            observations, choose_best_starts(narrowed, plan.final.starts), plan.final
+        )
+        return Resection(choose_best_starts(fit, 1)[0], float(fit.cost.min()))
 
     def refine_main(self, fit: Resection, observations: Observations) -> Resection:
         """The camera once more with what is known of main cameras, where it stands like one.
@@ -398,17 +402,17 @@ class ResectionProblem:
         return prior
 
 
-def best_starts(fit: Fit, count: int) -> FloatArray:
+def choose_best_starts(fit: Fit, count: int) -> FloatArray:
     """Parameters of the ``count`` starts of lowest cost, lowest first."""
     return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
 
 
 def has_few_measurements(observations: Observations) -> bool:
     """Whether several cameras may fit nearly as well."""
-    return measurement_count(observations) < FEW_MEASUREMENTS
+    return count_measurements(observations) < FEW_MEASUREMENTS
 
 
-def measurement_count(observations: Observations) -> int:
+def count_measurements(observations: Observations) -> int:
     """Independent numbers that the observations give: two a line, at most five a circle."""
     total = 0
     for index in np.unique(observations.marking):

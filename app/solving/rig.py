@@ -184,7 +184,7 @@ def make_rig(
 
 def adjust_rig(rig: Rig) -> RigFit:
     """The cameras that explain lines and balls best, and how well they are known."""
-    anchors = [grass_in_view(camera) for camera in rig.cameras]
+    anchors = [sample_grass_in_view(camera) for camera in rig.cameras]
     observed = [_observations_of_camera(camera, rig.pitch) for camera in rig.cameras]
     parameters, ball_sigma, line_sigma = rig.start, 1.0, LINE_SIGMA_PX
     for scale in (WIDE, TIGHT, TIGHT):
@@ -198,7 +198,7 @@ def adjust_rig(rig: Rig) -> RigFit:
     return RigFit(parameters, covariance(fit.information[0]), ball_sigma, line_sigma)
 
 
-def line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> FloatArray:
+def measure_line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> FloatArray:
     """Distance of each annotated point to its projected marking, pixels, shape (N,)."""
     observed = _observations_of_camera(camera, pitch)
     return curve_distances(
@@ -206,7 +206,7 @@ def line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> F
     )
 
 
-def grass_in_view(camera: RigCamera) -> FloatArray:
+def sample_grass_in_view(camera: RigCamera) -> FloatArray:
     """Points of the grass that a camera shows, pitch frame, metres, shape (N, 3)."""
     across, along = np.arange(-65.0, 65.1, _GRID_M), np.arange(-45.0, 45.1, _GRID_M)
     places = np.array([(x, y, 0.0) for x in across for y in along])
@@ -335,7 +335,7 @@ def _require_adjustable(camera: RigCamera) -> None:
             f"camera {camera.key} has a {camera.camera.lens} lens, which a rig does not adjust",
             hint="Only one focal length and one radial term can be adjusted: keep this camera as it is.",
         )
-    grass = grass_in_view(camera)
+    grass = sample_grass_in_view(camera)
     plain = camera.with_parameters(camera.parameters)
     if len(grass) == 0:
         return

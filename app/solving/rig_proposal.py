@@ -26,9 +26,9 @@ from app.solving.rig import (
     RigFit,
     RigFrame,
     adjust_rig,
-    grass_in_view,
-    line_distances,
     make_rig,
+    measure_line_distances,
+    sample_grass_in_view,
 )
 
 PROPOSAL_VERSION = 2
@@ -163,7 +163,9 @@ def propose_rig(
     )
 
 
-def error_covariance(camera: RigCamera, parameters: FloatArray, balls: FloatArray) -> FloatArray:
+def compute_error_covariance(
+    camera: RigCamera, parameters: FloatArray, balls: FloatArray
+) -> FloatArray:
     """Covariance of the camera in use about the adjusted one, shape (8, 8).
 
     Of its error one example is known. The square of that would say that the error can be no other
@@ -179,7 +181,7 @@ def error_covariance(camera: RigCamera, parameters: FloatArray, balls: FloatArra
     after, step = camera.with_parameters(parameters), camera.parameters - parameters
     moved = camera.camera.project(balls, folded=True) - after.project(balls, folded=True)
     shown = np.isfinite(moved).all(axis=1)
-    grass = grass_in_view(camera)
+    grass = sample_grass_in_view(camera)
     slopes = _pixel_derivatives(camera, parameters, grass)
     information = np.einsum("nia,nib->ab", slopes, slopes) / max(len(grass), 1)
     square = float(step @ information @ step)
@@ -203,7 +205,7 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
     camera, parameters, covariance = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
     after = camera.with_parameters(parameters)
     turn = after.rotation @ camera.camera.rotation.T
-    grass = grass_in_view(camera)
+    grass = sample_grass_in_view(camera)
     moved = after.project(grass) - camera.camera.project(grass)
     slopes = _pixel_derivatives(camera, parameters, grass)
     variances = np.trace(slopes @ covariance @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
@@ -213,17 +215,19 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
         before=camera.camera,
         after=after,
         covariance=row_by_row(covariance),
-        covariance_before=row_by_row(covariance + error_covariance(camera, parameters, balls)),
+        covariance_before=row_by_row(
+            covariance + compute_error_covariance(camera, parameters, balls)
+        ),
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
         turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
         focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),
         picture_px=_median_or_none(np.hypot(*moved.T)) or 0.0,
         position_sigma_m=float(np.sqrt(np.trace(covariance[X : Z + 1, X : Z + 1]))),
         picture_sigma_px=_median_or_none(np.sqrt(variances)) or 0.0,
-        lines_before_px=_median_or_none(line_distances(camera, rig.start[row], rig.pitch))
+        lines_before_px=_median_or_none(measure_line_distances(camera, rig.start[row], rig.pitch))
         if lines
         else None,
-        lines_after_px=_median_or_none(line_distances(camera, parameters, rig.pitch))
+        lines_after_px=_median_or_none(measure_line_distances(camera, parameters, rig.pitch))
         if lines
         else None,
     )
@@ -240,7 +244,7 @@ def _pair_changes(
         before, after = ray_gaps(rig.start, rays)[0], ray_gaps(fit.parameters, rays)[0]
         out = odd[rows] if halved is not None else np.zeros(len(rows), bool)
         unseen = None if halved is None else ray_gaps(halved.parameters, rays)[0]
-        offset = time_offset(rig, fit, a, b)
+        offset = estimate_time_offset(rig, fit, a, b)
         pairs.append(
             PairChange(
                 a=rig.cameras[a].key,
@@ -258,7 +262,7 @@ def _pair_changes(
     return pairs
 
 
-def time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, float] | None:
+def estimate_time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, float] | None:
     """How many frames camera b is ahead of camera a, and the sigma of that.
 
     Ahead by ``offset``: frame t of b shows the instant that a shows at t + offset. A ball that

@@ -53,7 +53,7 @@ class SwappedView:
     confidence: float
 
 
-def turned_camera(camera: Camera) -> Camera:
+def turn_camera(camera: Camera) -> Camera:
     """The camera that sees the pitch turned by 180 degrees about the centre mark."""
     return replace(
         camera, rotation=camera.rotation @ _HALF_TURN, position=_HALF_TURN @ camera.position
@@ -135,7 +135,7 @@ def _test_half_turn(
 
 def _turn_observation(observation: BallObservation) -> BallObservation:
     calibration = replace(
-        observation.calibration, camera=turned_camera(observation.camera), covariance=None
+        observation.calibration, camera=turn_camera(observation.camera), covariance=None
     )
     return replace(observation, calibration=calibration)
 

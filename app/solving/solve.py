@@ -3,7 +3,7 @@
 ``solve`` is one pure function: no clock, no database, no memory, the same bits every time. The
 edit in the browser, the preview, the batch and the export all call it.
 
-``rethreshold`` calibrates and triangulates nothing. Of what ``solve`` computes, tau decides which pairs are
+``rethreshold_solution`` calibrates and triangulates nothing. Of what ``solve`` computes, tau decides which pairs are
 valid; where those stay as they were, it is told in one gate and two findings, and in which views
 look turned. The last needs the cameras again, but never under a smaller tau: a turned view must
 meet the others within tau, so one that did not before does not now.
@@ -36,21 +36,27 @@ from app.soccer.solution import (
     Solution,
     ViewSolution,
 )
-from app.solving.ball_3d import best_ball, exported_ball, judged_pairs, mean_ball
+from app.solving.ball_3d import choose_exported_ball, compute_mean_ball, find_best_ball, judge_pairs
 from app.solving.ball_box import fit_ball, predict_ball_in_view
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.calibrate import calibrate, calibrate_view, view_key
-from app.solving.contradiction import chi_square_of, find_contradiction
-from app.solving.facts import Facts, facts_of
+from app.solving.calibrate import calibrate, calibrate_view, compute_view_key
+from app.solving.contradiction import compute_chi_square, find_contradiction
+from app.solving.facts import Facts, collect_facts
 from app.solving.findings import (
-    closest_pair,
+    find_closest_pair,
     find_group_findings,
-    misses_ball_finding,
-    view_disagrees_finding,
+    make_misses_ball_finding,
+    make_view_disagrees_finding,
 )
-from app.solving.gates import JudgedView, describe_gates, reprojection_gate_of_pairs
-from app.solving.judgement import PASSES, Judgement, first_failed_gates, judge_groups, view_jac
-from app.solving.triangulate import ball_observations, triangulate_observation_pairs
+from app.solving.gates import JudgedView, describe_gates, make_reprojection_gate
+from app.solving.judgement import (
+    PASSES,
+    Judgement,
+    compute_view_jac,
+    find_first_failed_gates,
+    judge_groups,
+)
+from app.solving.triangulate import collect_ball_observations, triangulate_observation_pairs
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
 LEFT_OUT = "excluded"
@@ -78,20 +84,20 @@ def solve_with_facts(
     known = dict(calibrations)
     keys = [_calibration_key_of_view(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
-    observations = ball_observations(group.views, found)
+    observations = collect_ball_observations(group.views, found)
     pair_points = triangulate_observation_pairs(combinations(observations, 2))
-    facts = facts_of(group.views, found, pair_points)
+    facts = collect_facts(group.views, found, pair_points)
     uncertainty = MeanCovariance(facts)
     judgement = judge_groups(facts, policy, uncertainty)
-    pairs = judged_pairs(pair_points, judgement)
+    pairs = judge_pairs(pair_points, judgement)
     names = [view.key for view in group.views]
     failed = _failed_gate_names(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [observation for observation in observations if observation.view in left]
-    chi_square = chi_square_of(names, facts, judgement, policy)
-    mean = mean_ball(names, facts, judgement, uncertainty, policy, chi_square)
-    best = best_ball(pairs, usable, policy)
-    ball = exported_ball(mean, best, policy)
+    chi_square = compute_chi_square(names, facts, judgement, policy)
+    mean = compute_mean_ball(names, facts, judgement, uncertainty, policy, chi_square)
+    best = find_best_ball(pairs, usable, policy)
+    ball = choose_exported_ball(mean, best, policy)
     contradicted = find_contradiction(chi_square, names, facts, judgement, observations, policy)
     views = tuple(
         _add_ball_to_view(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
@@ -120,7 +126,7 @@ def _calibration_key_of_view(
     view: View, group: Group, policy: Policy, known: dict[str, Calibration]
 ) -> str:
     """Key of a view's calibration, which is known then."""
-    key = view_key(group, view, policy.calibration)
+    key = compute_view_key(group, view, policy.calibration)
     if key not in known:
         known[key] = calibrate_view(group, view, policy.calibration, known)
     return key
@@ -200,7 +206,7 @@ _SQUARE = {
 }
 
 
-def warm_up() -> None:
+def warm_up_solver() -> None:
     """Calibrate a made-up picture and look for a point once; the first time on a machine this compiles for seconds."""
     calibrate(make_lines(_SQUARE), Pitch(), ImageSize(960, 540), CalibrationPolicy())
     lens = np.array([0.01, *np.zeros(COEFFICIENTS - 1)])
@@ -215,7 +221,7 @@ def warm_up() -> None:
     )
 
 
-def differs_in_smaller_tau(policy: Policy, before: Policy) -> bool:
+def differs_only_in_smaller_tau(policy: Policy, before: Policy) -> bool:
     """Whether a policy differs from another in its name and a smaller tau alone."""
     alike = replace(before, name=policy.name, tau_percent=policy.tau_percent)
     return alike == policy and policy.tau_percent < before.tau_percent
@@ -229,19 +235,21 @@ def has_unchanged_pairs(facts: Facts, before: Policy, policy: Policy) -> BoolArr
         before: A policy.
         policy: The same with another tau.
     """
-    jac = view_jac(facts, policy.jac_gamma_percent)
-    _, then = first_failed_gates(facts, jac, before)
-    _, now = first_failed_gates(facts, jac, policy)
+    jac = compute_view_jac(facts, policy.jac_gamma_percent)
+    _, then = find_first_failed_gates(facts, jac, before)
+    _, now = find_first_failed_gates(facts, jac, policy)
     same = np.ones(facts.groups, bool)
     same[facts.pair_group[then != now]] = False
     return same
 
 
-def rethreshold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> Solution | None:
+def rethreshold_solution(
+    solution: Solution, diagonals: Sequence[float], policy: Policy
+) -> Solution | None:
     """What ``solve`` says under a smaller tau, bit for bit; None where it has to be asked.
 
     Args:
-        solution: Under a policy that this one ``differs_in_smaller_tau`` than, of a group that is
+        solution: Under a policy that this one ``differs_only_in_smaller_tau`` than, of a group that is
             ``has_unchanged_pairs``; its calibrations are not read.
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
@@ -259,7 +267,7 @@ def rethreshold(solution: Solution, diagonals: Sequence[float], policy: Policy) 
     if not missed <= reported:
         return None
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
-    gate = reprojection_gate_of_pairs(solution.pairs, letters, tau_px, policy.tau_percent)
+    gate = make_reprojection_gate(solution.pairs, letters, tau_px, policy.tau_percent)
     return replace(
         solution,
         gates=tuple(gate if item.name == gate.name else item for item in solution.gates),
@@ -282,10 +290,10 @@ def _rethreshold_finding(
     if found.kind == "view_disagrees" and found.view is not None and found.number is not None:
         view = solution.view(found.view)
         if view is not None and view.included:
-            return misses_ball_finding(found.view, found.number, tau_px[found.view])
-        own = closest_pair([pair for pair in judged if found.view in (pair.a, pair.b)])
-        return view_disagrees_finding(found.view, own, letters, tau_px[found.view])
+            return make_misses_ball_finding(found.view, found.number, tau_px[found.view])
+        own = find_closest_pair([pair for pair in judged if found.view in (pair.a, pair.b)])
+        return make_view_disagrees_finding(found.view, own, letters, tau_px[found.view])
     if found.kind == "not_synchronous":
-        best = closest_pair(judged)
+        best = find_closest_pair(judged)
         return replace(found, threshold=max(tau_px[best.a], tau_px[best.b]))
     return found

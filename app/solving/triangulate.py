@@ -146,7 +146,7 @@ class PairPoint:
         return x, y, z
 
 
-def ball_observations(
+def collect_ball_observations(
     views: Sequence[View], calibrations: Sequence[Calibration]
 ) -> list[BallObservation]:
     """The views that take part: included, calibrated, and with one ball.
@@ -160,15 +160,15 @@ def ball_observations(
     """
     return [
         observation
-        for observation in clicked_balls(views, calibrations)
+        for observation in collect_clicked_balls(views, calibrations)
         if np.isfinite(observation.ideal_center).all()
     ]
 
 
-def clicked_balls(
+def collect_clicked_balls(
     views: Sequence[View], calibrations: Sequence[Calibration]
 ) -> list[BallObservation]:
-    """``ball_observations`` with those through which no ray goes.
+    """``collect_ball_observations`` with those through which no ray goes.
 
     Args:
         views: Of a group.
@@ -200,7 +200,7 @@ def triangulate_observation_pairs(
     couples = [(a, b) for a, b in couples if not np.array_equal(a.P, b.P)]
     if not couples:
         return []
-    points = triangulate_pairs(*arrays_of_pairs([a for a, _ in couples], [b for _, b in couples]))
+    points = triangulate_pairs(*stack_pairs([a for a, _ in couples], [b for _, b in couples]))
     return [
         _make_pair_point(a, b, point)
         for (a, b), point in zip(couples, points, strict=True)
@@ -208,7 +208,7 @@ def triangulate_observation_pairs(
     ]
 
 
-def arrays_of_pairs(
+def stack_pairs(
     a: Sequence[BallObservation], b: Sequence[BallObservation]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Couples of observations as ``triangulate_pairs`` takes them."""

@@ -1,7 +1,7 @@
 """Tripod pitch: what the frames of one camera on a tripod say together of the pitch that they show.
 
 No pitch is quite the plan, and the paint of one frame cannot tell it: its camera gives way
-(``paint_noise``). Frames that one tripod took have a position in common, and length, width, crown, the place of the paint
+(``estimate_paint_noise``). Frames that one tripod took have a position in common, and length, width, crown, the place of the paint
 and of each line; all are unknowns with what is known of stadiums as prior, beside the camera of each frame.
 
 A camera that is used with the plan stays on the plan's markings. How far it is from the camera that
@@ -129,7 +129,7 @@ class TripodPitch:
 
     @property
     def terms(self) -> FloatArray:
-        """Numbers of the pitch in their standard deviations (``paint_noise``), shape (TERMS,)."""
+        """Numbers of the pitch in their standard deviations (``estimate_paint_noise``), shape (TERMS,)."""
         return self.shared[_PITCH]
 
     @property
@@ -186,7 +186,7 @@ class TripodPitch:
 
     def shift_of(self, frame: PaintSightings) -> FloatArray:
         """How far each place of paint lies off the plan of the size that is shown, metres, shape (N, 3)."""
-        grass = grass_of(frame, self.size)
+        grass = project_paint_to_grass(frame, self.size)
         return painted_shift(grass, frame.sightings.curve, self.terms, self.pitch)
 
     def camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
@@ -299,7 +299,7 @@ class _Frames:
         self.parameters = np.array([frame.parameters for frame in frames])
         self.parameters[:, PAN] = np.unwrap(self.parameters[:, PAN])
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
-        self._grass = [grass_of(frame, size) for frame in frames]
+        self._grass = [project_paint_to_grass(frame, size) for frame in frames]
         if known is None:
             shared = np.zeros(SHARED)
             shared[_PLACE] = np.median(self.parameters[:, X : Z + 1], axis=0)
@@ -419,7 +419,7 @@ def _without_frames(parts: _Parts, carried: FloatArray) -> FloatArray:
     return np.asarray(parts.common - np.einsum("nis,nit->st", parts.between, carried))
 
 
-def grass_of(frame: PaintSightings, size: ImageSize) -> FloatArray:
+def project_paint_to_grass(frame: PaintSightings, size: ImageSize) -> FloatArray:
     """Where on the grass each place of paint lies by the frame's camera, metres, shape (N, 2)."""
     center = principal_point(size)
     camera = camera_from_parameters(frame.parameters, center, size.diagonal / 2)

@@ -339,9 +339,9 @@ def export_values(
         job = follow_job(client, client.post("exports", {**request, "to": out}), progress)
         report = _export_report_values(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
-    from app.formats.output import output_tree
+    from app.formats.output import open_output_folder
 
-    with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
+    with open_output_folder(out) as folder, tempfile.TemporaryDirectory() as held:
         job = client.post("exports", request)
         follow_job(client, job, progress)
         found = client.get(f"exports/{job['id']}")

@@ -145,9 +145,9 @@ def connect_to_server(server: ServerPlace) -> Iterator[Client]:
 
 
 def _require_version(server: ServerPlace, client: Client) -> None:
-    from app.formats.manifest import software_version
+    from app.formats.manifest import read_software_version
 
-    mine, found = software_version(), None
+    mine, found = read_software_version(), None
     # What is no JSON at all.
     with suppress(ValueError):
         found = client.get("/healthz")

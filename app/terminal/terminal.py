@@ -179,9 +179,9 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
     print_values(values, as_json)
     if as_json:
         return
-    from app.formats.export_formats import missing_for_use
+    from app.formats.export_formats import describe_missing_content
 
-    absent = missing_for_use(values.get("format", ""), values["counts"])
+    absent = describe_missing_content(values.get("format", ""), values["counts"])
     if absent is not None:
         say(f"Not complete: {absent}. --images copy puts them there.")
     missing = values["missing_images"]

@@ -12,7 +12,12 @@ import numpy as np
 from app.errors import ImageError
 from app.geometry.camera import Camera
 from app.paint.evidence import Image
-from app.paint.propose import ENLARGED_WIDTH, WORK_WIDTH, enlarge_small_picture, why_too_small
+from app.paint.propose import (
+    ENLARGED_WIDTH,
+    WORK_WIDTH,
+    enlarge_small_picture,
+    explain_too_small_picture,
+)
 from app.soccer.frames import ImageSize
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex
@@ -68,7 +73,7 @@ class Clip:
         """
         index = index or index_times(path)
         _, image = next(read_frames(path, index, [first]))
-        if (small := why_too_small(image)) is not None:
+        if (small := explain_too_small_picture(image)) is not None:
             raise ImageError(f"{path.name}: {small}")
         shapes = [(each.shape[1], each.shape[0]) for each in (image, _work_size(image))]
         own, work = (ImageSize(*shape) for shape in shapes)

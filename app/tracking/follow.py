@@ -30,7 +30,7 @@ from app.geometry.resection import (
 )
 from app.paint.agreement import PaintAgreement, measure_agreement
 from app.paint.candidates import MAIN, WIDE, Library
-from app.paint.propose import weakest_marking
+from app.paint.propose import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -304,7 +304,7 @@ class Follower:
                 continue
             weakest = 0.0
             if snapped.reason is None:
-                weakest = weakest_marking(picture.reading, snapped, self.pitch)
+                weakest = measure_weakest_marking(picture.reading, snapped, self.pitch)
             most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
             why = self._why_not(snapped, seen, weakest, unit, most)
             outcome = TRACKED if why is None else BRIDGED

@@ -14,12 +14,12 @@ from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
 from app.paint.candidates import Library
 from app.paint.evidence import Image, Reading, read_picture
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.propose import (
     FrameProposal,
-    frame_to_search,
-    kernel_threads,
+    get_kernel_executor,
     line_strength,
+    prepare_frame_to_search,
     propose_for_frame,
 )
 from app.paint.ridges import Strength
@@ -63,7 +63,7 @@ class Picture:
 def read_frame(frame: Frame) -> Picture:
     """All that a frame shows."""
     image = frame.image
-    field = field_of_play(image)
+    field = find_field_of_play(image)
     strength, reading = line_strength(image, field), read_picture(image, field)
     return Picture(frame.number, frame.time, image, grey_of(frame), field, strength, reading)
 
@@ -77,7 +77,7 @@ def read_frames(frames: Iterable[Frame]) -> Iterator[Picture]:
     """Frames read in threads, in their order, a few ahead."""
     waiting: deque[Future[Picture]] = deque()
     for frame in frames:
-        waiting.append(kernel_threads().submit(read_frame, frame))
+        waiting.append(get_kernel_executor().submit(read_frame, frame))
         if len(waiting) > AHEAD:
             yield waiting.popleft().result()
     while waiting:
@@ -92,7 +92,7 @@ def propose_in_picture(
     libraries: Sequence[Library],
 ) -> FrameProposal:
     """As ``propose_for_frame``, for a picture of a clip."""
-    frame = frame_to_search(picture.image, picture.field, picture.strength, picture.reading)
+    frame = prepare_frame_to_search(picture.image, picture.field, picture.strength, picture.reading)
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     return propose_for_frame(frame, picture.image, pitch, known, policy, libraries)

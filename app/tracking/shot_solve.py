@@ -59,7 +59,7 @@ from app.solving.tripod_pitch import (
     PaintSightings,
     TripodPitch,
     find_tripod_pitch,
-    grass_of,
+    project_paint_to_grass,
     second_moment_about_plan,
 )
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
@@ -373,7 +373,7 @@ class _Shot:
         for place, frame in self.painted().items():
             seen = self._seen()[place]
             assert seen is not None
-            grass = grass_of(frame, self._size)
+            grass = project_paint_to_grass(frame, self._size)
             own = all_terms(grass, seen.marking, seen.jacobian, self._pitch)
             weighted = seen.jacobian * self._weights(seen)[:, None]
             terms[place] = weighted.T @ own

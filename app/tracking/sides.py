@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.resection import PARAMETERS, X, Y
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.track import FrameCamera
 
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
@@ -29,7 +29,7 @@ def turned_frame(frame: FrameCamera) -> FrameCamera:
     if covariance is not None:
         matrix = np.reshape(covariance, (PARAMETERS, PARAMETERS)) * np.outer(_SIGNS, _SIGNS)
         covariance = tuple(matrix.ravel().tolist())
-    return replace(frame, camera=turned_camera(frame.camera), covariance=covariance)
+    return replace(frame, camera=turn_camera(frame.camera), covariance=covariance)
 
 
 def stand_opposite(frames: Sequence[FrameCamera], before: Mapping[int, FrameCamera]) -> bool:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from app.config import Settings
 from app.errors import GeometryError
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.propose import propose_camera
 from app.progress import ReportProgress
 from app.video.cuts import hard_cuts
@@ -256,7 +256,7 @@ def look_at(image: npt.NDArray[np.uint8]) -> LookedAt:
     Args:
         image: Red green blue, shape (H, W, 3).
     """
-    grass = float(field_of_play(image).mean())
+    grass = float(find_field_of_play(image).mean())
     if grass < GRASS_MAIN:
         return LookedAt(grass, False)
     try:

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from app.config import is_local
 from app.durable import is_open_to_others
 from app.errors import ClusterError, InputError
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.soccer.solution import SOLVER_VERSION
 
 R = TypeVar("R")
@@ -137,7 +137,7 @@ def software_versions() -> dict[str, str]:
     python = ".".join(platform.python_version_tuple()[:2])
     libraries = {name: version(name) for name in _NUMBERS}
     return {
-        "touchline": software_version(),
+        "touchline": read_software_version(),
         "solver": str(SOLVER_VERSION),
         "python": python,
         "processor": platform.machine(),

@@ -13,7 +13,7 @@ from app.sample.scenes import CENTER_SIGMA_PX, CENTER_SIGMA_SHARE
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.policy import PAPER
-from app.solving.calibrate import calibrate, calibration_key, measure_calibration
+from app.solving.calibrate import calibrate, compute_calibration_key, measure_calibration
 from app.solving.solve import solve
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -53,7 +53,7 @@ def _errors(scene: Scene, make: Make, rng: np.random.Generator) -> tuple[float, 
         truth = scene.truth.view(view.key)
         found = calibrate(view.station.lines, group.pitch, view.size, PAPER.calibration)
         if truth is not None and found.camera is not None:
-            key = calibration_key(view.station, group.pitch, PAPER.calibration)
+            key = compute_calibration_key(view.station, group.pitch, PAPER.calibration)
             right = replace(found, camera=truth.camera)
             known[key] = measure_calibration(right, view.station.lines, group.pitch, view.size)
     solution = solve(group, PAPER, known)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.evaluation.cameras import error_without, score_frame, score_frames
+from app.evaluation.cameras import measure_error_without_marking, score_frame, score_frames
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
@@ -108,7 +108,7 @@ def _bench_left_out(frames: Mapping[str, Lines]) -> None:
         errors = []
         for lines in frames.values():
             marking = chooser.choice(sorted(lines))
-            error = error_without(lines, marking, PITCH, SIZE, policy)
+            error = measure_error_without_marking(lines, marking, PITCH, SIZE, policy)
             errors.append(np.inf if error is None else error)
         share = 100 * float(np.mean(np.array(errors) < LEFT_OUT_LIMIT_PX))
         rows.append([f"Touchline, {name}", float(np.median(errors)), share])

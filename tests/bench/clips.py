@@ -37,7 +37,7 @@ from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians
 from app.paint.evidence import to_paint_evidence
 from app.paint.frame_pitch import find_shared_pitch
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.propose import propose_camera
 from app.paint.snap import SnappedCamera, snap_camera
 from app.soccer.annotation import Lines, make_lines
@@ -278,7 +278,7 @@ def _snapped(image: np.ndarray, lines: Lines | None) -> Known | None:
     start = _clicked(image, lines)
     if start is None:
         return None
-    field = field_of_play(image)
+    field = find_field_of_play(image)
     found = snap_camera(image, field, start.camera, start_covariance=start.covariance)
     if found.reason is not None or found.covariance is None:
         return None

@@ -21,7 +21,7 @@ from app.sample.scenes import click_lines, loose_box, true_ball_box
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration, Solution
-from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.calibrate import calibrate_station, compute_calibration_key
 from app.solving.solve import solve
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -172,7 +172,7 @@ def judged(cases: Sequence[Case], known: dict[str, Calibration]) -> list[Judged]
     """Every case solved; cameras that are known are not sought again."""
     for case in cases:
         for view in case.group.views:
-            key = calibration_key(view.station, case.group.pitch, PAPER.calibration)
+            key = compute_calibration_key(view.station, case.group.pitch, PAPER.calibration)
             if key not in known:
                 known[key] = calibrate_station(view.station, case.group.pitch, PAPER.calibration)
     return [Judged(case, solve(case.group, PAPER, known)) for case in cases]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.evaluation.cameras import error_without
+from app.evaluation.cameras import measure_error_without_marking
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
@@ -52,7 +52,9 @@ def bench_goals(data: Path, every: int = 1) -> None:
 def left_out_grass(lines: Lines, policy: CalibrationPolicy) -> list[float]:
     """Largest distance of each grass marking from where the others put it, pixels."""
     grass = [marking for marking in lines if marking not in GOAL_PARTS]
-    errors = [error_without(lines, marking, PITCH, SIZE, policy) for marking in grass]
+    errors = [
+        measure_error_without_marking(lines, marking, PITCH, SIZE, policy) for marking in grass
+    ]
     return [np.inf if error is None else error for error in errors]
 
 

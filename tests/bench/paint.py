@@ -27,7 +27,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import parameters_from_camera
 from app.paint.agreement import measure_agreement
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.ridges import find_line_like
 from app.paint.snap import SnappedCamera, snap_camera
 from app.paint.view_paint import read_paint_of_image
@@ -39,7 +39,7 @@ from app.soccer.group import Group, Media
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.soccer.solution import Calibration, Solution
-from app.solving.calibrate import calibrate, calibration_key, measure_calibration
+from app.solving.calibrate import calibrate, compute_calibration_key, measure_calibration
 from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from app.solving.solve import solve
@@ -155,7 +155,7 @@ def _snap(image: np.ndarray, found: Calibration) -> tuple[np.ndarray, SnappedCam
     assert found.camera is not None
     known = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
     began = time.thread_time()
-    field = field_of_play(image)
+    field = find_field_of_play(image)
     snapped = snap_camera(image, field, found.camera, start_covariance=known)
     return field, snapped, 1000 * (time.thread_time() - began)
 
@@ -167,7 +167,7 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
         shot = shots.get(view.key)
         if shot is None:
             continue
-        key = calibration_key(view.station, group.pitch, PAPER.calibration)
+        key = compute_calibration_key(view.station, group.pitch, PAPER.calibration)
         found = replace(shot.clicked, camera=shot.truth)
         true[key] = measure_calibration(found, view.station.lines, group.pitch, view.size)
         if shot.snapped.planned is not None:

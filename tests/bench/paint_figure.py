@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from app.paint.evidence import find_paint, read_picture, trace_visible_markings
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.paint.ridges import find_line_like
 from app.sample.render import render
 from app.soccer.pitch import Pitch
@@ -24,7 +24,7 @@ def main(out: str) -> None:
     key = scene.group.views[0].key
     image = render(scene, key).copy()
     picture = np.ascontiguousarray(image[:, :, ::-1])
-    field = field_of_play(picture)
+    field = find_field_of_play(picture)
     truth = scene.truth.view(key)
     assert truth is not None
     reading = read_picture(picture, field)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.issia import MIRRORED, people_on_grass, turn_people
+from app.formats.issia import MIRRORED, locate_people_on_grass, mirror_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.report import Report
 from tests.bench.table import print_table
@@ -27,7 +27,7 @@ def bench_people(data: Path, every: int = EVERY) -> None:
         # Turned once more they are as they were written.
         width = folder.stations[one].size.width
         tracks = {
-            number: turn_people(track, width) if number in MIRRORED else track
+            number: mirror_people(track, width) if number in MIRRORED else track
             for number, track in folder.tracks.items()
         }
         written = apart(IssiaFolder(tracks, folder.stations), one, other, every)
@@ -45,8 +45,8 @@ def apart(folder: IssiaFolder, one: int, other: int, every: int = EVERY) -> list
     found = []
     for frame in sorted(track.persons.keys() & track_b.persons.keys())[::every]:
         here, there = (
-            people_on_grass(camera, track, frame),
-            people_on_grass(camera_b, track_b, frame),
+            locate_people_on_grass(camera, track, frame),
+            locate_people_on_grass(camera_b, track_b, frame),
         )
         found += [
             float(np.hypot(*(here[name] - there[name]))) for name in here.keys() & there.keys()

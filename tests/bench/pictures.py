@@ -7,7 +7,7 @@ import numpy as np
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.match_picture import PictureFrame, choose_frames, estimate_match_picture
-from app.solving.picture_camera import warp_of
+from app.solving.picture_camera import picture_to_warp
 from tests.bench.cases import SIZE, Case, _aimed, _clicks, _deformed, _shows_enough
 from tests.bench.table import print_table
 
@@ -35,7 +35,7 @@ def bench_pictures() -> None:
                 estimate_match_picture(_match(case, SEED + match, count), PAPER.calibration)
                 for match in range(MATCHES)
             ]
-            off = np.array([warp_of(item.picture) - truth for item in found])
+            off = np.array([picture_to_warp(item.picture) - truth for item in found])
             sigma = np.array([item.picture.sigma for item in found])
             inside = (np.abs(off) < 1.96 * sigma).mean(axis=0)
             wide, aside, _ = np.sqrt((off**2).mean(axis=0))

@@ -20,12 +20,12 @@ from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
-from app.solving.ball_noise import RayResidual, estimate_ball_noise, ray_residuals
+from app.solving.ball_noise import RayResidual, compute_ray_residuals, estimate_ball_noise
 from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve
-from app.solving.triangulate import ball_observations
+from app.solving.triangulate import collect_ball_observations
 from tests.bench.table import print_table
 
 PERCENTILE, EXPECTED = 95, 1.96
@@ -153,7 +153,9 @@ def _misses(group: Group) -> tuple[RayResidual, ...]:
     if solution.ball is None:
         return ()
     calibrations = [view.calibration for view in solution.views]
-    return ray_residuals(solution.ball, ball_observations(group.views, calibrations))
+    return compute_ray_residuals(
+        solution.ball, collect_ball_observations(group.views, calibrations)
+    )
 
 
 def _with_stations(group: Group, change: Callable[[Station], Station]) -> Group:

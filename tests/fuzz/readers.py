@@ -36,7 +36,7 @@ from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Limits
 from app.formats.guess_format import guess_format
-from app.formats.output import output_tree
+from app.formats.output import open_output_folder
 from app.formats.report import Report
 from app.json_text import json_text
 from app.media.files import read_frame
@@ -169,7 +169,7 @@ def _use(groups: list[Group]) -> None:
         with (
             tempfile.TemporaryDirectory(prefix="touchline-case-") as out,
             suppress(ReviewError),
-            output_tree(Path(out, "export")) as root,
+            open_output_folder(Path(out, "export")) as root,
         ):
             write_format(root, records, WriteOptions(name, everything=True))
 

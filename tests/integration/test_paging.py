@@ -35,7 +35,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.webhooks.messages import Kind
 from app.features.webhooks.service import make_webhook, send_ping
-from app.http.server import listen, make_server
+from app.http.server import make_server, open_listening_socket
 from app.main import create_app
 from tests.openapi import openapi_of
 from tests.scenes import make_scenes
@@ -121,7 +121,7 @@ def client(application: Any) -> Iterator[touchline.Client]:
             _, link = invite(store, name, role, actor="local")
             links.set_password_by_link(store, link.token, SECRET)
         fill(store, store.settings.home)
-        with listen("127.0.0.1", 0) as (socket, address):
+        with open_listening_socket("127.0.0.1", 0) as (socket, address):
             server = make_server(application)
             thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
             thread.start()

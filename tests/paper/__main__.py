@@ -12,7 +12,7 @@ import numpy as np
 from app.config import Settings
 from app.db.store import Store
 from app.evaluation.evaluate import Evaluation
-from app.evaluation.result import figure_png
+from app.evaluation.result import figure_to_png
 from tests.paper.issia import run_issia
 from tests.paper.page import page
 from tests.paper.printed_jac import both_directions
@@ -42,7 +42,7 @@ def main() -> None:
 
 def _drawn(found: Evaluation, name: str) -> bytes:
     (figure,) = (one for one in found.figures if one.name == name)
-    picture = cv2.imdecode(np.frombuffer(figure_png(figure), np.uint8), cv2.IMREAD_COLOR)
+    picture = cv2.imdecode(np.frombuffer(figure_to_png(figure), np.uint8), cv2.IMREAD_COLOR)
     # A hundred coloured lines are 400 kB as PNG, which is too much for a repository.
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
     assert done

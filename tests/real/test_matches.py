@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.evaluation.cameras import error_without
+from app.evaluation.cameras import measure_error_without_marking
 from app.features.file_tools.matches import match_shares
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
@@ -16,7 +16,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.match_position import NO_PLACES, place_of
+from app.solving.match_position import NO_PLACES, find_camera_place
 from app.solving.pitch_size import PitchFrame, estimate_pitch
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -38,7 +38,7 @@ def files():
 
 @pytest.fixture(scope="module")
 def shares(files):
-    places = [place_of(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
+    places = [find_camera_place(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
     return match_shares(files, places, None)
 
 
@@ -48,7 +48,9 @@ class TestShares:
         errors = np.array(
             [
                 [
-                    error_without(files[at].lines, name, Pitch(), SIZE, POLICY, others)
+                    measure_error_without_marking(
+                        files[at].lines, name, Pitch(), SIZE, POLICY, others
+                    )
                     for others in (NO_PLACES, shares[at].others)
                 ]
                 for at, name in asked
@@ -78,7 +80,7 @@ class TestShares:
         errors = np.array(
             [
                 [
-                    error_without(it.lines, name, pitch, SIZE, POLICY)
+                    measure_error_without_marking(it.lines, name, pitch, SIZE, POLICY)
                     for pitch in (Pitch(), proposed)
                 ]
                 for it, name in middle

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from tests.release.advisories import ask_browser, ask_python
 from tests.release.bill import write_bill
 from tests.release.libraries import EXTRAS, ROOT, closure, pins
@@ -51,7 +51,7 @@ def build(out: Path, tools: Path) -> int:
     if not _same_again(out):
         print("The source distribution builds another wheel than the checkout.", file=sys.stderr)
         return 1
-    name = f"touchline-{software_version()}"
+    name = f"touchline-{read_software_version()}"
     write_lock(out / "requirements.txt")
     write_lock(out / "requirements-all.txt", *EXTRAS)
     write_bill(out / f"{name}.cdx.json", tools)

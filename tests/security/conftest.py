@@ -25,7 +25,7 @@ from app.features.people.roles import Role
 from app.formats.issia_writer import write_issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.http import access
-from app.http.server import listen, make_server
+from app.http.server import make_server, open_listening_socket
 from app.main import create_app
 from tests.e2e.service import NOBODY, run_touchline, serving
 from tests.flights import flight_groups
@@ -203,7 +203,7 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
         patch.setattr("app.http.team.CHALLENGE_LIMIT", parse("1000/minute"))
         passwords._placeholder_hash.cache_clear()
         app = create_app(settings)
-        with listen("127.0.0.1", 0) as (socket, address):
+        with open_listening_socket("127.0.0.1", 0) as (socket, address):
             server = make_server(app)
             thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
             thread.start()

@@ -246,10 +246,10 @@ class TestSessions:
         # Whoever has a role in one dataset alone: it takes a look where each thing is.
         team.add("here-only", Role.NONE)
         assert team.ask("GET", f"{API}/jobs/1", role="here-only").status == 404
-        assert by_threads == ["require_allowed", "missing_error"]
+        assert by_threads == ["require_allowed", "find_missing_error"]
         with team.store.read_without_waiting():
             assert team.ask("GET", address, role="reviewer").status == 200
-        assert by_threads == ["require_allowed", "missing_error", "_find_login"]
+        assert by_threads == ["require_allowed", "find_missing_error", "_find_login"]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401
 
     def test_the_log_says_who_asked_and_from_where(self, team: Team) -> None:

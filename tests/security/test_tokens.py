@@ -18,7 +18,7 @@ from app.features.people.access_tokens import make_access_token_text
 from app.features.people.roles import Role, Scope
 from app.features.people.service import change_person, find_person
 from app.features.people.tables import AccessTokenModel
-from app.http.headers import bearer_token
+from app.http.headers import read_bearer_token
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, BYTES, Team
 from tests.waiting import SECONDS
@@ -70,7 +70,7 @@ class TestTokens:
         assert self.ask(team, "Basic eDp5", Cookie=cookie).status == 200, "a proxy asked for it"
         both = [("authorization", bearer), ("authorization", team.bearer("read"))]
         raw = [(name.encode(), value.encode()) for name, value in both]
-        assert bearer_token({"type": "http", "headers": raw}) == ""
+        assert read_bearer_token({"type": "http", "headers": raw}) == ""
 
     def test_a_page_of_another_site_is_refused_with_a_token_too(self, team: Team) -> None:
         bearer = team.bearer("lead")

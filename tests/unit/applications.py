@@ -21,7 +21,7 @@ from app.features.jobs import runner as job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
 from app.http.deps import Services
-from app.http.errors import install_handlers
+from app.http.errors import install_error_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.pages import BrowserSite, install_pages
@@ -91,7 +91,7 @@ def write_static(folder: Path) -> Path:
 def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClient:
     """A client of the pages and modules of a few files, without the rest of the application."""
     site = BrowserSite(static_folder)
-    install_handlers(plain_app)
+    install_error_handlers(plain_app)
     install_pages(plain_app, site)
     plain_app.add_middleware(SecurityHeaders, policy=site.policy)
     return client_of(plain_app)

@@ -19,7 +19,7 @@ import typer
 
 from app import cli, command_line
 from app.command_line import YOUNG, app
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.formats.sn_calibration_writer import lines_to_json
 from tests.scenes import make_scenes
 
@@ -98,7 +98,7 @@ class TestHelp:
             gc.set_threshold(*before)
 
     def test_the_version_is_that_of_manifests(self, run: Run) -> None:
-        assert run("--version")[:2] == (0, f"touchline {software_version()}\n")
+        assert run("--version")[:2] == (0, f"touchline {read_software_version()}\n")
 
     def test_a_shell_completes_what_is_typed(self) -> None:
         command = "import sys; sys.argv = ['touchline']; from app.cli import main; main()"

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import app
-from app.evaluation.result import Axis, Figure, Panel, Series, figure_csv
+from app.evaluation.result import Axis, Figure, Panel, Series, figure_to_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.jobs.queries import _json_column as job_text
@@ -249,7 +249,7 @@ class TestFiles:
         series = Series("all", "All", x=(1.0, 2.0), y=(bad, 3.0))
         panel = Panel("p", Axis("x"), Axis("y"), (series,))
         figure = Figure("f", "t", (panel,))
-        rows = list(csv.reader(io.StringIO(figure_csv(figure))))
+        rows = list(csv.reader(io.StringIO(figure_to_csv(figure))))
         assert not NOT_A_NUMBER.search(str(rows))
 
 

@@ -35,7 +35,7 @@ from app.features.independent_annotations.routes import AnnotationReturn
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, document, no_content, responds
+from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -275,7 +275,7 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(document)
+@respond_with(document)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
@@ -313,7 +313,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
     return adjudicate.adjudicate_case(
@@ -333,7 +333,7 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
     responses=responses(403, 404, 409, 413, 415),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(no_content)
+@respond_with(make_empty_response)
 def return_annotation(
     group: Id, back: AnnotationReturn, store: AppStore, actor: Actor
 ) -> DisclosedAnnotation:

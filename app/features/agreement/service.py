@@ -46,7 +46,7 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.service import find_annotation_of_copy
 from app.features.solutions.codec import to_json
-from app.features.webhooks.queries import DISPUTED, announce, time_suffix
+from app.features.webhooks.queries import DISPUTED, make_time_suffix, queue_webhook_messages
 from app.soccer.actors import SCRIPT
 
 KIND = "agreement"
@@ -363,11 +363,11 @@ def _announce_disagreement(
 ) -> None:
     at, group_id = values["found"], values["group_id"]
     summary = {name: values[name] for name in ("worst", "disagreements")}
-    announce(
+    queue_webhook_messages(
         session,
         values["dataset_id"],
         DISPUTED,
-        f"group{group_id}_disputed{time_suffix(at)}",
+        f"group{group_id}_disputed{make_time_suffix(at)}",
         actor=BY_ITSELF,
         at=at,
         batch_id=annotations[0].batch_id,

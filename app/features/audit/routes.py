@@ -18,10 +18,10 @@ from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.formats.csv_text import csv_line
-from app.http.access import current_login
-from app.http.cursor import Before, Cursor, first_below
+from app.http.access import get_current_login
+from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
-from app.http.documents import ListDocument, json_of
+from app.http.documents import ListDocument, encode_document
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -49,7 +49,7 @@ class AuditDocument(ListDocument[AuditEntry]):
 
 async def led_datasets_of_request(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
-    login = current_login(request.scope)
+    login = get_current_login(request.scope)
     return EVERYTHING if login is None else login.roles.led_datasets()
 
 
@@ -112,7 +112,12 @@ def get_audit(
     and have a `next` all the same.
     """
     return audit.read_audit(
-        store, query, led, search=search, before=first_below(cursor, before), limit=limit
+        store,
+        query,
+        led,
+        search=search,
+        before=parse_descending_cursor(cursor, before),
+        limit=limit,
     )
 
 
@@ -145,4 +150,4 @@ def _csv_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
 
 def _json_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
     for entry in found:
-        yield json_of(entry).decode() + "\n"
+        yield encode_document(entry).decode() + "\n"

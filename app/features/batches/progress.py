@@ -38,10 +38,10 @@ from app.features.independent_annotations.service import ReturnedGroup, read_ret
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.webhooks.queries import (
     STALLED,
-    announce,
     list_active_webhooks,
     list_listeners,
-    time_suffix,
+    make_time_suffix,
+    queue_webhook_messages,
 )
 from app.soccer.actors import person_of
 
@@ -112,9 +112,9 @@ def _find_stalled_groups(
 
 
 def _notify_of_stall(session: Session, batch: Batch, stall: BatchStall, at: datetime) -> int:
-    event = f"batch{batch.id}_{stall.why}{time_suffix(stall.since)}"
+    event = f"batch{batch.id}_{stall.why}{make_time_suffix(stall.since)}"
     details = {"why": str(stall.why), "since": stall.since}
-    return announce(
+    return queue_webhook_messages(
         session,
         batch.dataset_id,
         STALLED,

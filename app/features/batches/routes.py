@@ -31,10 +31,17 @@ from app.features.independent_annotations.service import ReturnedGroup
 from app.features.people.logins import Login
 from app.features.people.roles import role_allows
 from app.features.queue.query import MAX_LISTED_LENGTH
-from app.http.access import current_login
+from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, Services
-from app.http.documents import Document, ListDocument, as_document, document, no_content, responds
+from app.http.documents import (
+    Document,
+    ListDocument,
+    document,
+    make_empty_response,
+    respond_with,
+    respond_with_document,
+)
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import PresenceDocument, responses
 from app.http.route import Route
@@ -257,7 +264,7 @@ class BatchMembers:
 
 
 async def _batch_workers(request: Request) -> BatchMembers:
-    return BatchMembers(current_login(request.scope))
+    return BatchMembers(get_current_login(request.scope))
 
 
 Members = Annotated[BatchMembers, Depends(_batch_workers)]
@@ -308,7 +315,7 @@ def _created_response(batch: Batch) -> Response:
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_created_response)
+@respond_with(_created_response)
 def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor) -> Batch:
     """Give out the groups that a query finds now, in its order."""
     wanted = NewBatch(query=new.q, **new.model_dump(exclude={"q"}))
@@ -346,7 +353,7 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, batch=OwnedKind.WORK)
-@responds(as_document(WorkBatchDocument.model_validate))
+@respond_with(respond_with_document(WorkBatchDocument.model_validate))
 def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
     """Give a batch on to others, close it, or name it otherwise."""
     values = change.model_dump(exclude_unset=True)
@@ -358,7 +365,7 @@ def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) ->
     "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
 )
 @may(Action.LEAD, batch=OwnedKind.WORK)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
     """Delete a batch; what was said of its groups stays."""
     return batches.remove_batch(store, batch, actor=actor)
@@ -424,7 +431,7 @@ def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> 
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@responds(as_document(LeaseDocument.model_validate))
+@respond_with(respond_with_document(LeaseDocument.model_validate))
 def submit_group(
     batch: Id,
     group: Id,
@@ -448,7 +455,7 @@ def submit_group(
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@responds(as_document(LeaseDocument.model_validate))
+@respond_with(respond_with_document(LeaseDocument.model_validate))
 def withdraw_submission(
     batch: Id, group: Id, services: AppServices, actor: Actor, members: Members
 ) -> Lease:
@@ -465,7 +472,7 @@ def withdraw_submission(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, batch=OwnedKind.WORK)
-@responds(as_document(LeaseDocument.model_validate))
+@respond_with(respond_with_document(LeaseDocument.model_validate))
 def return_group(
     batch: Id, group: Id, why: ReturnReason, services: AppServices, actor: Actor, members: Members
 ) -> Lease:

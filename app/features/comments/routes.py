@@ -14,7 +14,7 @@ from app.features.comments.queries import StoredComment, StoredThread
 from app.features.comments.service import LONGEST
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, Id
-from app.http.documents import Document, ListDocument, document, no_content, responds
+from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -145,7 +145,7 @@ def _thread_response(thread: comments.StoredThread, actor: str, status: int = 20
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(partial(_thread_response, status=201), "actor")
+@respond_with(partial(_thread_response, status=201), "actor")
 def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> comments.StoredThread:
     """Say something about the group, a view of it, or a place there.
 
@@ -162,7 +162,7 @@ def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> co
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(_thread_response, "actor")
+@respond_with(_thread_response, "actor")
 def change_thread(
     group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
@@ -178,7 +178,7 @@ def change_thread(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(partial(_thread_response, status=201), "actor")
+@respond_with(partial(_thread_response, status=201), "actor")
 def reply(
     group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
@@ -193,7 +193,7 @@ def reply(
     responses=responses(403, 404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(_thread_response, "actor")
+@respond_with(_thread_response, "actor")
 def change_comment(
     group: Id, thread: Id, comment: Id, new: NewComment, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
@@ -208,7 +208,7 @@ def change_comment(
     responses=responses(403, 404),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_comment(group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it."""
     comments.delete_comment(store, group, thread, comment, actor=actor)

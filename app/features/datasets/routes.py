@@ -16,10 +16,10 @@ from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.features.policies.schemas import PolicyDocument
 from app.features.queue.service import summarize_groups
 from app.features.solve.jobs import request_solve
-from app.http.access import current_login
+from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
-from app.http.documents import Document, ListDocument, document, responds
+from app.http.documents import Document, ListDocument, document, respond_with
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -118,7 +118,7 @@ class DeletedDocument(BaseModel):
 @paged()
 def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
-    login = current_login(request.scope)
+    login = get_current_login(request.scope)
     own = () if login is None else login.roles.single.keys()
     return DatasetList(items=review.list_datasets(store, visibility, own))
 
@@ -146,7 +146,7 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
 
 @router.post("/{dataset}/solve", operation_id="solveDataset", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Solve what has no solution for its present state, policy and solver, as a job.
 
@@ -167,7 +167,7 @@ def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
-@responds(_deleted_response, "dry_run")
+@respond_with(_deleted_response, "dry_run")
 def delete_dataset(
     dataset: DatasetPath,
     request: DatasetDeletion,

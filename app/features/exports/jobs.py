@@ -26,7 +26,7 @@ from app.features.exports.service import ExportReport, export_dataset, require_p
 from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.jobs.service import Jobs
-from app.formats.export_formats import missing_for_use
+from app.formats.export_formats import describe_missing_content
 from app.formats.file_tree import Root
 from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
@@ -70,7 +70,7 @@ class ExportEntry:
     @property
     def incomplete(self) -> str | None:
         """What the files still lack before they can be used; None: nothing."""
-        return missing_for_use(self.request["format"], self.counts)
+        return describe_missing_content(self.request["format"], self.counts)
 
 
 class ExportFolder:

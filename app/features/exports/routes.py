@@ -23,7 +23,7 @@ from app.features.jobs.queries import DONE, Job
 from app.features.jobs.routes import Cursor, DatasetFilter, Limit
 from app.features.jobs.schemas import ACCEPTED, JobDocument, make_location_header
 from app.features.versions.routes import VersionId
-from app.formats.export_formats import options_used_by
+from app.formats.export_formats import list_options_of_format
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import (
     Actor,
@@ -32,10 +32,10 @@ from app.http.deps import (
     DatasetPath,
     SeesWhole,
     Services,
-    etag_matches,
+    is_not_modified,
 )
-from app.http.documents import Document, ListDocument, document, no_content, responds
-from app.http.headers import content_disposition
+from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
@@ -228,7 +228,7 @@ def list_formats(
     return FormatList(
         items=[
             FormatDocument(
-                **vars(one), possible=one.reason is None, options=options_used_by(one.format)
+                **vars(one), possible=one.reason is None, options=list_options_of_format(one.format)
             )
             for one in answers
         ]
@@ -248,7 +248,7 @@ def _export_job_response(job: Job) -> Response:
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
 @may(Action.EXPORT, body={"dataset": OwnedKind.DATASET}, whole=True)
-@responds(_export_job_response)
+@respond_with(_export_job_response)
 def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> Job:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
     return request_export(
@@ -300,7 +300,7 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, export=OwnedKind.EXPORT)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _export_document(services, export)
@@ -431,9 +431,9 @@ def redirect_or_stream_stored_file(
         "ETag": stored.etag,
         "Accept-Ranges": "bytes",
         "Cache-Control": "private, no-cache",
-        "Content-Disposition": content_disposition(name),
+        "Content-Disposition": make_content_disposition(name),
     }
-    if etag_matches(request, stored.etag):
+    if is_not_modified(request, stored.etag):
         return Response(status_code=304, headers=headers)
     return _partial_response(store, stored, headers, request)
 

@@ -39,11 +39,11 @@ from app.formats.export_formats import (
     TRACKS,
     USERS,
     WriteOptions,
-    box_settings,
+    describe_box_settings,
+    describe_missing_frames,
+    describe_view_settings,
     export_names,
-    frame_path_rule,
-    missing_sentence,
-    view_settings,
+    find_frame_path_rule,
     write_format,
 )
 from app.formats.export_record import ExportRecord
@@ -51,7 +51,7 @@ from app.formats.file_tree import Root
 from app.formats.frame_names import ExportNames, Outline
 from app.formats.issia import FramePersons
 from app.formats.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
-from app.formats.output import output_anywhere
+from app.formats.output import open_output
 from app.formats.tracks_writer import TrackRecord
 from app.formats.view_files import PutText, ViewFiles
 from app.media.frames import make_picture
@@ -184,7 +184,7 @@ def export_dataset(
             the same bytes every time.
         progress: Called as groups are written, and as their files are packed.
         read: Reads frames; in this process by default.
-        beside: After which its half written files are called, see ``output_anywhere``.
+        beside: After which its half written files are called, see ``open_output``.
 
     Raises:
         InputError: Nothing to export, the format does not use an option, or the groups do not fit it.
@@ -198,9 +198,9 @@ def export_dataset(
         return ExportReport(out, CARRY, counts["groups"], counts)
     with store.read() as session:
         source = _open_source(session, store, dataset, options, version)
-        with output_anywhere(out, store.settings.exports, beside, progress) as root:
+        with open_output(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(
-                root, images, read or _local_reader(store), frame_path_rule(format)
+                root, images, read or _local_reader(store), find_frame_path_rule(format)
             )
             names = export_names(format, source.outlines())
             run = _ExportRun(source, options, frames, names, progress)
@@ -301,7 +301,9 @@ def _require_format(
         if format == CARRY:
             return
         source = _SampleSource(whole)
-        frames = ExportImages(Path(folder), "none", _local_reader(store), frame_path_rule(format))
+        frames = ExportImages(
+            Path(folder), "none", _local_reader(store), find_frame_path_rule(format)
+        )
         with ViewFiles(Path(folder)) as small:
             try:
                 names = export_names(format, source.outlines())
@@ -470,9 +472,9 @@ class _ExportRun:
             settings={
                 **source.settings(),
                 "images": self._options.images,
-                **box_settings(self._options.format, self._options.boxes),
-                **view_settings(self._options.format, self._options.every_view),
-                **missing_sentence(self._options.format, counts),
+                **describe_box_settings(self._options.format, self._options.boxes),
+                **describe_view_settings(self._options.format, self._options.every_view),
+                **describe_missing_frames(self._options.format, counts),
             },
             licence=source.licence or terms,
             version=source.version,

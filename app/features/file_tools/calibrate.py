@@ -15,7 +15,7 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.cameras import leave_one_out, score_frame, score_frames
+from app.evaluation.cameras import measure_leave_one_out_errors, score_frame, score_frames
 from app.features.file_tools.matches import (
     MatchShare,
     choose_picture,
@@ -39,11 +39,14 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import GoalEdge, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate, lone_frame_of, with_lone_covariance
-from app.solving.calibration_findings import calibration_findings, lone_findings
+from app.solving.calibrate import analyse_lone_frame, calibrate, with_lone_covariance
+from app.solving.calibration_findings import (
+    find_calibration_findings,
+    find_pitch_findings_of_lone_frame,
+)
 from app.solving.lone_frame import LoneFrame
-from app.solving.match_position import FramePlace, Places, place_of, share_position
-from app.solving.solve import warm_up
+from app.solving.match_position import FramePlace, Places, find_camera_place, share_position
+from app.solving.solve import warm_up_solver
 
 CHUNK = 16
 """Frames that one process takes at a time."""
@@ -53,7 +56,7 @@ CHUNK = 16
 class CalibratedFrame:
     """What became of one line file.
 
-    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``leave_one_out``,
+    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``measure_leave_one_out_errors``,
     ``lone`` what nobody says of its pitch and picture, where no match shares anything with it.
     """
 
@@ -161,7 +164,7 @@ def calibrate_chunk(
     files: list[LineFile], size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
 ) -> list[CalibratedFrame]:
     """Calibrate some frames in this process, one after the other on one thread."""
-    warm_up()
+    warm_up_solver()
     return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
 
 
@@ -174,7 +177,7 @@ def recalibrate_chunk_with_match(
     with_leave_one_out: bool,
 ) -> list[CalibratedFrame]:
     """The same frames once more, each with what the others of its match say."""
-    warm_up()
+    warm_up_solver()
     return [
         _calibrate_with_shared_position(file, frame, share.others, size, policy, with_leave_one_out)
         for file, frame, share in zip(files, frames, shares, strict=True)
@@ -188,9 +191,13 @@ def _calibrate_file(
     calibration = calibrate(file.lines, Pitch(), size, policy)
     milliseconds = 1000 * (time.thread_time() - began)
     began = time.thread_time()
-    lone = lone_frame_of(calibration, file.lines, Pitch(), size, policy)
+    lone = analyse_lone_frame(calibration, file.lines, Pitch(), size, policy)
     milliseconds += 1000 * (time.thread_time() - began)
-    left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
+    left_out = (
+        measure_leave_one_out_errors(file.lines, Pitch(), size, policy)
+        if with_leave_one_out
+        else ()
+    )
     return _make_frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
 
 
@@ -206,7 +213,11 @@ def _calibrate_with_shared_position(
     began = time.thread_time()
     calibration = share_position(frame.alone, others, file.lines, pitch, size, policy)
     milliseconds = frame.milliseconds + 1000 * (time.thread_time() - began)
-    left_out = leave_one_out(file.lines, pitch, size, policy, others) if with_leave_one_out else ()
+    left_out = (
+        measure_leave_one_out_errors(file.lines, pitch, size, policy, others)
+        if with_leave_one_out
+        else ()
+    )
     if calibration is frame.alone:
         return replace(frame, milliseconds=milliseconds, left_out=tuple(left_out))
     return _make_frame(file.stem, calibration, size, milliseconds, tuple(left_out))
@@ -221,7 +232,10 @@ def _make_frame(
     lone: LoneFrame | None = None,
 ) -> CalibratedFrame:
     camera = calibration.camera
-    findings = [*calibration_findings(calibration, size), *lone_findings(lone, Pitch())]
+    findings = [
+        *find_calibration_findings(calibration, size),
+        *find_pitch_findings_of_lone_frame(lone, Pitch()),
+    ]
     # What is drawn travels no further: it is most of a calibration.
     alone = replace(calibration, markings=())
     return CalibratedFrame(
@@ -236,7 +250,7 @@ def _make_frame(
         left_out=left_out,
         milliseconds=milliseconds,
         alone=alone,
-        place=place_of(calibration, size),
+        place=find_camera_place(calibration, size),
         lone=lone,
     )
 

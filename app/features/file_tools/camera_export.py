@@ -13,9 +13,13 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
-from app.formats.camera_matrix import camera_arrays
+from app.formats.camera_matrix import cameras_to_arrays
 from app.formats.cameras import read_cameras
-from app.formats.opentrackio_writer import frame_rate, opentrackio_problem, opentrackio_sample
+from app.formats.opentrackio_writer import (
+    camera_to_opentrackio,
+    estimate_frame_rate,
+    find_opentrackio_problem,
+)
 from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.json_text import json_text
@@ -50,7 +54,7 @@ def export_cameras(
         raise report.refusal(f"{source} holds no camera_<frame>.json")
     if kind == "npz":
         content = io.BytesIO()
-        arrays: dict[str, Any] = dict(camera_arrays(cameras, str(source)))
+        arrays: dict[str, Any] = dict(cameras_to_arrays(cameras, str(source)))
         np.savez_compressed(content, **arrays)
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
@@ -84,7 +88,7 @@ def _write_samples(
 ) -> None:
     rows = _read_track_rows(source)
     times = {frame: row["time"] for frame, row in rows.items() if _is_number(row.get("time"))}
-    rate = frame_rate(times)
+    rate = estimate_frame_rate(times)
     width = len(str(max(cameras)))
     samples = {}
     for frame, camera in sorted(cameras.items()):
@@ -94,10 +98,10 @@ def _write_samples(
                 f"the camera of frame {frame} does not contain the size of its image, which"
                 " OpenTrackIO needs: give it as --size 1280x720"
             )
-        if problem := opentrackio_problem(camera):
+        if problem := find_opentrackio_problem(camera):
             raise DatasetFormatError(str(source), f"frame {frame}", None, problem)
         outcome = rows.get(frame, {}).get("outcome")
-        samples[f"sample_{frame:0{width}d}.json"] = opentrackio_sample(
+        samples[f"sample_{frame:0{width}d}.json"] = camera_to_opentrackio(
             camera,
             shape,
             frame,

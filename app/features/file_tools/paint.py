@@ -25,7 +25,7 @@ from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration import LineFile, read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.sn_calibration_writer import write_line_files
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.formats.view_files import write_file_below
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
@@ -35,8 +35,8 @@ from app.media.files import decode_picture
 from app.media.frames import LIMITS
 from app.paint.agreement import measure_agreement
 from app.paint.evidence import to_paint_evidence
-from app.paint.grass import field_of_play, why_no_field
-from app.paint.propose import why_too_small
+from app.paint.grass import explain_missing_field, find_field_of_play
+from app.paint.propose import explain_too_small_picture
 from app.paint.ridges import find_line_like
 from app.paint.snap import SnappedCamera, snap_camera
 from app.progress import ReportProgress
@@ -92,7 +92,7 @@ def read_pictures(
     """
     with closing(WorkerProcess(LIMITS)) as worker:
         for source in sources:
-            with opened_tree(source, report, Limits.of(settings)) as tree:
+            with open_tree_while_read(source, report, Limits.of(settings)) as tree:
                 if tree is None:
                     continue
                 for name in tree.names():
@@ -113,7 +113,7 @@ def list_picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]
     """Stems of every picture of some folders, zips and files; nothing is decoded."""
     stems: list[str] = []
     for source in sources:
-        with opened_tree(source, Report(), Limits.of(settings)) as tree:
+        with open_tree_while_read(source, Report(), Limits.of(settings)) as tree:
             if tree is None:
                 continue
             places = [PurePosixPath(name) for name in tree.names()]
@@ -243,7 +243,7 @@ class _FileByPicture:
 def _read_line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
     """The lines of each image, by stem with folders; an error where they cannot be read."""
     values: dict[str, Any] = {}
-    with opened_tree(lines, report, Limits.of(settings)) as tree:
+    with open_tree_while_read(lines, report, Limits.of(settings)) as tree:
         if tree is None:
             raise report.refusal(f"{lines} holds no line files")
         for name in tree.names():
@@ -272,7 +272,7 @@ def _snap_picture(
         return _result_row(frame, NOTHING, reason=picture.problem), None, None
     if isinstance(value, ReviewError):
         return _result_row(frame, NOTHING, reason=value.message), None, None
-    if (small := why_too_small(picture.image)) is not None:
+    if (small := explain_too_small_picture(picture.image)) is not None:
         return _result_row(frame, NOTHING, reason=small), None, None
     height, width = picture.image.shape[:2]
     size = ImageSize(width, height)
@@ -285,8 +285,8 @@ def _snap_picture(
     if clicked.camera is None:
         return _result_row(frame, NOTHING, reason=clicked.reason), None, None
     kept = camera_file_text(clicked.camera, clicked.known_covariance, size)
-    field = field_of_play(picture.image)
-    reason = why_no_field(picture.image, field)
+    field = find_field_of_play(picture.image)
+    reason = explain_missing_field(picture.image, field)
     if reason is not None:
         return _result_row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
     try:
@@ -328,8 +328,8 @@ def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str
         other = "the paint is read with lenses of one radial term; this camera has another"
         return _result_row(frame, NOTHING, reason=other)
     began = time.thread_time()
-    field = field_of_play(picture.image)
-    reason = why_no_field(picture.image, field)
+    field = find_field_of_play(picture.image)
+    reason = explain_missing_field(picture.image, field)
     if reason is not None:
         return _result_row(frame, NOTHING, reason=reason)
     seen = measure_agreement(camera, field, find_line_like(picture.image, field))

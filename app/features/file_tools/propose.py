@@ -22,7 +22,7 @@ from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.json_text import json_text
-from app.paint.frame_pitch import agreed_pitch, group_by_position, make_pitch_frame
+from app.paint.frame_pitch import find_agreed_pitch, group_by_position, make_pitch_frame
 from app.paint.propose import FrameProposal, propose_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
@@ -108,7 +108,7 @@ def _pitches_shown_by_films(seen: Sequence[_ProposedCamera | None]) -> dict[int,
     found = {}
     for film in group_by_position(cameras, sizes):
         frames = [one.frame for index in film if (one := seen[index]) is not None]
-        pitch = agreed_pitch(frames, Pitch())
+        pitch = find_agreed_pitch(frames, Pitch())
         if pitch is not None:
             found.update(dict.fromkeys(film, pitch))
     return found

@@ -24,8 +24,8 @@ from app.features.groups.edit import Edit, SetLines, set_ball
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.features.solutions.service import solve_encoded
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
-from app.http.documents import Document, as_document, document, responds
-from app.http.errors import http_status
+from app.http.documents import Document, document, respond_with, respond_with_document
+from app.http.errors import find_http_status
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -163,7 +163,7 @@ class EditedItem(Document):
             view=item.view,
             outcome=item.outcome,
             etag=item.etag,
-            status=None if error is None else http_status(error),
+            status=None if error is None else find_http_status(error),
             problem=None if error is None else error.message,
             hint=None if error is None else error.hint,
             pointer=None if error is None else error.pointer,
@@ -200,7 +200,7 @@ class BulkEditDocument(Document):
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@responds(as_document(BulkEditDocument.of))
+@respond_with(respond_with_document(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,
     edit: BulkEdit,

@@ -21,7 +21,11 @@ from app.geometry.camera import Camera
 from app.media.files import read_pixels
 from app.media.frames import refused_picture
 from app.paint.evidence import Image
-from app.paint.view_paint import hiding_boxes, read_paint_of_image, why_unreadable
+from app.paint.view_paint import (
+    choose_hiding_boxes,
+    explain_unreadable_picture,
+    read_paint_of_image,
+)
 from app.paint.view_proposal import ViewProposal, keep_undrawn_markings, propose_lines_in_image
 from app.soccer.annotation import Lines
 from app.soccer.codec import digest
@@ -93,7 +97,7 @@ class PaintTask:
 
 def digest_people_boxes(view: View) -> str:
     """Digest of the boxes that hide paint in a view; empty where there are none."""
-    boxes = hiding_boxes(view.extras.places, view.size)
+    boxes = choose_hiding_boxes(view.extras.places, view.size)
     if not boxes:
         return ""
     return digest(sorted([box.x, box.y, box.width, box.height] for box in boxes))
@@ -159,7 +163,7 @@ def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintRead
     clicked = task.clicked or calibrate_from_clicks(task.group, task.view, policy)
     if clicked.camera is None:
         return None
-    if why_unreadable(image, size) is not None:
+    if explain_unreadable_picture(image, size) is not None:
         return replace(task.reading_without_frame, frame=frame)
     seen = read_paint_of_image(
         image, size, clicked, task.group.pitch, policy, task.view.extras.places

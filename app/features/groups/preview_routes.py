@@ -32,7 +32,7 @@ from app.log import log_to_stderr
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.solve import solve, warm_up
+from app.solving.solve import solve, warm_up_solver
 from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
 
@@ -134,7 +134,7 @@ class LargeGroupSolver:
 def prepare_solver_process() -> None:
     """In the process: give way to others, and load the solver's kernels."""
     os.nice(NICENESS)
-    warm_up()
+    warm_up_solver()
     gc.collect()
     gc.freeze()
 
@@ -229,7 +229,7 @@ def prepare_preview_process(settings: Settings) -> None:
     """In the process: open the database and load the solver's kernels."""
     log_to_stderr(settings.log_format)
     _store_of_process(settings)
-    warm_up()
+    warm_up_solver()
     gc.collect()
     gc.freeze()
 

@@ -28,8 +28,8 @@ from app.features.people.roles import role_allows
 from app.features.queue import service as queue
 from app.features.queue.routes import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
 from app.features.queue.service import MatchingGroups
-from app.http.access import current_login
-from app.http.cursor import foreign_cursor, paged
+from app.http.access import get_current_login
+from app.http.cursor import foreign_cursor_error, paged
 from app.http.deps import (
     Actor,
     AppServices,
@@ -38,10 +38,10 @@ from app.http.deps import (
     Id,
     IfMatch,
     QueryText,
-    etag_matches,
+    is_not_modified,
 )
-from app.http.documents import Document, responds
-from app.http.errors import current_state
+from app.http.documents import Document, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import COMPUTE, limit
@@ -167,8 +167,8 @@ def list_groups(
         page = queue.list_groups(store, found, query, limit, cursor, start)
     except (OverflowError, UnicodeEncodeError) as error:
         # A forged cursor can hold what the database cannot.
-        raise foreign_cursor() from error
-    login = current_login(request.scope)
+        raise foreign_cursor_error() from error
+    login = get_current_login(request.scope)
     judges = login is None or role_allows(login.roles.role_in(found), Action.REVIEW)
     items = [GroupRow.of(row, judges) for row in page.items]
     return GroupPage(items=items, next=page.next, total=page.total)
@@ -203,7 +203,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
     if "if-none-match" in request.headers:
         etag = submit.read_group_etag(store, group)
-        if etag_matches(request, etag):
+        if is_not_modified(request, etag):
             return Response(status_code=304, headers={"ETag": etag})
     return group_response(submit.load_solved(store, group))
 
@@ -270,11 +270,11 @@ async def preview_group(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
     store = services.store
-    with current_state(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_document(store, group)):
         return history.undo_group_edit(
             store, group, if_match=if_match, actor=actor, paint=services.paint
         )
@@ -287,11 +287,11 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
-    with current_state(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_document(store, group)):
         return history.redo_group_edit(
             store, group, if_match=if_match, actor=actor, paint=services.paint
         )

@@ -21,12 +21,12 @@ from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.calibrate import calibrate_station, shortest_counted_marking_px
 from app.solving.calibration_findings import READ_PAINT
 from app.solving.jaccard import (
-    as_evaluator_markings,
+    classify_markings,
+    find_unannotated_not_missing,
     jaccard,
-    marking_outcomes,
     measure_markings,
     project_markings,
-    unannotated_not_missing,
+    project_markings_like_evaluator,
 )
 
 
@@ -394,14 +394,14 @@ def _jac_and_distance_without(
     """JaC of the other markings, and the largest distance of this one."""
     pitch, size, lines = policy.fitted(pitch), station.size, station.lines
     measured = measure_markings(project_markings(camera, pitch, size), lines)
-    judged = as_evaluator_markings(camera, pitch, size, lines, measured)
-    for short in unannotated_not_missing(
+    judged = project_markings_like_evaluator(camera, pitch, size, lines, measured)
+    for short in find_unannotated_not_missing(
         judged, lines, station.not_visible, shortest_counted_marking_px(policy, size)
     ):
         del judged[short]
     values = []
     for gamma in GAMMAS_PERCENT:
-        found = marking_outcomes(judged, lines, gamma / 100 * size.diagonal)
+        found = classify_markings(judged, lines, gamma / 100 * size.diagonal)
         found.pop(marking, None)
         values.append(jaccard(found))
     seen = measured.get(marking) or judged.get(marking)

@@ -31,10 +31,10 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import (
     calibrate_from_clicks,
-    click_calibration_key,
-    paint_search_key,
-    usable_paint_reading,
-    view_key,
+    compute_click_calibration_key,
+    compute_paint_search_key,
+    compute_view_key,
+    find_usable_paint_reading,
 )
 from app.solving.observations import principal_point
 from app.worker_pool import PoolTask
@@ -115,7 +115,7 @@ def _make_request(session: Session, view_id: int, lines: LineChanges) -> ViewPai
     known = read_known_calibrations(session, [group], policy)
     changed = next(item for item in group.views if item.key == view.key)
     # What the lines alone make: what was read of the paint before has no part in what is read.
-    start = known.get(click_calibration_key(group, changed, policy.calibration))
+    start = known.get(compute_click_calibration_key(group, changed, policy.calibration))
     return ViewPaintRequest(
         group,
         changed,
@@ -155,7 +155,7 @@ def list_nearby_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, 
     found = []
     for group in groups:
         for view in group.views[:1]:
-            item = known.get(view_key(group, view, policy))
+            item = known.get(compute_view_key(group, view, policy))
             if item is not None and item.camera is not None and not item.unobservable:
                 found.append((item.camera, view.size))
     return tuple(camera for camera, size in found if _has_plain_lens(camera, size))
@@ -241,11 +241,11 @@ def _outdated_tasks(
     if policy.source != "paint" or not group.paint:
         return
     for view in group.views:
-        reading = usable_paint_reading(group, view, policy)
+        reading = find_usable_paint_reading(group, view, policy)
         if reading is None and (view.media is None or not view.can_use_paint):
             continue
-        key = paint_search_key(group, view, policy)
-        clicked = known.get(click_calibration_key(group, view, policy))
+        key = compute_paint_search_key(group, view, policy)
+        clicked = known.get(compute_click_calibration_key(group, view, policy))
         # Clicks that were seen to make no camera say nowhere where to look.
         is_lost = clicked is not None and clicked.camera is None
         if (reading is None or reading.sought_for != key) and not is_lost:

@@ -35,9 +35,9 @@ from app.features.groups.submit import FoundView, find_view, submit_view_edit
 from app.features.groups.view_paint import NO_FRAME_HINT
 from app.features.solutions.service import Solve, solve_encoded
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, Id, IfMatch, Services, etag_matches
-from app.http.documents import responds
-from app.http.errors import current_state
+from app.http.deps import Actor, AppServices, Id, IfMatch, Services, is_not_modified
+from app.http.documents import respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, is_large, limit
@@ -75,7 +75,7 @@ FRAME: Responses = {
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_response)
+@respond_with(group_response)
 def patch_lines(
     view: Id,
     lines: LinesEdit,
@@ -102,7 +102,7 @@ def patch_lines(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_response)
+@respond_with(group_response)
 def patch_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
@@ -122,7 +122,7 @@ def patch_ball(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_response)
+@respond_with(group_response)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
@@ -148,7 +148,7 @@ def _submit_view_edit(
     solve: Solve = solve_encoded,
 ) -> GroupState:
     store, paint = services.store, services.paint
-    with current_state(lambda: load_document_of_view(store, view)):
+    with add_current_state_to_conflicts(lambda: load_document_of_view(store, view)):
         return submit_view_edit(
             store, view, edit_of, if_match=if_match, actor=actor, paint=paint, solve=solve
         )
@@ -191,7 +191,7 @@ async def get_image(
         return Response(status_code=CLIENT_GONE)
     etag = f'"{picture.digest}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
-    if etag_matches(request, etag):
+    if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
     return Response(picture.data, media_type=picture.kind, headers=headers)
 

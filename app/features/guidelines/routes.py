@@ -13,8 +13,8 @@ from app.features.independent_annotations.routes import (
     GuidelinesEdit,
     NewGuidelinePicture,
 )
-from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
-from app.http.documents import as_document, document, responds
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, is_not_modified
+from app.http.documents import document, respond_with, respond_with_document
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -51,7 +51,7 @@ def get_guidelines(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(document)
+@respond_with(document)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
 ) -> guidelines.Guidelines:
@@ -69,7 +69,7 @@ def write_guidelines(
     responses=responses(404, 409, 413, 415, 503),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
-@responds(as_document(GuidelinePictureDocument.model_validate, 201))
+@respond_with(respond_with_document(GuidelinePictureDocument.model_validate, 201))
 def add_picture(
     dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
 ) -> guidelines.GuidelinePicture:
@@ -100,6 +100,6 @@ def get_picture(
     """A picture of the guidelines."""
     picture = guidelines.read_picture(store, dataset, digest)
     headers = {"ETag": f'"{digest[:16]}"', "Cache-Control": "private, max-age=86400"}
-    if etag_matches(request, headers["ETag"]):
+    if is_not_modified(request, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     return Response(picture.body, media_type=picture.type, headers=headers)

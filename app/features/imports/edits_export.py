@@ -32,7 +32,7 @@ from app.features.imports.queries import (
 )
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.output import output_anywhere
+from app.formats.output import open_output
 from app.json_text import canonical, json_text
 from app.progress import ReportProgress
 from app.soccer.codec import (
@@ -67,9 +67,9 @@ def export_edits(
         dataset: Name or id.
         out: Folder, or file that ends in .zip; appears whole or not at all.
         progress: Called as groups are written, and as their files are packed.
-        beside: After which its half written files are called, see ``output_anywhere``.
+        beside: After which its half written files are called, see ``open_output``.
     """
-    output = output_anywhere(out, store.settings.exports, beside, progress)
+    output = open_output(out, store.settings.exports, beside, progress)
     with store.read() as session, output as root:
         found = read_dataset_head(session, dataset)
         counts = {

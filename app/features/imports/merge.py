@@ -58,7 +58,7 @@ from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report
-from app.formats.trees import opened_tree
+from app.formats.trees import open_tree_while_read
 from app.progress import ReportProgress
 from app.soccer.codec import station_digest, station_to_json
 from app.soccer.group import Group, Station
@@ -243,7 +243,7 @@ def merge_edits(
         dry_run: Dry run: report what would happen, change nothing.
     """
     result = IngestReport()
-    with opened_tree(path, report, limits) as tree:
+    with open_tree_while_read(path, report, limits) as tree:
         if tree is None:
             return result
         try:

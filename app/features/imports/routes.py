@@ -33,7 +33,7 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import make_job_response, openapi_of_job_response
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees, Services
-from app.http.documents import no_content, responds
+from app.http.documents import make_empty_response, respond_with
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -75,7 +75,7 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
         "options/lines/folder": OwnedKind.FOLDER,
     },
 )
-@responds(make_job_response)
+@respond_with(make_job_response)
 def start_import(
     request: ImportBody, services: AppServices, actor: Actor, dry_run: DryRun = False
 ) -> Job:
@@ -319,7 +319,7 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_one(upload: UploadId, services: AppServices, visibility: Sees) -> None:
     """Delete a file; 400 while a dataset reads its frames from it.
 

@@ -51,7 +51,7 @@ from app.features.verdicts.queries import (
     insert_verdicts,
     read_last_verdicts,
 )
-from app.features.webhooks.queries import HANDED_BACK, announce, time_suffix
+from app.features.webhooks.queries import HANDED_BACK, make_time_suffix, queue_webhook_messages
 from app.soccer.actors import person_of
 from app.soccer.group import Group, Station
 
@@ -314,8 +314,10 @@ def _announce_return(
     if row is not None:
         where = need_group(session, row.group_id).dataset_id
         details = {"group": row.group_id, "person": person, "copy": group.id}
-    event = f"group{group.id}_handed_back{time_suffix(at)}"
-    announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=details)
+    event = f"group{group.id}_handed_back{make_time_suffix(at)}"
+    queue_webhook_messages(
+        session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=details
+    )
 
 
 def strip_and_check_reason(reason: str) -> str:

@@ -16,8 +16,8 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.annotation_distance import (
     DistanceFromTruth,
     TrueView,
-    distance_from_truth,
-    world_error,
+    measure_distance_from_truth,
+    measure_error_in_world,
 )
 from app.features.datasets.service import need_dataset
 from app.features.groups.state import GroupState, need_group, read_states
@@ -353,9 +353,9 @@ def _gold_result(
     verdict, judged = submission.verdict, truth["verdict"] in JUDGED
     annotated = rename_views_as_original(group, submission.group)
     if ball is not None and "views" in truth:
-        error = world_error(group, true_views(truth), annotated, ball, own)
+        error = measure_error_in_world(group, true_views(truth), annotated, ball, own)
     else:
-        error = distance_from_truth(group, annotated, ball, own)
+        error = measure_distance_from_truth(group, annotated, ball, own)
     return GoldResult(
         group=gold.group,
         label=gold.label,

@@ -45,7 +45,7 @@ from app.soccer.codec import group_inputs_hash, paint_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
-from app.solving.calibrate import view_keys
+from app.solving.calibrate import compute_view_keys
 from app.solving.facts import facts_from_bytes
 
 DATASET, DELETED = "dataset", "dataset_deleted"
@@ -266,7 +266,7 @@ def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
     if [view.key for view in group.views] != [view.view for view in solution.views]:
         return False
     return all(
-        solved.calibration_key in view_keys(group, view, policy.calibration)
+        solved.calibration_key in compute_view_keys(group, view, policy.calibration)
         for view, solved in zip(group.views, solution.views, strict=True)
     )
 

@@ -19,7 +19,7 @@ from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
 from app.features.datasets.queries import has_more_groups
 from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
-from app.formats.export_formats import missing_for_use
+from app.formats.export_formats import describe_missing_content
 from app.progress import ReportProgress
 from app.wording import counted, plural
 from app.worker_process import EndReason, WorkerEnded
@@ -341,7 +341,7 @@ def _import_sentence(result: Json) -> str:
 def _export_sentence(result: Json) -> str:
     counts = result["counts"]
     written = ", ".join(counted(count, name) for name, count in counts.items())
-    missing = missing_for_use(result.get("format", ""), counts)
+    missing = describe_missing_content(result.get("format", ""), counts)
     return f"Written: {written}." + ("" if missing is None else f" {missing}.")
 
 

@@ -37,8 +37,8 @@ from app.soccer.group import Group, SharedPosition, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
-from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.match_position import FramePlace, Places, pan_of, place_of
+from app.solving.calibrate import calibrate_station, compute_calibration_key
+from app.solving.match_position import FramePlace, Places, find_camera_place, find_pan
 from app.workers.executors import fan_out
 
 _BATCH = 100
@@ -324,7 +324,7 @@ def _make_task(
         for start in range(0, len(item.groups), _BATCH):
             stored = read_groups(session, item.groups[start : start + _BATCH], extras=False)
             keys = {
-                number: calibration_key(it.group.views[0].station, it.group.pitch, policy)
+                number: compute_calibration_key(it.group.views[0].station, it.group.pitch, policy)
                 for number, it in stored.items()
             }
             known = read_calibrations(session, keys.values())
@@ -350,7 +350,7 @@ def _estimate_match(
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without(next(row))
-        pan = None if calibration is None else pan_of(calibration)
+        pan = None if calibration is None else find_pan(calibration)
         near = None if pan is None else others.prior(pan)
         at = {}
         if near is not None:
@@ -376,7 +376,7 @@ def _calibrated_alone(
         if alone.source != "lines":
             yield picture, None, None
             continue
-        yield picture, alone, place_of(alone, station.size)
+        yield picture, alone, find_camera_place(alone, station.size)
 
 
 def _rounded_position(values: np.ndarray) -> tuple[float, float, float]:

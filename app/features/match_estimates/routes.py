@@ -21,7 +21,7 @@ from app.features.policies.service import read_policy
 from app.features.solve.jobs import change_and_solve
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
-from app.http.documents import Document, ListDocument, document, responds
+from app.http.documents import Document, ListDocument, document, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -173,7 +173,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
     "", operation_id="sharePositions", **openapi_of_job_response(404, 409, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def share_positions(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -188,7 +188,7 @@ def share_positions(
 
 @positions_router.delete("", operation_id="revertPositions", **openapi_of_job_response(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def take_back_positions(
     dataset: DatasetPath,
     services: AppServices,
@@ -208,7 +208,7 @@ def take_back_positions(
     **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def adjust_rig(
     dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -233,7 +233,7 @@ def _taken_back(count: int) -> Response:
     responses=responses(404, 409),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_taken_back)
+@respond_with(_taken_back)
 def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
     return take_rig_back(services.jobs, services.store, dataset, actor=actor)
@@ -256,7 +256,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
 @noise_router.post("", operation_id="acceptNoise", **openapi_of_job_response(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
 
@@ -274,7 +274,7 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
 @noise_router.delete("", operation_id="revertNoise", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
 
@@ -299,7 +299,7 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
     "", operation_id="estimateMatchPictures", **openapi_of_job_response(404, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def estimate_match_pictures(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -313,7 +313,7 @@ def estimate_match_pictures(
 
 @pictures_router.patch("", operation_id="setMatchPicture", **openapi_of_job_response(404, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def set_match_picture(
     dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
 ) -> Job:

@@ -11,9 +11,9 @@ from app.features.notifications import service as bell
 from app.features.notifications.queries import Notification
 from app.features.notifications.service import NotificationState
 from app.features.people.session_routes import Me
-from app.http.cursor import Before, Cursor, first_below
+from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
-from app.http.documents import ListDocument, as_document, responds
+from app.http.documents import ListDocument, respond_with, respond_with_document
 from app.http.permissions import Action, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -52,7 +52,7 @@ def get_notifications(
     before: Before = None,
 ) -> NotificationsDocument:
     """What one was told in the last 90 days, of what one sees now, the newest first."""
-    found = bell.read_notifications(store, me, limit + 1, first_below(cursor, before))
+    found = bell.read_notifications(store, me, limit + 1, parse_descending_cursor(cursor, before))
     document = NotificationsDocument.model_validate(found)
     if len(document.items) > limit:
         document.items = document.items[:limit]
@@ -67,7 +67,7 @@ def get_notifications(
     responses=responses(401, 409, 413, 415),
 )
 @may(Action.ACCOUNT)
-@responds(as_document(NotificationsDocument.model_validate))
+@respond_with(respond_with_document(NotificationsDocument.model_validate))
 def mark_notifications_read(
     body: SeenNotifications, store: AppStore, _team: AppTeam, me: Me
 ) -> NotificationState:

@@ -36,7 +36,7 @@ from app.features.paint.proposals import get_group_proposals, get_proposals
 from app.features.paint.service import PaintState, get_paint
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
-from app.http.documents import Document, ListDocument, document, responds
+from app.http.documents import Document, ListDocument, document, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -202,7 +202,7 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     "", operation_id="readDatasetPaint", **openapi_of_job_response(404, 409, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def read_paint(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -216,7 +216,7 @@ def read_paint(
 
 @paint_router.delete("", operation_id="revertDatasetPaint", **openapi_of_job_response(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Give all groups what they had before paint was read last; the job solves them.
 
@@ -303,7 +303,7 @@ def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDoc
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def accept_proposed_lines(
     dataset: DatasetPath,
     request: DatasetProposalsRequest,
@@ -336,7 +336,7 @@ def _forgotten_response(gone: int) -> Response:
     responses=responses(404),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_forgotten_response)
+@respond_with(_forgotten_response)
 def forget(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
 

@@ -41,7 +41,7 @@ from app.media.frames import VideoIndexer
 from app.progress import ReportProgress
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import click_calibration_key, paint_search_key
+from app.solving.calibrate import compute_click_calibration_key, compute_paint_search_key
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 
@@ -282,9 +282,9 @@ def _group_tasks(
     group = stored.group
     for view in group.views:
         if view.can_use_paint:
-            clicked = known.get(click_calibration_key(group, view, policy))
+            clicked = known.get(compute_click_calibration_key(group, view, policy))
             alone = replace(group, views=(view,), paint={})
-            key, old = paint_search_key(group, view, policy), group.paint.get(view.key)
+            key, old = compute_paint_search_key(group, view, policy), group.paint.get(view.key)
             yield PaintTask(alone, policy, key, clicked, old)
 
 

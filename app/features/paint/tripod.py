@@ -11,7 +11,7 @@ from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.paint.queries import PAINT, insert_readings, match_paint
 from app.soccer.paint_evidence import PaintReading
-from app.solving.match_tripod import readings_of_one_tripod
+from app.solving.match_tripod import solve_readings_of_one_tripod
 
 
 def share_tripods(
@@ -40,7 +40,7 @@ def share_tripods(
         with store.read() as session:
             groups = {it.id: it.group for it in read_groups(session, item.painted).values()}
         before = {number: group.paint.get(group.views[0].key) for number, group in groups.items()}
-        after = readings_of_one_tripod(groups, dataset.policy.calibration)
+        after = solve_readings_of_one_tripod(groups, dataset.policy.calibration)
         changed = {number: read for number, read in after.items() if read != before[number]}
         if not changed:
             continue

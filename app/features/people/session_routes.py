@@ -36,10 +36,10 @@ from app.features.people.schemas import (
 )
 from app.features.people.service import read_single_roles
 from app.features.people.sign_on_rules import read_login_ways, unlink_identity, unlink_person
-from app.http.access import current_login
+from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, Id
-from app.http.headers import bearer_token
+from app.http.headers import read_bearer_token
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -61,7 +61,7 @@ async def get_login(request: Request) -> Login:
     Raises:
         NotLoggedInError: Nobody is.
     """
-    login = current_login(request.scope)
+    login = get_current_login(request.scope)
     if login is None:
         raise NotLoggedInError("you are not logged in", hint="Log in first.")
     return login
@@ -106,7 +106,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             may=every,
             allows=ALLOWS,
         )
-    bearer = bearer_token(request.scope)
+    bearer = read_bearer_token(request.scope)
     login = team.login(request) if bearer is None else team.login_with(bearer, request)
     found = make_session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules

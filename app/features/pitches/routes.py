@@ -20,8 +20,8 @@ from app.features.pitches.service import DatasetPitches, read_pitches
 from app.features.solve.jobs import PitchJob, request_pitches, request_solve
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.documents import Document, ListDocument, document, responds
-from app.http.errors import current_state
+from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
@@ -151,7 +151,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
 
 @pitches_router.post("", operation_id="estimatePitches", **openapi_of_job_response(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
 
@@ -177,7 +177,7 @@ def _sized_response(sized: PitchJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_sized_response)
+@respond_with(_sized_response)
 def set_pitch(
     dataset: DatasetPath,
     change: PitchChange,
@@ -192,7 +192,9 @@ def set_pitch(
     """
     store = services.store
     present = read_pitches(store, dataset)
-    with current_state(lambda: PitchesDocument.model_validate(read_pitches(store, dataset))):
+    with add_current_state_to_conflicts(
+        lambda: PitchesDocument.model_validate(read_pitches(store, dataset))
+    ):
         return request_pitches(
             services.jobs,
             store,

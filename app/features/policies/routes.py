@@ -22,8 +22,8 @@ from app.features.policies.service import (
 from app.features.solve.jobs import PolicyJob, request_policy
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.documents import document, responds
-from app.http.errors import current_state
+from app.http.documents import document, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
@@ -79,7 +79,7 @@ def _judged_response(judged: PolicyJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_judged_response)
+@respond_with(_judged_response)
 def put_policy(
     dataset: DatasetPath,
     change: PolicyChange,
@@ -95,7 +95,9 @@ def put_policy(
     store = services.store
     present = read_policy(store, dataset)
     policy = policy_of_request(change, present.policy)
-    with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
+    with add_current_state_to_conflicts(
+        lambda: PolicyStateDocument.of(read_policy(store, dataset))
+    ):
         return request_policy(
             services.jobs, store, present.dataset_id, policy, if_match=if_match, actor=actor
         )

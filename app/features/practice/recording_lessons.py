@@ -14,7 +14,7 @@ from app.formats.camera_json import camera_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.track import FrameCamera
 from app.wording import plural
 
@@ -175,7 +175,7 @@ def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Recording
     }
     away = [_apart_m(truth.cameras[number], camera) for number, camera in found.items()]
     turned = [
-        _apart_m(truth.cameras[number], turned_camera(camera)) for number, camera in found.items()
+        _apart_m(truth.cameras[number], turn_camera(camera)) for number, camera in found.items()
     ]
     is_right = bool(away) and float(np.median(away)) < float(np.median(turned))
     if not away:

@@ -19,9 +19,9 @@ from app.features.practice.service import (
     read_practice,
     request_practice,
 )
-from app.http.access import current_login
+from app.http.access import get_current_login
 from app.http.deps import Actor, AppServices, Id, Sees
-from app.http.documents import Document, responds
+from app.http.documents import Document, respond_with
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -102,7 +102,7 @@ class RecordingPracticeDocument(Document):
 
 async def _practice_person(request: Request) -> str | None:
     """Whose practice it is; None where nobody logs in."""
-    login = current_login(request.scope)
+    login = get_current_login(request.scope)
     return None if login is None else login.name
 
 
@@ -130,7 +130,7 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
     **openapi_of_job_response(409, 413, 415, 503),
 )
 @may(Action.ANNOTATE, where=Where.OWN)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def start_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
 ) -> Job:
@@ -171,7 +171,7 @@ def get_recording_practice(
     **openapi_of_job_response(409, 413, 415, 503),
 )
 @may(Action.ANNOTATE, where=Where.OWN)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def start_recording_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
 ) -> Job:

@@ -14,7 +14,7 @@ from app.db.log import LogEntry, group_entries, single_edits
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
-from app.evaluation.prediction_run import box_problem
+from app.evaluation.prediction_run import find_box_problem
 from app.features.datasets.service import read_dataset_head
 from app.features.groups.edit import SetBalls, need_view, set_ball
 from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
@@ -270,7 +270,7 @@ def _judge_box(
 def _box_problem(box: PredictedBox, view: StoredView) -> str | None:
     """Why a box cannot be a ball in its view."""
     place = Box(box.x, box.y, box.width, box.height)
-    return box_problem(place, ImageSize(view.width, view.height))
+    return find_box_problem(place, ImageSize(view.width, view.height))
 
 
 def _by_group(items: Sequence[AcceptedView]) -> Iterator[tuple[int, list[AcceptedView]]]:

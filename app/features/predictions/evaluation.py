@@ -18,7 +18,7 @@ from app.evaluation.comparison import (
     FrameComparison,
     compare_frames,
     compare_tables,
-    differing_pins,
+    list_differing_settings,
 )
 from app.evaluation.result import (
     NUMBERS,
@@ -26,9 +26,9 @@ from app.evaluation.result import (
     Figure,
     FrameResult,
     Table,
-    figure_csv,
-    figure_png,
-    table_csv,
+    figure_to_csv,
+    figure_to_png,
+    table_to_csv,
 )
 from app.evaluation.track_scores import TrueTrack, evaluate_tracks
 from app.features.audit.service import add_audit_event
@@ -221,7 +221,7 @@ def compare_runs(
             [FrameResult(**row) for row in frame_rows.read_frame_rows(session, item.id)]
             for item in (first, second)
         ]
-    differs = differing_pins(first.pins, second.pins)
+    differs = list_differing_settings(first.pins, second.pins)
     return RunComparison(
         first,
         second,
@@ -274,7 +274,7 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
 
     def fetch(kind: str, name: str, file: Path) -> None:
         if kind == "tables":
-            file.write_text(table_csv(tables[name]), encoding="utf-8")
+            file.write_text(table_to_csv(tables[name]), encoding="utf-8")
             return
         title, _, ending = name.rpartition(".")
         file.write_bytes(_figure_content(figure(title), ending))
@@ -317,8 +317,8 @@ def write_parts(
 def _figure_content(figure: Figure, ending: str) -> bytes:
     """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
     if ending == "png":
-        return figure_png(figure)
-    text = figure_csv(figure) if ending == "csv" else solution_json_text(to_json(figure)) + "\n"
+        return figure_to_png(figure)
+    text = figure_to_csv(figure) if ending == "csv" else solution_json_text(to_json(figure)) + "\n"
     return text.encode()
 
 

@@ -19,9 +19,9 @@ from app.evaluation.result import (
     Figure,
     FrameResult,
     Table,
-    figure_csv,
-    figure_png,
-    table_csv,
+    figure_to_csv,
+    figure_to_png,
+    table_to_csv,
 )
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import make_job_response, openapi_of_job_response
@@ -33,8 +33,8 @@ from app.features.versions.routes import VersionId
 from app.features.versions.service import find_version_id
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, document, no_content, responds
-from app.http.headers import content_disposition
+from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
@@ -246,7 +246,7 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     dataset=OwnedKind.DATASET,
     body={"predictions": OwnedKind.PREDICTIONS, "careful": OwnedKind.PREDICTIONS},
 )
-@responds(make_job_response)
+@respond_with(make_job_response)
 def start_evaluation(
     dataset: DatasetPath, request: EvaluationBody, services: AppServices, actor: Actor
 ) -> Job:
@@ -279,7 +279,7 @@ def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     responses=responses(404),
 )
 @may(Action.LEAD, evaluation=OwnedKind.EVALUATION)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     """Delete an evaluation; its predictions stay."""
     review.remove_evaluation(store, evaluation, actor=actor)
@@ -305,9 +305,9 @@ def get_figure(
     if ending == "json":
         return document(found)
     if ending == "csv":
-        return _csv_response(figure_csv(found), name)
-    shown = {"Content-Disposition": content_disposition(name, "inline")}
-    return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
+        return _csv_response(figure_to_csv(found), name)
+    shown = {"Content-Disposition": make_content_disposition(name, "inline")}
+    return Response(figure_to_png(found), media_type=PNG_FILE, headers=shown)
 
 
 @router.get(
@@ -331,7 +331,7 @@ def get_table(
         )
     if ending == "json":
         return document(found)
-    return _csv_response(table_csv(found), f"touchline-{evaluation}-{table}.csv")
+    return _csv_response(table_to_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
 @router.get(
@@ -387,5 +387,5 @@ def compare_evaluations(
 
 
 def _csv_response(text: str, name: str) -> Response:
-    saved = {"Content-Disposition": content_disposition(name)}
+    saved = {"Content-Disposition": make_content_disposition(name)}
     return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

@@ -16,7 +16,7 @@ from app.features.groups.view_queries import find_group_and_view_ids
 from app.features.versions.membership import read_candidates, require_solved
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.json_text import quoted
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
 from app.soccer.choices import LiveRule
@@ -166,7 +166,7 @@ def make_truth_pins(
         "policy": policy_to_json(policy),
         "policy_hash": policy.hash,
         "solver_version": solver_version,
-        "software_version": software_version(),
+        "software_version": read_software_version(),
     }
 
 

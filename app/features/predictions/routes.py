@@ -36,8 +36,8 @@ from app.features.predictions.schemas import (
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.http.documents import document, no_content, responds
-from app.http.errors import current_state
+from app.http.documents import document, make_empty_response, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -82,7 +82,7 @@ def _added_response(found: review.PredictionSet) -> Response:
         "cameras_upload": OwnedKind.UPLOAD,
     },
 )
-@responds(_added_response)
+@respond_with(_added_response)
 def add_predictions(
     dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
 ) -> review.PredictionSet:
@@ -122,7 +122,7 @@ def _accepted_response(found: AcceptReport | Job) -> Response:
     },
 )
 @may(Action.LEAD, body={"dataset": OwnedKind.DATASET, "predictions": OwnedKind.PREDICTIONS})
-@responds(_accepted_response)
+@respond_with(_accepted_response)
 def accept_predictions(
     request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
 ) -> AcceptReport | Job | Response:
@@ -158,7 +158,7 @@ def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     responses=responses(404),
 )
 @may(Action.LEAD, predictions=OwnedKind.PREDICTIONS)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
     review.delete_predictions(store, predictions, actor=actor)
@@ -195,7 +195,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_response)
+@respond_with(group_response)
 def accept_prediction(
     view: Id,
     prediction: Id,
@@ -207,7 +207,7 @@ def accept_prediction(
     ] = False,
 ) -> GroupState:
     """Make this very prediction the ball of its view: an edit that can be undone."""
-    with current_state(lambda: load_document_of_view(store, view)):
+    with add_current_state_to_conflicts(lambda: load_document_of_view(store, view)):
         return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
 
 

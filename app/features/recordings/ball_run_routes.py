@@ -24,8 +24,8 @@ from app.features.recordings.ball_runs import (
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
-from app.http.documents import document, no_content, responds
-from app.http.errors import current_state
+from app.http.documents import document, make_empty_response, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -74,7 +74,7 @@ def get_runs(recording: Id, services: AppServices) -> BallRunList:
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
-@responds(_made)
+@respond_with(_made)
 def add_one(
     recording: Id, wanted: BallClickRequest, services: AppServices, actor: Actor
 ) -> StoredRun:
@@ -107,7 +107,7 @@ def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
-@responds(_tagged)
+@respond_with(_tagged)
 def mend_one(
     recording: Id,
     run: RunId,
@@ -118,7 +118,7 @@ def mend_one(
 ) -> StoredRun:
     """Say where the ball is in one more frame, and follow it from there, up to where both agree."""
     store, click = services.store, wanted.value()
-    with current_state(lambda: BallRunFrames.of(get_run(store, recording, run))):
+    with add_current_state_to_conflicts(lambda: BallRunFrames.of(get_run(store, recording, run))):
         return mend_run(store, services.balls, recording, run, click, if_match, actor=actor)
 
 
@@ -129,7 +129,7 @@ def mend_one(
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(_tagged)
+@respond_with(_tagged)
 def change_one(
     recording: Id,
     run: RunId,
@@ -144,7 +144,7 @@ def change_one(
     that somebody else said stays. Taken back, exactly those balls go.
     """
     store = services.store
-    with current_state(lambda: BallRunFrames.of(get_run(store, recording, run))):
+    with add_current_state_to_conflicts(lambda: BallRunFrames.of(get_run(store, recording, run))):
         return change_run(
             store, recording, run, wanted.value(), if_match, actor=actor, paint=services.paint
         )
@@ -158,7 +158,7 @@ def change_one(
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_one(recording: Id, run: RunId, store: AppStore, actor: Actor) -> None:
     """Delete a ball run; balls that views have from it stay."""
     remove_run(store, recording, run, actor=actor)

@@ -27,9 +27,9 @@ from app.features.recordings.cameras import (
     read_cameras,
 )
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches
-from app.http.documents import document, responds
-from app.http.headers import content_disposition
+from app.http.deps import Actor, AppServices, AppStore, Id, is_not_modified
+from app.http.documents import document, respond_with
+from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
@@ -71,7 +71,7 @@ def get_stretches(recording: Id, store: AppStore) -> CamerasList:
     **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def track_cameras(
     recording: Id, wanted: CamerasRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -105,7 +105,7 @@ def get_stretch(
     pitch = pitch_of(store, recording)
     tag = f'"{digest}-{pitch.length:g}-{pitch.width:g}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    if etag_matches(request, tag):
+    if is_not_modified(request, tag):
         return Response(status_code=304, headers=headers)
     frames = read_cameras(store.settings, digest)
     return document(FrameCamerasDocument.of(frames, pitch), 200, headers)
@@ -117,7 +117,7 @@ def get_stretch(
     **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def turn_stretch(
     recording: Id, frame: Frame, wanted: CamerasChange, services: AppServices, actor: Actor
 ) -> Job:
@@ -153,7 +153,7 @@ def get_file(
     found = get_cameras(store, recording, frame)
     name, content = camera_output(store, found, form)
     headers = {
-        "Content-Disposition": content_disposition(name),
+        "Content-Disposition": make_content_disposition(name),
         "Cache-Control": "private, no-cache",
     }
     return Response(content, media_type=MEDIA_TYPES[form], headers=headers)

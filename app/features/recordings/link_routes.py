@@ -24,8 +24,8 @@ from app.features.recordings.routes import CSV_FILE
 from app.features.tracks.link_ball import request_ball_link
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
-from app.http.documents import document, no_content, responds
-from app.http.errors import current_state
+from app.http.documents import document, make_empty_response, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -94,7 +94,7 @@ def get_links_file(recording: Id, store: AppStore) -> Response:
     recording=OwnedKind.RECORDING,
     body={"replay/recording": OwnedKind.RECORDING},
 )
-@responds(_made)
+@respond_with(_made)
 def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -> ShotLink:
     """Link a replay to the live shot of this recording that it shows again, without an instant yet."""
     live, replay = wanted.live, wanted.replay
@@ -137,7 +137,7 @@ def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(_tagged)
+@respond_with(_tagged)
 def put_instants(
     recording: Id,
     link: LinkId,
@@ -151,7 +151,9 @@ def put_instants(
     One says where the replay begins, at a speed that is assumed; two say the speed, too; more make both better, and
     tell where the speed changes.
     """
-    with current_state(lambda: LinkDocument.model_validate(get_link(store, recording, link))):
+    with add_current_state_to_conflicts(
+        lambda: LinkDocument.model_validate(get_link(store, recording, link))
+    ):
         return set_instants(
             store,
             recording,
@@ -171,7 +173,7 @@ def put_instants(
     recording=OwnedKind.RECORDING,
     body={"live_upload": OwnedKind.UPLOAD, "replay_upload": OwnedKind.UPLOAD},
 )
-@responds(make_job_response)
+@respond_with(make_job_response)
 def link_by_ball(
     recording: Id, link: LinkId, wanted: BallLinkRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -191,7 +193,7 @@ def link_by_ball(
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_one(recording: Id, link: LinkId, store: AppStore, actor: Actor) -> None:
     """Remove a link and its instants; groups that were taken of it stay."""
     remove_link(store, recording, link, actor=actor)

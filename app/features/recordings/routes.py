@@ -35,9 +35,18 @@ from app.features.recordings.service import (
 )
 from app.features.recordings.shots import RecordingShots, get_shots, put_shots, shots_csv
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, AppStore, DryRun, Id, IfMatch, SeesWhole, etag_matches
-from app.http.documents import as_document, document, no_content, responds
-from app.http.errors import current_state
+from app.http.deps import (
+    Actor,
+    AppServices,
+    AppStore,
+    DryRun,
+    Id,
+    IfMatch,
+    SeesWhole,
+    is_not_modified,
+)
+from app.http.documents import document, make_empty_response, respond_with, respond_with_document
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -78,7 +87,7 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
         "source/folder": OwnedKind.FOLDER,
     },
 )
-@responds(make_job_response)
+@respond_with(make_job_response)
 def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> Job:
     """Bring a video file into a dataset; the job indexes it, and finds its shots.
 
@@ -113,7 +122,7 @@ def get_one(recording: Id, store: AppStore) -> Recording:
     responses=responses(404, 413, 415),
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(as_document(RecordingDocument.model_validate))
+@respond_with(respond_with_document(RecordingDocument.model_validate))
 def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: Actor) -> Recording:
     """Say what the clock of the match shows in frames of a recording; others follow from them.
 
@@ -130,7 +139,7 @@ def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: A
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(no_content)
+@respond_with(make_empty_response)
 def delete_one(recording: Id, store: AppStore, actor: Actor) -> None:
     """Forget a recording and its shots; its file stays, and so do the groups made of it."""
     remove_recording(store, recording, actor=actor)
@@ -156,7 +165,7 @@ async def get_frame(
     sha256, wide = found.require_readable(), clamp_width(width)
     etag = f'"{digest_of(f"{sha256} {frame} {wide}".encode())}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
-    if etag_matches(request, etag):
+    if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
     task = services.recordings.ask(found, frame, wide)
     data = await task.result_unless_client_gone(request.is_disconnected)
@@ -207,18 +216,18 @@ def get_shots_file(recording: Id, store: AppStore) -> Response:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@responds(_tagged)
+@respond_with(_tagged)
 def set_shots(
     recording: Id, wanted: ShotsEdit, store: AppStore, actor: Actor, if_match: IfMatch
 ) -> RecordingShots:
     """Replace the list of shots: split, merged, of another kind, kept or dropped."""
-    with current_state(lambda: ShotList.of(get_shots(store, recording))):
+    with add_current_state_to_conflicts(lambda: ShotList.of(get_shots(store, recording))):
         return put_shots(store, recording, wanted.values(), if_match, actor=actor)
 
 
 @router.post("/{recording}/shots", operation_id="findShots", **openapi_of_job_response(404))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     """Find the shots of a recording anew, in place of the list that it has.
 
@@ -235,7 +244,7 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def take_instants(
     recording: Id,
     wanted: InstantsRequest,

@@ -262,7 +262,7 @@ def recording_of(row: RecordingRow) -> Recording:
 def _problem(path: Path, stamp: str) -> str | None:
     present = file_stamp(path)
     if present is None:
-        return f"{path.name} is not where it was imported from"
+        return f"{path.name} is no longer in the place that it was imported from"
     return None if present == stamp else f"{path.name} has changed since it was indexed"
 
 

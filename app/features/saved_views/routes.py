@@ -15,7 +15,7 @@ from app.features.verdicts import service as reviewers
 from app.features.verdicts.service import Reviewer
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
-from app.http.documents import ListDocument, document, responds
+from app.http.documents import ListDocument, document, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -73,7 +73,7 @@ def _saved_view_response(view: SavedView) -> Response:
     },
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
-@responds(_saved_view_response)
+@respond_with(_saved_view_response)
 def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
     values = view.model_dump()
@@ -98,7 +98,7 @@ def get_saved_view(view: Id, store: AppStore) -> SavedView:
     responses=responses(404),
 )
 @may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
-@responds(document)
+@respond_with(document)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
     return saved_views.delete_view(store, view)

@@ -42,12 +42,12 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
-from app.solving.calibrate import calibrate_station, calibration_key, view_keys
+from app.solving.calibrate import calibrate_station, compute_calibration_key, compute_view_keys
 from app.solving.facts import facts_from_bytes, facts_to_bytes
 from app.solving.solve import (
-    differs_in_smaller_tau,
+    differs_only_in_smaller_tau,
     has_unchanged_pairs,
-    rethreshold,
+    rethreshold_solution,
     solve_with_facts,
 )
 from app.wording import plural
@@ -94,7 +94,12 @@ def describe_contradiction(off: Mapping[str, float], where: str, how: str) -> st
 def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
     """Keys of the calibrations that groups need under a policy, or that those start from."""
     part = policy.calibration
-    return {key for group in groups for view in group.views for key in view_keys(group, view, part)}
+    return {
+        key
+        for group in groups
+        for view in group.views
+        for key in compute_view_keys(group, view, part)
+    }
 
 
 def read_known_calibrations(
@@ -150,7 +155,7 @@ def make_rethreshold_tasks(
     before = {
         item.policy.hash: item.policy
         for item in history
-        if differs_in_smaller_tau(policy, item.policy)
+        if differs_only_in_smaller_tau(policy, item.policy)
     }
     for start in range(0, len(ids) if before else 0, RETHRESHOLDED_AT_ONCE):
         with store.read() as session:
@@ -189,7 +194,7 @@ def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> It
     diagonals = np.split(facts.view_diagonal, ends[:-1])
     for place in np.flatnonzero(same).tolist():
         item = kept[place]
-        solution = rethreshold(item.solution, diagonals[place].tolist(), policy)
+        solution = rethreshold_solution(item.solution, diagonals[place].tolist(), policy)
         if solution is not None:
             key = SolutionKey(item.group_id, item.inputs_hash, policy.hash)
             yield SolveResult(key, item.group, solution.passes, item.encode(solution))
@@ -379,7 +384,7 @@ def _calibrate_static_cameras(store: Store, dataset: DatasetHead) -> None:
     policy = dataset.policy
     with store.read() as session:
         cameras = {
-            calibration_key(station, pitch, policy.calibration): (station, pitch)
+            compute_calibration_key(station, pitch, policy.calibration): (station, pitch)
             for station, pitch in _static_cameras_with_pitches(session, dataset.id)
         }
         known = read_calibration_bodies(session, cameras)

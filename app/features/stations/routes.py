@@ -33,8 +33,8 @@ from app.features.stations.service import (
     undo_station,
 )
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, Services
-from app.http.documents import responds
-from app.http.errors import current_state
+from app.http.documents import respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
@@ -122,7 +122,7 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def patch_lines(
     station: Id,
     lines: LinesEdit,
@@ -147,7 +147,7 @@ def patch_lines(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def patch_station(
     station: Id,
     change: StationEdit,
@@ -168,7 +168,7 @@ def patch_station(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def undo(
     station: Id,
     services: AppServices,
@@ -187,7 +187,7 @@ def undo(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def redo(
     station: Id,
     services: AppServices,
@@ -210,7 +210,7 @@ def _change_station(
     """Change a station with the group in view, and queue the others."""
     store = services.store
     shown = _shown_group(load_station(store, station), group)
-    with current_state(lambda: load_document(store, shown)):
+    with add_current_state_to_conflicts(lambda: load_document(store, shown)):
         state = change(store, station, if_match=if_match, actor=actor, shown=shown)
     with without_response():
         request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)

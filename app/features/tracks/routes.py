@@ -25,8 +25,8 @@ from app.features.tracks.schemas import (
 from app.features.tracks.service import Track
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
-from app.http.documents import document, responds
-from app.http.errors import current_state
+from app.http.documents import document, respond_with
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -77,7 +77,7 @@ def list_tracks(
     **openapi_of_job_response(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def make_tracks(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
@@ -163,10 +163,12 @@ def _tagged(track: Track) -> Response:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.REVIEW, track=OwnedKind.TRACK)
-@responds(_tagged)
+@respond_with(_tagged)
 def change_track(
     track: Id, edit: TrackEdit, store: AppStore, actor: Actor, if_match: IfMatch
 ) -> Track:
     """Accept or reject a track, or say which events it has and has not."""
-    with current_state(lambda: TrackDocument.model_validate(tracks.get_track(store, track))):
+    with add_current_state_to_conflicts(
+        lambda: TrackDocument.model_validate(tracks.get_track(store, track))
+    ):
         return tracks.change_track(store, track, edit.change(), if_match, actor=actor)

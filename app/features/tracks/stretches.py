@@ -24,7 +24,7 @@ from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import ray_covariances
-from app.solving.triangulate import BallObservation, clicked_balls
+from app.solving.triangulate import BallObservation, collect_clicked_balls
 from app.tracking.ball_track import BallMeasurements
 
 RATE = 25.0
@@ -260,7 +260,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
     by_key = {view.key: view for view in views}
     observations = [
         (view_name(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
-        for item in clicked_balls(views, calibrations)
+        for item in collect_clicked_balls(views, calibrations)
     ]
     return _Row(instant, group.pitch, observations, record.point, cameras, unused)
 

@@ -21,8 +21,8 @@ from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import set_verdict
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.http.documents import Document, ListDocument, as_document, document, responds
-from app.http.errors import current_state
+from app.http.documents import Document, ListDocument, document, respond_with, respond_with_document
+from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -163,7 +163,7 @@ class BatchList(ListDocument[BatchDocument]):
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def put_verdict(
     group: Id,
     verdict: VerdictEdit,
@@ -174,7 +174,7 @@ def put_verdict(
 ) -> GroupState:
     """Accept, reject with a reason, defer, or take a verdict back."""
     store, values = services.store, (verdict.state, verdict.reason, verdict.note)
-    with current_state(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_document(store, group)):
         state = set_verdict(store, group, *values, if_match=if_match, actor=actor)
     # A verdict on an independent annotation of a group, and on nothing else, submits that.
     if state.is_copy:
@@ -190,7 +190,7 @@ def put_verdict(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_response)
+@respond_with(group_response)
 def put_dismissal(
     group: Id, body: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
@@ -201,7 +201,7 @@ def put_dismissal(
     another.
     """
     named = FindingName(body.kind, body.view, body.marking, body.suggested, body.number)
-    with current_state(lambda: load_document(services.store, group)):
+    with add_current_state_to_conflicts(lambda: load_document(services.store, group)):
         return set_dismissal(
             services.store,
             group,
@@ -221,7 +221,7 @@ def put_dismissal(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET)
-@responds(as_document(BulkResult.done))
+@respond_with(respond_with_document(BulkResult.done))
 def post_verdicts(
     dataset: DatasetPath,
     verdict: BulkVerdict,
@@ -270,7 +270,7 @@ def list_batches(
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@responds(document)
+@respond_with(document)
 def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
@@ -288,7 +288,7 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@responds(document)
+@respond_with(document)
 def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 

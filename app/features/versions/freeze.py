@@ -50,7 +50,7 @@ from app.features.versions.service import (
     hash_version,
     read_version,
 )
-from app.formats.manifest import software_version
+from app.formats.manifest import read_software_version
 from app.json_text import canonical, digest_of, quoted
 from app.media.files import media_facts
 from app.progress import ReportProgress
@@ -242,7 +242,7 @@ class _FreezeRun:
             "policy": canonical(policy_to_json(dataset.policy)),
             "policy_hash": dataset.policy.hash,
             "solver_version": SOLVER_VERSION,
-            "software_version": software_version(),
+            "software_version": read_software_version(),
             "split": canonical(request.split.values()),
             "counts": canonical(self._counts(rows)),
         }

@@ -39,7 +39,7 @@ from app.features.versions.queries import Verification
 from app.features.versions.verify import VersionDifference
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
-from app.http.documents import Document, ListDocument, document, responds
+from app.http.documents import Document, ListDocument, document, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -280,7 +280,7 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def freeze_version(
     dataset: DatasetPath,
     request: VersionRequest,
@@ -356,7 +356,7 @@ def get_diff(
     **openapi_of_job_response(404),
 )
 @may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
-@responds(make_job_response)
+@respond_with(make_job_response)
 def verify_version(version: VersionPath, services: AppServices, actor: Actor) -> Job:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""
     return version_jobs.request_verify(services.jobs, services.store, version, actor=actor)

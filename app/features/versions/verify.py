@@ -44,7 +44,7 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
-from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.calibrate import calibrate_station, compute_calibration_key
 from app.solving.solve import solve
 from app.wording import plural
 from app.workers.executors import fan_out
@@ -333,7 +333,7 @@ class _VerifyTasks:
         policy, keys = self._version.policy.calibration, set()
         for group in groups:
             for station in (view.station for view in group.views if view.station.shared):
-                key = calibration_key(station, group.pitch, policy)
+                key = compute_calibration_key(station, group.pitch, policy)
                 keys.add(key)
                 if key not in self._shared:
                     found = calibrate_station(station, group.pitch, policy)

@@ -21,7 +21,7 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.features.jobs.queries import DONE, FAILED
 from app.features.webhooks import queries as webhook_outbox
-from app.features.webhooks.queries import entries_since, jobs_ended_since
+from app.features.webhooks.queries import list_jobs_ended_since, list_log_entries_since
 from app.json_text import canonical
 
 
@@ -88,9 +88,9 @@ class Message:
 
 def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]:
     """What has happened since a webhook was told last, its kinds and others."""
-    entries = entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
+    entries = list_log_entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
     place = (webhook.jobs_until, webhook.job_id)
-    jobs = jobs_ended_since(session, webhook.dataset_id, *place, _OF_JOBS)
+    jobs = list_jobs_ended_since(session, webhook.dataset_id, *place, _OF_JOBS)
     return [
         *_messages_of_log(webhook.id, dataset, entries),
         *_messages_of_jobs(webhook.id, dataset, jobs),

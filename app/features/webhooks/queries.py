@@ -107,7 +107,7 @@ class LoggedEvent(NamedTuple):
     group_id: int | None
 
 
-def entries_since(
+def list_log_entries_since(
     session: Session, dataset_id: int, log_id: int, most: int
 ) -> Sequence[LoggedEvent]:
     """Entries of a dataset's log after one of them, in order."""
@@ -133,7 +133,7 @@ class EndedJob(NamedTuple):
     ended: str
 
 
-def jobs_ended_since(
+def list_jobs_ended_since(
     session: Session, dataset_id: int, ended: str, job_id: int, states: Iterable[str]
 ) -> Sequence[EndedJob]:
     """Jobs of a dataset that ended after another one."""
@@ -169,7 +169,9 @@ def insert_delivery(session: Session, webhook_id: int, message: str, kind: str, 
     return bool(cast(Any, done).rowcount)
 
 
-def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequence[DueDelivery]:
+def list_due_deliveries(
+    session: Session, at: str, most: int, most_each: int
+) -> Sequence[DueDelivery]:
     """Deliveries whose time has come, with ``url`` and ``salt`` of their webhooks; oldest first.
 
     Args:
@@ -191,7 +193,7 @@ def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequ
     return session.rows(DueDelivery, statement)
 
 
-def next_due(session: Session) -> str | None:
+def find_next_delivery_time(session: Session) -> str | None:
     """When the next delivery is to be tried; None: none waits."""
     return session.scalar(
         select(func.min(DeliveryModel.next_at))
@@ -217,7 +219,7 @@ def find_delivery(session: Session, webhook_id: int, delivery_id: int) -> Delive
     return session.row(DeliveryModel, _DELIVERIES.where(*where))
 
 
-def waiting_of_kind(session: Session, webhook_id: int, kind: str) -> DeliveryModel | None:
+def find_waiting_delivery(session: Session, webhook_id: int, kind: str) -> DeliveryModel | None:
     """A delivery of that kind that is still to be sent."""
     where = (
         DeliveryModel.webhook_id == webhook_id,
@@ -239,7 +241,7 @@ def count_deliveries(session: Session, webhook_ids: Sequence[int]) -> dict[tuple
     return {(row[0], row[1]): row[2] for row in session.execute(statement.group_by(*key))}
 
 
-def arrived_since(session: Session, webhook_id: int, at: str) -> bool:
+def has_delivered_since(session: Session, webhook_id: int, at: str) -> bool:
     """Whether a webhook took anything since a time."""
     statement = select(DeliveryModel.id).where(
         DeliveryModel.webhook_id == webhook_id,
@@ -280,7 +282,7 @@ def list_listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
     return [row.id for row in rows if kind in parse(row.kinds)]
 
 
-def announce(
+def queue_webhook_messages(
     session: Session,
     dataset_id: int,
     kind: str,
@@ -308,21 +310,23 @@ def announce(
         return 0
     data: dict[str, Json] = {"dataset": read_dataset_name(session, dataset_id), "actor": actor}
     if batch_id is not None:
-        data["batch"] = batch_values(session, batch_id)
+        data["batch"] = read_batch_values(session, batch_id)
     body = canonical({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})
     return sum(insert_delivery(session, hook, f"msg_{hook}_{event}", kind, body) for hook in hooks)
 
 
-def announce_batch(session: Session, batch_id: int, kind: str, *, actor: str, at: str) -> int:
-    """``announce`` what became of a batch at a time; nothing where it is gone."""
+def queue_batch_messages(session: Session, batch_id: int, kind: str, *, actor: str, at: str) -> int:
+    """``queue_webhook_messages`` what became of a batch at a time; nothing where it is gone."""
     row = find_batch(session, batch_id)
     if row is None:
         return 0
-    event = f"batch{batch_id}_{kind.partition('.')[2]}{time_suffix(at)}"
-    return announce(session, row.dataset_id, kind, event, actor=actor, at=at, batch_id=batch_id)
+    event = f"batch{batch_id}_{kind.partition('.')[2]}{make_time_suffix(at)}"
+    return queue_webhook_messages(
+        session, row.dataset_id, kind, event, actor=actor, at=at, batch_id=batch_id
+    )
 
 
-def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
+def read_batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
     """What a message says of a batch; None where it is gone."""
     row = find_batch(session, batch_id)
     if row is None:
@@ -343,6 +347,6 @@ def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
     }
 
 
-def time_suffix(at: str) -> str:
+def make_time_suffix(at: str) -> str:
     """A time as a part of a message's id."""
     return "".join(letter for letter in at if letter.isdigit())

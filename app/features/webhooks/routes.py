@@ -11,7 +11,7 @@ from app.features.webhooks import service as webhooks
 from app.features.webhooks.messages import CHOSEN, Kind
 from app.features.webhooks.sender import LONGEST
 from app.features.webhooks.service import Delivery, Webhook
-from app.http.cursor import Before, Cursor, first_below, paged
+from app.http.cursor import Before, Cursor, paged, parse_descending_cursor
 from app.http.deps import Actor, AppStore, DatasetPath, Id
 from app.http.documents import Document, ListDocument
 from app.http.permissions import Action, OwnedKind, may
@@ -161,7 +161,7 @@ def list_deliveries(
     before: Before = None,
 ) -> DeliveryList:
     """What a webhook was told in the last 30 days, newest first."""
-    start = first_below(cursor, before)
+    start = parse_descending_cursor(cursor, before)
     found = webhooks.list_deliveries(store, dataset, webhook, before=start, most=limit + 1)
     more = str(found[limit - 1].id) if len(found) > limit else None
     return DeliveryList(items=found[:limit], next=more)

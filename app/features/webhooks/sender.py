@@ -31,11 +31,11 @@ from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
     DueDelivery,
-    arrived_since,
-    due_deliveries,
+    find_next_delivery_time,
+    has_delivered_since,
     insert_delivery,
     list_active_webhooks,
-    next_due,
+    list_due_deliveries,
     update_delivery,
     update_webhook,
 )
@@ -236,7 +236,7 @@ class WebhookSender:
         """
         now = self._clock()
         with self._store.read() as session:
-            due = due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
+            due = list_due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
         answers = asyncio.run(self._send_all_due(due)) if due else []
         if answers:
             with self._store.write() as session:
@@ -282,7 +282,7 @@ class WebhookSender:
     def _seconds_until_next_due(self) -> float:
         """Seconds until something waits to be sent again."""
         with self._store.read() as session:
-            due = next_due(session)
+            due = find_next_delivery_time(session)
         if due is None:
             return POLL_SECONDS
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
@@ -339,7 +339,7 @@ class WebhookSender:
             update_webhook(
                 session, row.webhook_id, {"off": "it answered 410: it wants no further messages"}
             )
-        elif not arrived_since(session, row.webhook_id, row.created):
+        elif not has_delivered_since(session, row.webhook_id, row.created):
             reason = f"nothing arrived since {row.created[:16].replace('T', ' ')} UTC"
             update_webhook(session, row.webhook_id, {"off": reason})
 

@@ -28,6 +28,7 @@ from app.features.webhooks.queries import (
     count_deliveries,
     delete_webhook,
     find_delivery,
+    find_waiting_delivery,
     find_webhook,
     insert_delivery,
     insert_webhook,
@@ -35,7 +36,6 @@ from app.features.webhooks.queries import (
     read_webhooks,
     update_delivery,
     update_webhook,
-    waiting_of_kind,
 )
 from app.features.webhooks.sender import require_allowed
 from app.json_text import Moment, canonical
@@ -206,7 +206,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
     number = dataset_id(store, dataset)
     with store.write() as session:
         _require_on(_read_webhook(session, number, webhook_id))
-        waiting = waiting_of_kind(session, webhook_id, Kind.PING)
+        waiting = find_waiting_delivery(session, webhook_id, Kind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
             return _delivery_from_row(find_delivery(session, webhook_id, waiting.id))

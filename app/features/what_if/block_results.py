@@ -22,13 +22,13 @@ from app.solving.chi_square import p_values
 from app.solving.facts import Facts
 from app.solving.judgement import (
     Judgement,
-    first_failed_gates,
+    compute_view_jac,
+    find_first_failed_gates,
+    find_views_in_pairs,
     judge_groups,
     judge_known_failures,
     recompare_thresholds,
-    view_jac,
-    views_in_pairs,
-    widened_covariances,
+    widen_covariances,
 )
 
 _NUMBERS = ("baseline", "point", "parallax", "distance")
@@ -48,7 +48,7 @@ class BlockResults:
 
     Attributes:
         facts: The groups.
-        jac: ``view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V).
+        jac: ``compute_view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V).
         policy: By which they are judged.
         judgement: What it makes of them.
         sigma: Standard deviation along the longest axis, metres, NaN without a ball, shape (G,).
@@ -96,14 +96,14 @@ class BlockResults:
 
     def judge_under(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
-        if _uses_click_noise(policy) and click_noise(policy) != click_noise(self.policy):
+        if _uses_click_noise(policy) and noise_of_policy(policy) != noise_of_policy(self.policy):
             jac = _jac_at_threshold(self.facts, self.jac, policy)
             return judge_groups(self.facts, policy, self._uncertainty(), jac)
         return self._judge_under(policy)[0]
 
     def judged_by(self, policy: Policy) -> BlockResults:
         """The groups judged by another policy from now on."""
-        if click_noise(policy) != click_noise(self.policy):
+        if noise_of_policy(policy) != noise_of_policy(self.policy):
             return BlockResults.by(self.facts, self.jac, policy)
         judgement, new, part = self._judge_under(policy)
         found = BlockResults(self.facts, self.jac, policy, judgement)
@@ -118,7 +118,7 @@ class BlockResults:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
         jac = _jac_at_threshold(facts, self.jac, policy)
-        view_failed, pair_failed = first_failed_gates(facts, jac, policy)
+        view_failed, pair_failed = find_first_failed_gates(facts, jac, policy)
         new = np.zeros(facts.groups, bool)
         new[facts.view_group[np.flatnonzero(view_failed != known.view_failed)]] = True
         new[facts.pair_group[np.flatnonzero(pair_failed != known.pair_failed)]] = True
@@ -160,7 +160,7 @@ class BlockResults:
         return self.uncertainty
 
 
-def click_noise(policy: Policy) -> tuple[float, float, float]:
+def noise_of_policy(policy: Policy) -> tuple[float, float, float]:
     """How exact clicks are taken to be."""
     return policy.click_sigma_px, policy.box_sigma_share, policy.given_sigma_px
 
@@ -175,7 +175,7 @@ def _jac_at_threshold(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArr
     if gamma in GAMMAS_PERCENT:
         known: FloatArray = jac[GAMMAS_PERCENT.index(gamma)]
         return known
-    return view_jac(facts, gamma)
+    return compute_view_jac(facts, gamma)
 
 
 def _mean_sigmas(
@@ -184,14 +184,14 @@ def _mean_sigmas(
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
     point = judgement.point
     covariances = uncertainty.covariances(judgement.valid, there, point[there], policy)
-    covariances = widened_covariances(facts, judgement.valid, there, covariances, point, policy)
+    covariances = widen_covariances(facts, judgement.valid, there, covariances, point, policy)
     sigma = np.full(facts.groups, np.nan)
     sigma[there] = major_axis_sigma(covariances)
     return sigma
 
 
 def _p_values(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
-    return p_values(facts, views_in_pairs(facts, judgement.valid), judgement.point, policy)
+    return p_values(facts, find_views_in_pairs(facts, judgement.valid), judgement.point, policy)
 
 
 def map_in_threads(work: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
@@ -237,7 +237,7 @@ class GroupCounts:
     splits: Counter[str] = field(default_factory=Counter)
 
 
-def sum_counts(tallies: Iterable[GroupCounts]) -> GroupCounts:
+def sum_group_counts(tallies: Iterable[GroupCounts]) -> GroupCounts:
     """All groups of several blocks."""
     total = GroupCounts()
     for counts in tallies:

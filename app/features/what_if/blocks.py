@@ -27,9 +27,9 @@ from app.features.solutions.queries import StoredFacts, read_calibrations, read_
 from app.features.what_if.cache import (
     CachedBlock,
     CachedTable,
-    cache_block,
-    cache_block_list,
-    cached_table,
+    read_cached_table,
+    write_cached_block,
+    write_cached_block_list,
 )
 from app.features.what_if.table import EMPTY, YieldTable, join_tables, make_table
 from app.solving.facts import NOTHING, Facts, facts_from_bytes, facts_to_bytes, group_facts
@@ -124,7 +124,7 @@ class DatasetBlocks:
         session: Session, folder: Path, dataset_id: int, calibration: str
     ) -> DatasetBlocks | None:
         """What the cache holds; None where it holds nothing that this database could have said."""
-        kept = cached_table(folder, calibration)
+        kept = read_cached_table(folder, calibration)
         if kept is None or kept.mark > find_newest_change_id(session):
             return None
         number, digest = kept.entry
@@ -231,12 +231,12 @@ class DatasetBlocks:
         self._write_block_list(session)
 
     def _write_block(self, table: YieldTable) -> CachedBlock:
-        return cache_block(self.folder, table)
+        return write_cached_block(self.folder, table)
 
     def _write_block_list(self, session: Session) -> None:
         number = newest_entry(session)
         entry = number, entry_hash(session, number) or ""
-        cache_block_list(
+        write_cached_block_list(
             self.folder,
             CachedTable(
                 self.calibration, self.mark, entry, self.through, tuple(self.blocks), self.bare

@@ -16,7 +16,7 @@ import numpy as np
 import structlog
 
 from app.durable import replace_file
-from app.features.what_if.block_results import BlockResults, click_noise
+from app.features.what_if.block_results import BlockResults, noise_of_policy
 from app.features.what_if.table import FIGURES, HEADS, YieldTable
 from app.geometry.arrays import BoolArray, IntArray
 from app.json_text import json_text
@@ -171,7 +171,7 @@ class CachedTable:
     bare: YieldTable
 
 
-def cache_block(folder: Path, table: YieldTable) -> CachedBlock:
+def write_cached_block(folder: Path, table: YieldTable) -> CachedBlock:
     """Write a block, and map it; on a full disk it stays in memory under no name."""
     name = secrets.token_hex(8)
     arrays = {item: getattr(table.facts, item) for item in COLUMNS}
@@ -185,7 +185,7 @@ def cache_block(folder: Path, table: YieldTable) -> CachedBlock:
         return CachedBlock("", table)
 
 
-def cache_block_list(folder: Path, table: CachedTable) -> None:
+def write_cached_block_list(folder: Path, table: CachedTable) -> None:
     """Write which blocks count, and delete those that do not any more."""
     if not all(block.name for block in table.blocks):
         return
@@ -207,7 +207,7 @@ def cache_block_list(folder: Path, table: CachedTable) -> None:
         _log_failure(error)
 
 
-def cached_table(folder: Path, calibration: str) -> CachedTable | None:
+def read_cached_table(folder: Path, calibration: str) -> CachedTable | None:
     """What a folder holds; None where there is none of this kind."""
     try:
         found = json.loads((folder / LIST).read_bytes())
@@ -233,7 +233,7 @@ def cached_table(folder: Path, calibration: str) -> CachedTable | None:
         return None
 
 
-def cache_results(folder: Path, block: CachedBlock, judged: BlockResults) -> None:
+def write_cached_results(folder: Path, block: CachedBlock, judged: BlockResults) -> None:
     """Write what a policy makes of a block."""
     if not block.name:
         return
@@ -249,7 +249,7 @@ def cache_results(folder: Path, block: CachedBlock, judged: BlockResults) -> Non
         _log_failure(error)
 
 
-def cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockResults | None:
+def read_cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockResults | None:
     """What was kept of a block under this policy; None where nothing was."""
     if not block.name:
         return None
@@ -280,7 +280,7 @@ def delete_table(folder: Path) -> None:
 
 
 def _policy_key(policy: Policy) -> list[Any]:
-    return [policy.hash, *click_noise(policy)]
+    return [policy.hash, *noise_of_policy(policy)]
 
 
 def _block_path(folder: Path, name: str) -> Path:

@@ -12,10 +12,10 @@ from app.features.what_if.block_results import (
     FINDINGS,
     GroupCounts,
     Leak,
-    click_noise,
     find_split_leaks,
     map_in_threads,
-    sum_counts,
+    noise_of_policy,
+    sum_group_counts,
 )
 from app.features.what_if.service import TableBlock, TableSnapshot, YieldStore
 from app.features.what_if.table import JAC_STEPS
@@ -104,19 +104,21 @@ def get_yield(
     """
     snapshot = yields.snapshot(dataset_id)
     policy = _changed_policy(snapshot.policy, values or {})
-    unanswered = thresholds_that_need_solving(snapshot.policy, policy)
+    unanswered = list_thresholds_that_need_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
 
     def count_block(block: TableBlock) -> GroupCounts:
         return block.count_present if same else block.count_under(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
-    side_by_side = click_noise(policy) != click_noise(snapshot.policy)
-    total = sum_counts((map_in_threads if side_by_side else map)(count_block, snapshot.blocks))
+    side_by_side = noise_of_policy(policy) != noise_of_policy(snapshot.policy)
+    total = sum_group_counts(
+        (map_in_threads if side_by_side else map)(count_block, snapshot.blocks)
+    )
     return _make_yield(snapshot, policy, total, unanswered)
 
 
-def thresholds_that_need_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
+def list_thresholds_that_need_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
     """Names of thresholds that differ and that the table cannot answer for."""
     return tuple(
         item.name

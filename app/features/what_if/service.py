@@ -27,10 +27,10 @@ from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.cache import (
     ARRAYS,
     CachedBlock,
-    cache_results,
-    cached_results,
     delete_table,
     map_arrays,
+    read_cached_results,
+    write_cached_results,
 )
 from app.features.what_if.table import EMPTY, YieldTable, join_tables
 from app.geometry.arrays import BoolArray
@@ -281,7 +281,7 @@ class YieldStore:
             if known is not None and known.judged.policy.hash == policy.hash:
                 return known if known.block is block else TableBlock(block, known.judged)
             if known is None:
-                judged = cached_results(blocks.folder, block, policy)
+                judged = read_cached_results(blocks.folder, block, policy)
                 if judged is not None:
                     return TableBlock(block, judged)
             table = block.table
@@ -291,7 +291,7 @@ class YieldStore:
                 judged = BlockResults.by(table.facts, table.jac, policy)
             if block.name:
                 judged.complete()
-                cache_results(blocks.folder, block, judged)
+                write_cached_results(blocks.folder, block, judged)
             return TableBlock(block, judged)
 
         return TableSnapshot(

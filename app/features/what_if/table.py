@@ -15,7 +15,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.facts import COLUMNS, NOTHING, Facts
 from app.solving.facts import join_facts as join_facts
-from app.solving.judgement import MIN_VIEWS, view_jac
+from app.solving.judgement import MIN_VIEWS, compute_view_jac
 
 JAC_STEPS = tuple((np.arange(101) / 100).tolist())
 """Where the curves are counted: JaC from 0 to 1."""
@@ -29,7 +29,7 @@ def qualifying_jac(facts: Facts, jac: FloatArray) -> FloatArray:
 
     Args:
         facts: The groups.
-        jac: ``view_jac`` at some gamma, shape (V,).
+        jac: ``compute_view_jac`` at some gamma, shape (V,).
     """
     shown = np.flatnonzero(facts.view_included & facts.view_camera & facts.view_ball)
     value = np.where(np.isnan(jac), np.inf, jac)[shown]
@@ -104,8 +104,8 @@ class YieldTable:
 
     @cached_property
     def jac(self) -> FloatArray:
-        """``view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V)."""
-        return np.stack([view_jac(self.facts, gamma) for gamma in GAMMAS_PERCENT])
+        """``compute_view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V)."""
+        return np.stack([compute_view_jac(self.facts, gamma) for gamma in GAMMAS_PERCENT])
 
     @cached_property
     def steps(self) -> npt.NDArray[np.uint8]:

@@ -10,7 +10,7 @@ from app.evaluation.cameras import (
     FrameScore,
     cameras_table,
     jac_figure,
-    leave_one_out,
+    measure_leave_one_out_errors,
     score_cameras,
     score_frame,
     score_frames,
@@ -127,12 +127,12 @@ class TestScoreFrame:
 class TestLeaveOneOut:
     def test_the_others_predict_a_marking_they_were_not_shown(self):
         lines = click(MAIN, 0.5)
-        errors = dict(leave_one_out(lines, PITCH, SIZE, CalibrationPolicy()))
+        errors = dict(measure_leave_one_out_errors(lines, PITCH, SIZE, CalibrationPolicy()))
         assert set(errors) == set(lines)
         assert sorted(errors.values())[len(errors) // 2] < 5.0
 
     def test_what_the_others_cannot_calibrate_has_no_error(self):
         lines = click(MAIN)
         few = make_lines({name: lines[name] for name in list(lines)[:3]})
-        errors = dict(leave_one_out(few, PITCH, SIZE, CalibrationPolicy()))
+        errors = dict(measure_leave_one_out_errors(few, PITCH, SIZE, CalibrationPolicy()))
         assert set(errors.values()) == {None}

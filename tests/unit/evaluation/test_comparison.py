@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.comparison import FIELDS, compare_frames, compare_tables, differing_pins
+from app.evaluation.comparison import (
+    FIELDS,
+    compare_frames,
+    compare_tables,
+    list_differing_settings,
+)
 from app.evaluation.result import Cell, Column, FrameResult, Row, Table
 
 RESULT = FrameResult(1, 1, "g", "1.png", "m", ball=True, detections=1)
@@ -36,20 +41,20 @@ def table(name: str, *, row: str = "all", **values: float | None) -> Table:
 class TestDifferingPins:
     def test_names_the_pins_that_make_numbers_incomparable(self) -> None:
         pins = {"state": "a", "software_version": "1", "name": "x", "careful": {"digest": "d"}}
-        assert differing_pins(pins, {**pins, "name": "y"}) == ()
+        assert list_differing_settings(pins, {**pins, "name": "y"}) == ()
         other = {**pins, "state": "b", "software_version": "2", "careful": {"digest": "e"}}
-        assert differing_pins(pins, other) == ("state", "software_version", "careful")
+        assert list_differing_settings(pins, other) == ("state", "software_version", "careful")
 
     def test_careful_boxes_of_one_run_alone_make_no_difference(self) -> None:
-        assert differing_pins({"careful": {"digest": "d"}}, {}) == ()
+        assert list_differing_settings({"careful": {"digest": "d"}}, {}) == ()
 
     @pytest.mark.parametrize("name", PINS)
     def test_a_run_that_was_measured_otherwise_says_in_what(self, name: str) -> None:
-        assert differing_pins(PINS, {**PINS, name: "another"}) == (name,)
+        assert list_differing_settings(PINS, {**PINS, name: "another"}) == (name,)
 
     def test_the_same_careful_boxes_sent_again_are_the_same(self) -> None:
         first, again = ({"careful": {"digest": "d", "name": name}} for name in ("a", "b"))
-        assert differing_pins(first, again) == ()
+        assert list_differing_settings(first, again) == ()
 
 
 class TestCompareTables:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.localization import localization_table, precision_distance
+from app.evaluation.localization import localization_table, make_precision_distance_figure
 from app.evaluation.result import FrameResult
 
 RESULT = FrameResult(1, 1, "g", "v", "m", ball=True, detections=1, distance_m=50.0)
@@ -49,7 +49,7 @@ class TestLocalizationTable:
 
 class TestPrecisionDistance:
     def test_counts_frames_with_a_smaller_error(self, frames) -> None:
-        (panel,) = precision_distance(frames, predicted=False).panels
+        (panel,) = make_precision_distance_figure(frames, predicted=False).panels
         curve, everywhere = panel.series
         at = dict(zip(curve.x, curve.y, strict=True))
         assert (at[0.0], at[1.0], at[1.1], at[4.0], at[4.1], at[20.0]) == (0, 0, 0.5, 0.5, 1, 1)
@@ -58,7 +58,7 @@ class TestPrecisionDistance:
 
     def test_a_point_opens_the_frames_that_its_curve_counts(self, frames) -> None:
         frames = [replace(frame, predicted_error_m=3.0) for frame in frames]
-        (panel,) = precision_distance(frames, predicted=True).panels
+        (panel,) = make_precision_distance_figure(frames, predicted=True).panels
         assert [series.frames[0].field for series in panel.series] == [
             "error_m", "any_error_m", "predicted_error_m", "predicted_any_error_m",
         ]  # fmt: skip

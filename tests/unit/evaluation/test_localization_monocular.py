@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.frame import Detection, JudgedFrame
-from app.evaluation.localization import measure_frame, place_error
+from app.evaluation.localization import measure_frame, measure_position_error
 from app.soccer.frames import Box, ImagePoint
 from tests.unit.evaluation.conftest import DIAMETER, camera_at
 
@@ -18,20 +18,25 @@ class TestPlaceError:
     def test_of_the_optimised_box_is_nothing(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
         found = Detection(frame.boxes["optimized"])
-        assert place_error(frame, frame.camera, found, DIAMETER) == pytest.approx(0, abs=1e-9)
+        assert measure_position_error(frame, frame.camera, found, DIAMETER) == pytest.approx(
+            0, abs=1e-9
+        )
 
     def test_of_a_box_a_quarter_too_large_is_a_fifth_of_the_distance(self, make_frame) -> None:
         # Depth times diameter is constant: 50 m / 1.25 = 40 m.
         frame = make_frame(distance=50.0)
         found = Detection(frame.boxes["annotated"])
-        assert place_error(frame, frame.camera, found, DIAMETER) == pytest.approx(10)
+        assert measure_position_error(frame, frame.camera, found, DIAMETER) == pytest.approx(10)
 
     def test_without_camera_ball_or_detection_there_is_none(self, make_frame) -> None:
         frame = make_frame()
         found = Detection(frame.boxes["optimized"])
-        assert place_error(frame, None, found, DIAMETER) is None
-        assert place_error(replace(frame, point=None), frame.camera, found, DIAMETER) is None
-        assert place_error(frame, frame.camera, None, DIAMETER) is None
+        assert measure_position_error(frame, None, found, DIAMETER) is None
+        assert (
+            measure_position_error(replace(frame, point=None), frame.camera, found, DIAMETER)
+            is None
+        )
+        assert measure_position_error(frame, frame.camera, None, DIAMETER) is None
 
 
 class TestMeasureFrame:

@@ -357,9 +357,9 @@ class TestYolo:
 
     def test_a_size_and_a_document_are_refused(self, tmp_path, names) -> None:
         write(tmp_path / "7.txt", YOLO)
-        with pytest.raises(InputError, match="yolo does not use a size"):
+        with pytest.raises(InputError, match="yolo do not use an image size"):
             read_predictions(tmp_path, "auto", names, size=SIZE)
-        with pytest.raises(InputError, match="yolo does not use a COCO document"):
+        with pytest.raises(InputError, match="yolo do not use a COCO document"):
             read_predictions(tmp_path, "auto", names, images=tmp_path / "x.json")
 
     def test_reads_shares_of_the_image(self, tmp_path, names) -> None:

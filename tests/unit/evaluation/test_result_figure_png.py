@@ -16,14 +16,14 @@ from app.evaluation.result import (
     Mark,
     Panel,
     Series,
-    figure_png,
+    figure_to_png,
 )
 
 LINE = Series("a", "A line", (0.0, 1.0), (0.0, 1.0))
 
 
 def drawn(figure: Figure) -> np.ndarray:
-    return cv2.imdecode(np.frombuffer(figure_png(figure), np.uint8), cv2.IMREAD_COLOR)
+    return cv2.imdecode(np.frombuffer(figure_to_png(figure), np.uint8), cv2.IMREAD_COLOR)
 
 
 def figure(*series: Series, **more) -> Figure:
@@ -74,7 +74,7 @@ class TestFigurePng:
     def test_without_matplotlib_the_extra_is_named(self, monkeypatch) -> None:
         monkeypatch.setitem(sys.modules, "matplotlib", None)
         with pytest.raises(InputError, match="matplotlib") as caught:
-            figure_png(figure(LINE))
+            figure_to_png(figure(LINE))
         assert "touchline[charts]" in (caught.value.hint or "")
 
     @pytest.mark.parametrize(

@@ -6,11 +6,11 @@ import pytest
 from app.evaluation.sensitivity import (
     choose_frames,
     error_slopes,
+    make_centre_shifts,
+    make_size_changes,
     measure_frame_sensitivity,
     sensitivity_figure,
     sensitivity_table,
-    shift_places,
-    size_places,
 )
 from app.geometry.sphere import position_from_diameter
 from app.soccer.frames import Box, ImagePoint
@@ -65,7 +65,7 @@ class TestMeasure:
         assert found.distance_m == pytest.approx(50)
         assert found.by_size[0] == pytest.approx(50 * (1 / 0.9 - 1))
         assert found.by_size[-1] == pytest.approx(50 * (1 - 1 / 1.1))
-        assert found.by_size[len(size_places()) // 2] == 0
+        assert found.by_size[len(make_size_changes()) // 2] == 0
 
     def test_two_per_cent_of_the_diagonal_move_it_across(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
@@ -75,8 +75,8 @@ class TestMeasure:
     def test_the_derivative_touches_the_curve(self, make_frame) -> None:
         found = measure_frame_sensitivity(make_frame(distance=70.0, point=POINTS[1]), DIAMETER)
         for places, curve, slope in (
-            (size_places(), found.by_size, found.size_slope),
-            (shift_places(), found.by_shift, found.shift_slope),
+            (make_size_changes(), found.by_size, found.size_slope),
+            (make_centre_shifts(), found.by_shift, found.shift_slope),
         ):
             middle = len(places) // 2
             step = abs(places[middle + 1])

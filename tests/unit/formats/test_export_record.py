@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.formats.export_record import ExportRecord, chosen_box
+from app.formats.export_record import ExportRecord, choose_ball_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
@@ -67,10 +67,12 @@ class TestChosenBox:
         self, soccer_group: Callable[..., Group], solved: Solved, kind: str, box: Box
     ) -> None:
         record = solved(soccer_group())
-        assert chosen_box(record, record.group.views[0], kind) == box
+        assert choose_ball_box(record, record.group.views[0], kind) == box
 
     def test_the_annotated_box_where_there_is_no_other(
         self, soccer_group: Callable[..., Group], solved: Solved
     ) -> None:
         record = solved(soccer_group(), ball=False)
-        assert chosen_box(record, record.group.views[0], "exact") == Box(610.0, 300.0, 12.0, 11.0)
+        assert choose_ball_box(record, record.group.views[0], "exact") == Box(
+            610.0, 300.0, 12.0, 11.0
+        )

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.formats.fields import exact_inverse
+from app.formats.fields import find_exact_inverse
 
 COORDINATES = st.floats(-5000, 5000)
 
@@ -17,19 +17,19 @@ class TestExactInverse:
         self, unit: float, scale: int
     ) -> None:
         pixel = unit * scale
-        written = exact_inverse(pixel / scale, pixel, lambda value: value * scale)
+        written = find_exact_inverse(pixel / scale, pixel, lambda value: value * scale)
         assert written * scale == pixel
 
     @given(COORDINATES, COORDINATES)
     def test_a_width_from_two_corners_comes_back(self, x1: float, x2: float) -> None:
         width = x2 - x1
-        written = exact_inverse(x1 + width, width, lambda value: value - x1)
+        written = find_exact_inverse(x1 + width, width, lambda value: value - x1)
         assert written - x1 == width
 
     @pytest.mark.parametrize("towards", [-math.inf, math.inf])
     def test_neighbours_on_both_sides_are_tried(self, towards: float) -> None:
         target = math.nextafter(math.nextafter(1.0, towards), towards)
-        assert exact_inverse(1.0, target, lambda value: value) == target
+        assert find_exact_inverse(1.0, target, lambda value: value) == target
 
     def test_without_an_exact_neighbour_the_guess_stays(self) -> None:
-        assert exact_inverse(1.0, 5.0, lambda value: value) == 1.0
+        assert find_exact_inverse(1.0, 5.0, lambda value: value) == 1.0

@@ -4,21 +4,21 @@ from typing import Any
 
 import pytest
 
-from app.formats.fields import IdIndex, id_text
+from app.formats.fields import IdIndex, id_to_text
 
 
 class TestIdText:
     @pytest.mark.parametrize("value", [7, 7.0, "7", " 7 ", "7.0", "7."])
     def test_equal_numbers_have_one_text(self, value: Any) -> None:
-        assert id_text(value) == "7"
+        assert id_to_text(value) == "7"
 
     @pytest.mark.parametrize("value", [None, True, False, [], {}, "", "  ", 10**50])
     def test_what_is_no_id_has_none(self, value: Any) -> None:
-        assert id_text(value) is None
+        assert id_to_text(value) is None
 
     @pytest.mark.parametrize("value", ["007", "a7", "7.5", "-7"])
     def test_other_texts_stay(self, value: str) -> None:
-        assert id_text(value) == value
+        assert id_to_text(value) == value
 
 
 class TestIdIndex:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.formats.camera_json import camera_to_json
-from app.formats.issia import MIRRORED, cameras_with_mirrored_people, turn_people
+from app.formats.issia import MIRRORED, find_cameras_with_mirrored_people, mirror_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
 from app.formats.report import Report
@@ -34,25 +34,27 @@ def boxes(camera: Camera) -> list[tuple[str, float, float, float, float]]:
 def seen(number: int, *, mirrored: bool, source: str = "file://C:/a.mpg") -> ViperTrack:
     """What a camera shows of the people in two frames."""
     track = ViperTrack(persons={f: boxes(CAMERAS[number]) for f in (20, 21)}, source=source)
-    return turn_people(track, WIDTH) if mirrored else track
+    return mirror_people(track, WIDTH) if mirrored else track
 
 
 def asked(number: int, track: ViperTrack, given: dict[int, Camera]) -> list[int]:
     tracks = {1: seen(1, mirrored=False), number: track}
-    return cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH))
+    return find_cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH))
 
 
 class TestTurned:
     def test_columns_become_those_that_they_are_in_the_mirror(self):
         """A box covers columns x to x + width - 1; those of a mirror are W - 1 - x."""
-        (box,) = turn_people(ViperTrack(persons={0: [("7", 0.0, 3.0, 10.0, 20.0)]}), 100).persons[0]
+        (box,) = mirror_people(ViperTrack(persons={0: [("7", 0.0, 3.0, 10.0, 20.0)]}), 100).persons[
+            0
+        ]
         assert box == ("7", 90.0, 3.0, 10.0, 20.0)
         columns = {100 - 1 - column for column in range(10)}
         assert columns == set(range(90, 100))
 
     def test_twice_is_as_written(self):
         track = seen(2, mirrored=False)
-        again = turn_people(turn_people(track, WIDTH), WIDTH)
+        again = mirror_people(mirror_people(track, WIDTH), WIDTH)
         assert np.array(again.persons[20])[:, 1:].astype(float) == pytest.approx(
             np.array(track.persons[20])[:, 1:].astype(float)
         )
@@ -74,7 +76,7 @@ class TestMirroredPeople:
     def test_other_cameras_are_what_they_are(self):
         tracks = {1: seen(1, mirrored=False), 3: seen(2, mirrored=True)}
         given = {1: CAMERAS[1], 3: CAMERAS[2]}
-        assert cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH)) == []
+        assert find_cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH)) == []
         assert {2, 6} == MIRRORED
 
 

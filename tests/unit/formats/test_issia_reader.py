@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.formats.camera_json import camera_to_json
-from app.formats.issia_reader import IssiaOptions, camera_number, open_issia
+from app.formats.issia_reader import IssiaOptions, open_issia, parse_camera_number
 from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint, ImageSize
@@ -201,7 +201,7 @@ class TestCameraNumber:
         ],
     )
     def test_the_number_that_a_name_speaks_of(self, name: str, number: int | None) -> None:
-        assert camera_number(name) == number
+        assert parse_camera_number(name) == number
 
 
 def _sized(text: str, width: int, height: int) -> str:

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from app.formats.opentrackio_writer import (
-    frame_rate,
-    opentrackio_problem,
-    opentrackio_sample,
+    camera_to_opentrackio,
+    estimate_frame_rate,
+    find_opentrackio_problem,
     pan_tilt_roll_z_up,
 )
 from app.geometry.camera import Camera
@@ -64,13 +64,13 @@ class TestOpentrackioSample:
         ],
     )
     def test_a_reader_sees_the_same_pixels(self, camera: Camera) -> None:
-        sample = opentrackio_sample(camera, SIZE, 7, source="clip")
+        sample = camera_to_opentrackio(camera, SIZE, 7, source="clip")
         seen = seen_by_a_reader(sample, POINTS * (1.0, -1.0, -1.0))
         assert np.allclose(seen, camera.project(POINTS) + 0.5, atol=1e-6)
 
     def test_times_are_exact_and_ids_are_those_of_the_recording(self) -> None:
         made = [
-            opentrackio_sample(
+            camera_to_opentrackio(
                 BENT, SIZE, frame, source="clip", time=frame * 0.04, rate=Fraction(25),
                 status="tracked",
             )
@@ -86,12 +86,12 @@ class TestOpentrackioSample:
         assert made[0]["sourceId"] == made[1]["sourceId"]
         assert made[0]["sampleId"] != made[1]["sampleId"]
         assert made[0]["sampleId"].startswith("urn:uuid:")
-        assert made[0] == opentrackio_sample(
+        assert made[0] == camera_to_opentrackio(
             BENT, SIZE, 3, source="clip", time=0.12, rate=Fraction(25), status="tracked"
         )
 
     def test_what_nobody_knows_is_left_out(self) -> None:
-        sample = opentrackio_sample(BENT, SIZE, 3, source="clip")
+        sample = camera_to_opentrackio(BENT, SIZE, 3, source="clip")
         assert sample["timing"] == {"mode": "internal", "sequenceNumber": 3}
         assert "tracker" not in sample
 
@@ -123,14 +123,14 @@ class TestPanTiltRollZUp:
 
 class TestWhyNotOpentrackio:
     def test_lenses_that_it_has(self) -> None:
-        assert opentrackio_problem(BENT) is None
+        assert find_opentrackio_problem(BENT) is None
 
     def test_those_that_it_has_not(self) -> None:
-        assert "tangential" in (opentrackio_problem(EVERY_COEFFICIENT) or "")
+        assert "tangential" in (find_opentrackio_problem(EVERY_COEFFICIENT) or "")
         prism = replace(BENT, distortion=np.array([*BENT.distortion[:8], 1e-4, 0.0, 0.0, 0.0]))
-        assert "thin prism" in (opentrackio_problem(prism) or "")
-        assert "fisheye" in (opentrackio_problem(wide((0, 60, -20), (0, 0, 0))) or "")
-        assert "skewed" in (opentrackio_problem(replace(BENT, skew=0.1)) or "")
+        assert "thin prism" in (find_opentrackio_problem(prism) or "")
+        assert "fisheye" in (find_opentrackio_problem(wide((0, 60, -20), (0, 0, 0))) or "")
+        assert "skewed" in (find_opentrackio_problem(replace(BENT, skew=0.1)) or "")
 
 
 class TestFrameRate:
@@ -139,12 +139,12 @@ class TestFrameRate:
     )
     def test_television(self, rate: Fraction) -> None:
         times = {frame: round(float(frame / rate), 4) for frame in range(200)}
-        assert frame_rate(times) == rate
+        assert estimate_frame_rate(times) == rate
 
     def test_missing_frames_change_nothing(self) -> None:
-        assert frame_rate({3: 0.12, 50: 2.0}) == 25
+        assert estimate_frame_rate({3: 0.12, 50: 2.0}) == 25
 
     def test_too_few(self) -> None:
-        assert frame_rate({}) is None
-        assert frame_rate({3: 1.0}) is None
-        assert frame_rate({3: 1.0, 4: 1.0}) is None
+        assert estimate_frame_rate({}) is None
+        assert estimate_frame_rate({3: 1.0}) is None
+        assert estimate_frame_rate({3: 1.0, 4: 1.0}) is None

@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import InputError, JobCancelled, StorageError
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.output import output_tree, write_files_to_zip, write_zip
+from app.formats.output import open_output_folder, write_files_to_zip, write_zip
 
 MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
 
@@ -19,7 +19,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _export(out: Path, text: str = "1") -> None:
-    with output_tree(out) as root:
+    with open_output_folder(out) as root:
         (root / "b").mkdir()
         (root / "b" / "x.txt").write_text(text)
         (root / "a.txt").write_text(text)
@@ -29,7 +29,7 @@ def _export(out: Path, text: str = "1") -> None:
 class TestOutputTree:
     def test_a_folder_appears_when_all_is_written(self, tmp_path: Path) -> None:
         out = tmp_path / "new" / "out"
-        with output_tree(out) as root:
+        with open_output_folder(out) as root:
             (root / "a.txt").write_text("1")
             assert not out.exists()
         assert (out / "a.txt").read_text() == "1"
@@ -58,7 +58,7 @@ class TestOutputTree:
             if done == 1:
                 raise JobCancelled
 
-        with pytest.raises(JobCancelled), output_tree(out, progress=progress) as root:
+        with pytest.raises(JobCancelled), open_output_folder(out, progress=progress) as root:
             (root / "a.txt").write_text("1")
             (root / "b.txt").write_text("1")
         assert told == [(0, 2, "Packing the files."), (1, 2, "Packing the files.")]
@@ -74,7 +74,7 @@ class TestOutputTree:
         def progress(*_: object) -> None:
             half.update(_names(tmp_path))
 
-        with output_tree(tmp_path / name, tmp_path / "12.zip.ab", progress) as root:
+        with open_output_folder(tmp_path / name, tmp_path / "12.zip.ab", progress) as root:
             (root / "a.txt").write_text("1")
             half.update(_names(tmp_path))
         assert half and all(item.startswith(".12.zip.ab.") for item in half)
@@ -96,7 +96,7 @@ class TestOutputTree:
 
     @pytest.mark.parametrize("name", ["out", "out.zip"])
     def test_an_error_leaves_nothing_behind(self, tmp_path: Path, name: str) -> None:
-        with pytest.raises(InputError), output_tree(tmp_path / name) as root:
+        with pytest.raises(InputError), open_output_folder(tmp_path / name) as root:
             (root / "a.txt").write_text("1")
             raise InputError("nothing to export")
         assert _names(tmp_path) == []
@@ -105,7 +105,7 @@ class TestOutputTree:
     def test_an_error_keeps_an_earlier_export(self, tmp_path: Path, name: str) -> None:
         _export(tmp_path / name)
         before = sorted(tmp_path.rglob("*"))
-        with pytest.raises(KeyError), output_tree(tmp_path / name) as root:
+        with pytest.raises(KeyError), open_output_folder(tmp_path / name) as root:
             (root / "c.txt").write_text("1")
             raise KeyError
         assert sorted(tmp_path.rglob("*")) == before
@@ -113,7 +113,7 @@ class TestOutputTree:
     @pytest.mark.parametrize("name", ["out", "out.zip"])
     def test_an_earlier_export_is_replaced(self, tmp_path: Path, name: str) -> None:
         _export(tmp_path / name, "old")
-        with output_tree(tmp_path / name) as root:
+        with open_output_folder(tmp_path / name) as root:
             (root / "a.txt").write_text("new")
         assert _names(tmp_path) == [name]
         if name == "out":
@@ -124,7 +124,7 @@ class TestOutputTree:
         (tmp_path / "out" / "thesis.txt").write_text("mine")
         with (
             pytest.raises(InputError, match="is not an earlier export"),
-            output_tree(tmp_path / "out"),
+            open_output_folder(tmp_path / "out"),
         ):
             raise AssertionError("not reached")
         assert (tmp_path / "out" / "thesis.txt").read_text() == "mine"
@@ -134,7 +134,10 @@ class TestOutputTree:
     )
     def test_a_foreign_manifest_does_not_make_an_export(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "manifest.json").write_text(text)
-        with pytest.raises(InputError, match="is not an earlier export"), output_tree(tmp_path):
+        with (
+            pytest.raises(InputError, match="is not an earlier export"),
+            open_output_folder(tmp_path),
+        ):
             raise AssertionError("not reached")
 
     @pytest.mark.parametrize("name", ["out", "out.zip"])
@@ -152,7 +155,7 @@ class TestOutputTree:
             with zipfile.ZipFile(out, "w") as archive:
                 for file, text in content.items():
                     archive.writestr(file, text)
-        with pytest.raises(InputError, match="is not an earlier export"), output_tree(out):
+        with pytest.raises(InputError, match="is not an earlier export"), open_output_folder(out):
             raise AssertionError("not reached")
 
     def test_others_may_read_what_was_published(self, tmp_path: Path) -> None:
@@ -177,7 +180,7 @@ class TestOutputTree:
             with zipfile.ZipFile(out, "a") as archive:
                 archive.writestr("thesis.txt", "mine")
         before = out.read_bytes()
-        with pytest.raises(InputError, match="is not an earlier export"), output_tree(out):
+        with pytest.raises(InputError, match="is not an earlier export"), open_output_folder(out):
             raise AssertionError("not reached")
         assert out.read_bytes() == before
 
@@ -188,9 +191,9 @@ class TestOutputTree:
 
     def test_a_file_in_the_way_is_said(self, tmp_path: Path) -> None:
         (tmp_path / "out").write_text("x")
-        with pytest.raises(InputError, match="is a file"), output_tree(tmp_path / "out"):
+        with pytest.raises(InputError, match="is a file"), open_output_folder(tmp_path / "out"):
             raise AssertionError("not reached")
-        with pytest.raises(StorageError), output_tree(tmp_path / "out" / "deeper"):
+        with pytest.raises(StorageError), open_output_folder(tmp_path / "out" / "deeper"):
             raise AssertionError("not reached")
 
 

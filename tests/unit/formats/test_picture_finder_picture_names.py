@@ -4,7 +4,7 @@ import unicodedata
 
 import pytest
 
-from app.formats.picture_finder import picture_name_parts
+from app.formats.picture_finder import split_picture_name
 
 
 class TestPictureParts:
@@ -29,7 +29,7 @@ class TestPictureParts:
         ],
     )
     def test_the_parts_that_a_folder_here_can_have(self, name: str, parts: str) -> None:
-        assert "/".join(picture_name_parts(name)) == parts
+        assert "/".join(split_picture_name(name)) == parts
 
     def test_decomposed_letters_are_composed(self) -> None:
-        assert picture_name_parts(unicodedata.normalize("NFD", "bälle/é.jpg")) == ("bälle", "é.jpg")
+        assert split_picture_name(unicodedata.normalize("NFD", "bälle/é.jpg")) == ("bälle", "é.jpg")

@@ -9,7 +9,7 @@ import pytest
 
 from app.formats.file_tree import DEFAULT_LIMITS, Limits
 from app.formats.report import Report
-from app.formats.soccernet_v3 import MatchFrames, group_label, image_numbers
+from app.formats.soccernet_v3 import MatchFrames, group_label, parse_image_numbers
 from app.formats.trees import open_tree
 from app.soccer.group import Media
 
@@ -35,9 +35,9 @@ class TestGroupLabel:
 
 class TestImageNumbers:
     def test_actions_and_replays(self) -> None:
-        assert image_numbers("7.png") == (7, None)
-        assert image_numbers("12_0.png") == (12, 0)
-        assert image_numbers("cam3") is None
+        assert parse_image_numbers("7.png") == (7, None)
+        assert parse_image_numbers("12_0.png") == (12, 0)
+        assert parse_image_numbers("cam3") is None
 
 
 def _frames(folder: Path, report: Report) -> MatchFrames:

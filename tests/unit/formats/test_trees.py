@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 
 from app.config import Settings
 from app.errors import DatasetFormatError, ImageError
-from app.formats.file_tree import Limits, files_inside
+from app.formats.file_tree import Limits, list_files_in_folder
 from app.formats.guess_format import guess_format
 from app.formats.report import Report
 from app.formats.safe_path import is_hidden, read_regular_file
 from app.formats.soccernet_v3 import MatchFrames
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.formats.trees import FolderTree, ZipTree, open_tree, opened_tree
+from app.formats.trees import FolderTree, ZipTree, open_tree, open_tree_while_read
 from app.media.object_frames import ArchiveMembers
 
 MakeZip = Callable[..., Path]
@@ -65,11 +65,11 @@ class TestOpenedTree:
         path = tmp_path / "a.zip"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("a.json", "{}")
-        with opened_tree(path, Report()) as tree:
+        with open_tree_while_read(path, Report()) as tree:
             assert tree is not None and tree.read_bytes("a.json") == b"{}"
         with pytest.raises(ValueError, match="closed"):
             tree.open("a.json")
-        with opened_tree(tmp_path / "none", Report()) as tree:
+        with open_tree_while_read(tmp_path / "none", Report()) as tree:
             assert tree is None
 
 
@@ -117,7 +117,7 @@ class TestFolderTree:
 class TestFilesInside:
     def test_every_name_below_a_folder_is_among_them(self) -> None:
         names = sorted(["a/x", "a/Ünsal.png", "a/日本.png", "a~", "b/x"])
-        assert files_inside(names, "a/") == {"x", "Ünsal.png", "日本.png"}
+        assert list_files_in_folder(names, "a/") == {"x", "Ünsal.png", "日本.png"}
 
 
 class TestReadPlain:

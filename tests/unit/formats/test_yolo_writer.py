@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from app.formats.export_record import ExportRecord
-from app.formats.yolo_writer import write_yolo, yolo_label_line
+from app.formats.yolo_writer import format_yolo_label, write_yolo
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 
@@ -43,7 +43,7 @@ class TestLabelLine:
         ],
     )
     def test_parts_of_the_image_clipped_at_its_border(self, box: Box, line: str | None) -> None:
-        assert yolo_label_line(box, SIZE) == line
+        assert format_yolo_label(box, SIZE) == line
 
 
 class TestWriteYolo:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.errors import InputError
-from app.http.cursor import MAX_DIGITS, first_below, parse_cursor
+from app.http.cursor import MAX_DIGITS, parse_cursor, parse_descending_cursor
 
 
 class TestParseCursor:
@@ -23,4 +23,8 @@ class TestParseCursor:
 
 class TestFirstBelow:
     def test_the_cursor_counts_before_what_was_asked_in_its_place(self) -> None:
-        assert [first_below("7", 9), first_below(None, 9), first_below(None, None)] == [7, 9, None]
+        assert [
+            parse_descending_cursor("7", 9),
+            parse_descending_cursor(None, 9),
+            parse_descending_cursor(None, None),
+        ] == [7, 9, None]

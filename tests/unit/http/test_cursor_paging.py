@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import InputError
-from app.http.cursor import page_of, paged
+from app.http.cursor import paged, slice_page
 from app.http.documents import ListDocument
 
 Things = list[dict[str, int]]
@@ -18,7 +18,7 @@ def things(*ids: int) -> Things:
 def walked(items: Things, limit: int) -> list[Things]:
     pages, cursor = [], None
     while True:
-        page, cursor = page_of(items, limit, cursor, "a" * 8)
+        page, cursor = slice_page(items, limit, cursor, "a" * 8)
         pages.append(page)
         if cursor is None:
             return pages
@@ -36,21 +36,21 @@ class TestPageOf:
         assert all(len(page) == limit for page in pages[:-1])
 
     def test_without_a_limit_the_rest_is_one_page(self) -> None:
-        _, cursor = page_of(things(1, 2, 3), 1, None, "a" * 8)
-        assert page_of(things(1, 2, 3), None, cursor, "a" * 8) == (things(2, 3), None)
+        _, cursor = slice_page(things(1, 2, 3), 1, None, "a" * 8)
+        assert slice_page(things(1, 2, 3), None, cursor, "a" * 8) == (things(2, 3), None)
 
     def test_what_comes_before_the_page_is_not_seen_twice(self) -> None:
-        _, cursor = page_of(things(3, 2, 1), 2, None, "a" * 8)
-        assert page_of(things(5, 4, 3, 2, 1), 2, cursor, "a" * 8) == (things(1), None)
+        _, cursor = slice_page(things(3, 2, 1), 2, None, "a" * 8)
+        assert slice_page(things(5, 4, 3, 2, 1), 2, cursor, "a" * 8) == (things(1), None)
 
     def test_where_its_item_is_gone_the_next_one_is_not_missed(self) -> None:
-        _, cursor = page_of(things(1, 2, 3, 4), 2, None, "a" * 8)
-        assert page_of(things(1, 3, 4), 2, cursor, "a" * 8) == (things(3, 4), None)
+        _, cursor = slice_page(things(1, 2, 3, 4), 2, None, "a" * 8)
+        assert slice_page(things(1, 3, 4), 2, cursor, "a" * 8) == (things(3, 4), None)
 
     @pytest.mark.parametrize("cursor", ["", "7", "0.zz.a", "0." + "0" * 12 + "." + "b" * 8])
     def test_a_cursor_that_is_none_of_this_list_is_refused(self, cursor: str) -> None:
         with pytest.raises(InputError, match="not a cursor of this list"):
-            page_of(things(1, 2), 1, cursor, "a" * 8)
+            slice_page(things(1, 2), 1, cursor, "a" * 8)
 
 
 class TestPaged:

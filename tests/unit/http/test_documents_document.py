@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from app.features.groups.solution_schemas import FailingGate
 from app.features.policies.schemas import PolicyDocument
 from app.features.predictions.evaluation_routes import FrameList
-from app.http.documents import Document, json_of
+from app.http.documents import Document, encode_document
 from app.json_text import Moment
 from app.soccer.policy import PAPER
 from app.soccer.solution import Gate
@@ -56,7 +56,7 @@ class Match:
 class TestJsonOf:
     def test_a_value_tells_times_in_utc_with_a_z(self) -> None:
         match = Match("2026-11-28T21:00:00.000000+00:00")
-        assert json.loads(json_of(match)) == {
+        assert json.loads(encode_document(match)) == {
             "begins": "2026-11-28T21:00:00Z",
             "ended": None,
             "length_m": None,
@@ -67,12 +67,14 @@ class TestJsonOf:
             match: Match
 
         match = Match("2026-11-28T21:00:00.250000+00:00")
-        assert json.loads(json_of(Page(match=match)))["match"] == json.loads(json_of(match))
+        assert json.loads(encode_document(Page(match=match)))["match"] == json.loads(
+            encode_document(match)
+        )
 
     @pytest.mark.parametrize("bad", [float("inf"), float("-inf")])
     def test_a_number_that_is_not_finite_is_null(self, bad: float) -> None:
         match = Match("2026-11-28T21:00:00+00:00", length_m=bad)
-        assert json.loads(json_of(match))["length_m"] is None
+        assert json.loads(encode_document(match))["length_m"] is None
 
 
 class TestWhatShowsADataclass:

@@ -17,7 +17,7 @@ from app.features.imports import upload_queries as uploads
 from app.features.independent_annotations.service import begin_annotation
 from app.http import idempotency
 from app.http.deps import Services
-from app.http.documents import no_content, responds
+from app.http.documents import make_empty_response, respond_with
 from tests.databases import content
 from tests.openapi import openapi_of
 from tests.unit.http import dataset_requests, group_requests
@@ -323,7 +323,7 @@ class TestInnerWork:
 
 class TestResponds:
     def test_a_route_gives_its_parameters_to_what_makes_the_response(self) -> None:
-        @responds(lambda outcome, status: Response(outcome, status), "status")
+        @respond_with(lambda outcome, status: Response(outcome, status), "status")
         def route(name: str, status: int) -> str:
             return name
 
@@ -333,7 +333,7 @@ class TestResponds:
     def test_a_response_that_a_route_makes_itself_is_sent_as_it_is(self) -> None:
         made = Response(b"planned")
 
-        @responds(no_content)
+        @respond_with(make_empty_response)
         def route() -> Response:
             return made
 
@@ -344,12 +344,12 @@ class TestResponds:
             """Does nothing."""
 
         with pytest.raises(AssertionError):
-            responds(no_content)(route)
+            respond_with(make_empty_response)(route)
 
     def test_what_follows_a_response_has_no_request_to_answer(self) -> None:
         seen: list[bool] = []
 
-        @responds(no_content)
+        @respond_with(make_empty_response)
         def route() -> None:
             seen.append(pending_response.get() is not None)
 

@@ -32,8 +32,8 @@ from app.features.people.schemas import NewSession
 from app.http.errors import (
     PreconditionRequiredError,
     StaleStateError,
-    http_status,
-    install_handlers,
+    find_http_status,
+    install_error_handlers,
 )
 
 
@@ -82,7 +82,7 @@ CASES: list[tuple[ReviewError, int]] = [
 class TestStatusOf:
     @pytest.mark.parametrize(("error", "status"), CASES, ids=lambda v: str(v)[:20])
     def test_each_branch_of_the_tree_has_its_status(self, error: ReviewError, status: int) -> None:
-        assert http_status(error) == status
+        assert find_http_status(error) == status
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def client(plain_app: FastAPI, client_of):
     @plain_app.post("/session")
     def log_in(said: NewSession) -> None: ...
 
-    install_handlers(plain_app)
+    install_error_handlers(plain_app)
     return client_of(plain_app)
 
 

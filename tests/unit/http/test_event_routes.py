@@ -22,7 +22,7 @@ from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.http import events as module
-from app.http.server import Server, listen
+from app.http.server import Server, open_listening_socket
 from app.soccer.policy import PAPER, STRICT
 from tests.waiting import SECONDS
 
@@ -33,7 +33,7 @@ EVENTS = "/api/v1/events"
 def served(app: FastAPI) -> Iterator[tuple[str, Server]]:
     """Address and server of a real socket."""
     app.state.services.settings.allowed_hosts.append("127.0.0.1")
-    with listen("127.0.0.1", 0) as (socket, address):
+    with open_listening_socket("127.0.0.1", 0) as (socket, address):
         server = Server(uvicorn.Config(app, log_level="critical", lifespan="off"), app)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [socket]})
         thread.start()
@@ -297,7 +297,7 @@ class TestFeed:
             stream.next()
             seen = stream.last_id
             feed = next(iter(app.state.services.events._feeds))
-            feed.loop.call_soon_threadsafe(feed.take, [module.first_event(1)] * 3)
+            feed.loop.call_soon_threadsafe(feed.take, [module.make_first_event(1)] * 3)
             with pytest.raises(EOFError):
                 stream.next()
         end = time.monotonic() + SECONDS

@@ -8,7 +8,7 @@ import pytest
 
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import LoggedChange
-from app.http.events import Listener, _change_event, first_event
+from app.http.events import Listener, _change_event, make_first_event
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,10 @@ def test_who_comes_once_a_dataset_is_gone_is_told_of_it_only_if_they_see_everyth
 
 
 def test_who_annotates_blind_is_told_no_id_of_the_log() -> None:
-    told = [_change_event(LoggedChange(41, 3, "demo", "verdict", "eve", 7, "x")), first_event(41)]
+    told = [
+        _change_event(LoggedChange(41, 3, "demo", "verdict", "eve", 7, "x")),
+        make_first_event(41),
+    ]
 
     async def read(numbered: bool) -> bytes:
         feed = Listener(None, 5, EVERYTHING, began=10, numbered=numbered)

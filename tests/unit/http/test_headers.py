@@ -7,8 +7,13 @@ from fastapi import FastAPI, Response
 from structlog.testing import capture_logs
 
 from app.errors import InputError
-from app.http.errors import install_handlers
-from app.http.headers import FIXED, SecurityHeaders, content_disposition, content_security_policy
+from app.http.errors import install_error_handlers
+from app.http.headers import (
+    FIXED,
+    SecurityHeaders,
+    make_content_disposition,
+    make_content_security_policy,
+)
 from app.http.request_log import RequestLog
 
 
@@ -30,21 +35,21 @@ def client(plain_app: FastAPI, client_of):
     def refused() -> str:
         raise InputError("no")
 
-    install_handlers(plain_app)
+    install_error_handlers(plain_app)
     plain_app.add_middleware(RequestLog)
-    plain_app.add_middleware(SecurityHeaders, policy=content_security_policy)
+    plain_app.add_middleware(SecurityHeaders, policy=make_content_security_policy)
     return client_of(plain_app)
 
 
 class TestContentSecurityPolicy:
     def test_has_no_inline_script_unless_a_hash_admits_it(self) -> None:
-        assert "script-src 'self';" in content_security_policy()
-        assert "script-src 'self' 'sha256-x';" in content_security_policy(("sha256-x",))
-        assert "unsafe" not in content_security_policy(("sha256-x",))
+        assert "script-src 'self';" in make_content_security_policy()
+        assert "script-src 'self' 'sha256-x';" in make_content_security_policy(("sha256-x",))
+        assert "unsafe" not in make_content_security_policy(("sha256-x",))
 
     def test_begins_as_the_security_page_says(self) -> None:
         expected = "default-src 'self'; img-src 'self' blob: data:;"
-        assert content_security_policy().startswith(expected)
+        assert make_content_security_policy().startswith(expected)
 
 
 class TestSecurityHeaders:
@@ -52,7 +57,7 @@ class TestSecurityHeaders:
     def test_every_answer_carries_them(self, client, path: str) -> None:
         with capture_logs():
             headers = client.get(path).headers
-        assert headers["content-security-policy"] == content_security_policy()
+        assert headers["content-security-policy"] == make_content_security_policy()
         assert {name: headers.get(name) for name in FIXED} == FIXED
 
     def test_a_method_that_is_not_allowed_carries_them_too(self, client) -> None:
@@ -80,7 +85,7 @@ class TestMistakes:
 
 class TestSavedAs:
     def test_a_name_of_any_letters_is_a_header_that_browsers_read(self) -> None:
-        assert content_disposition("cup_0-5.npz") == 'attachment; filename="cup_0-5.npz"'
-        assert content_disposition('Łódź "1".npz', "inline") == (
+        assert make_content_disposition("cup_0-5.npz") == 'attachment; filename="cup_0-5.npz"'
+        assert make_content_disposition('Łódź "1".npz', "inline") == (
             "inline; filename=\"__d_ _1_.npz\"; filename*=UTF-8''%C5%81%C3%B3d%C5%BA%20%221%22.npz"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fastapi import FastAPI
 
-from app.http.headers import KnownHosts, SameOrigin, host_name, same_origin
+from app.http.headers import KnownHosts, SameOrigin, is_same_origin, parse_host_name
 
 ALLOWED = ["127.0.0.1", "localhost", "[::1]"]
 
@@ -22,7 +22,7 @@ class TestHostName:
         ],
     )
     def test_leaves_the_port_away(self, host: str, name: str) -> None:
-        assert host_name(host) == name
+        assert parse_host_name(host) == name
 
     @pytest.mark.parametrize(
         "host",
@@ -42,7 +42,7 @@ class TestHostName:
         ],
     )
     def test_what_is_no_host_has_no_name(self, host: str) -> None:
-        assert host_name(host) == ""
+        assert parse_host_name(host) == ""
 
 
 class TestSameOrigin:
@@ -57,7 +57,7 @@ class TestSameOrigin:
         ],
     )
     def test_the_same_host_and_port_are_the_same_origin(self, origin: str, host: str) -> None:
-        assert same_origin(origin, host, "http")
+        assert is_same_origin(origin, host, "http")
 
     @pytest.mark.parametrize(
         "origin",
@@ -76,11 +76,11 @@ class TestSameOrigin:
         ],
     )
     def test_another_host_port_or_scheme_is_another_origin(self, origin: str) -> None:
-        assert not same_origin(origin, "127.0.0.1:8000", "http")
+        assert not is_same_origin(origin, "127.0.0.1:8000", "http")
 
     def test_another_scheme_is_another_one_on_the_same_port_too(self) -> None:
-        assert not same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "http")
-        assert same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "https")
+        assert not is_same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "http")
+        assert is_same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "https")
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from app.features.verdicts import routes as verdicts
 from app.features.verdicts.service import set_verdict
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.request_limits import WRITE
-from app.http.server import Server, listen
+from app.http.server import Server, open_listening_socket
 from tests.openapi import openapi_of
 from tests.waiting import SECONDS
 
@@ -202,7 +202,7 @@ class TestFailure:
 class TestTwins:
     @pytest.fixture
     def address(self, app) -> Iterator[str]:
-        with listen("127.0.0.1", 0) as (socket, address):
+        with open_listening_socket("127.0.0.1", 0) as (socket, address):
             server = Server(uvicorn.Config(app, log_level="critical", lifespan="off"), app)
             thread = threading.Thread(target=server.run, kwargs={"sockets": [socket]})
             thread.start()

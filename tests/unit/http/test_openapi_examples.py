@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.http.openapi import example_of
+from app.http.openapi import make_example
 
 SCHEMAS: dict[str, Any] = {
     "Node": {
@@ -32,10 +32,10 @@ class TestExampleOf:
         ],
     )
     def test_fits_the_schema(self, schema: dict[str, Any], example: Any) -> None:
-        assert example_of(schema, {}) == example
+        assert make_example(schema, {}) == example
 
     def test_a_model_that_holds_itself_ends(self) -> None:
-        found, depth = example_of(SCHEMAS["Node"], SCHEMAS), 0
+        found, depth = make_example(SCHEMAS["Node"], SCHEMAS), 0
         while found is not None:
             found, depth = found["next"], depth + 1
         assert depth < 20

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from fastapi import FastAPI
 
-from app.http.errors import install_handlers
-from app.http.pages import PAGES, BrowserSite, install_pages, script_hashes
+from app.http.errors import install_error_handlers
+from app.http.pages import PAGES, BrowserSite, hash_import_maps, install_pages
 
 
 class TestPages:
@@ -36,7 +36,7 @@ class TestPages:
         assert answer.content == pages_client.get("/").content
 
     def test_the_policy_admits_the_import_map(self, pages_client) -> None:
-        (digest,) = script_hashes(pages_client.get("/").content)
+        (digest,) = hash_import_maps(pages_client.get("/").content)
         for path in ("/", "/static/main.js", "/nothing"):
             assert f"'{digest}'" in pages_client.get(path).headers["content-security-policy"]
 
@@ -49,7 +49,7 @@ class TestPages:
         os.utime(index, ns=(1, 1))
         new = pages_client.get("/", headers={"If-None-Match": old.headers["etag"]})
         assert new.status_code == 200
-        (digest,) = script_hashes(new.content)
+        (digest,) = hash_import_maps(new.content)
         assert f"'{digest}'" in new.headers["content-security-policy"]
 
     def test_a_page_says_how_things_stood_and_is_another_one_once_they_stand_otherwise(
@@ -141,7 +141,7 @@ class TestPages:
     def test_without_the_application_there_is_no_page(
         self, plain_app: FastAPI, client_of, tmp_path: Path
     ) -> None:
-        install_handlers(plain_app)
+        install_error_handlers(plain_app)
         install_pages(plain_app, BrowserSite(tmp_path / "none"))
         assert client_of(plain_app).get("/").status_code == 404
         assert client_of(plain_app).get("/static/main.js").status_code == 404

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 
-from app.http.pages import script_hashes
+from app.http.pages import hash_import_maps
 
 
 class TestScriptHashes:
@@ -13,7 +13,7 @@ class TestScriptHashes:
         text = b'\n{"imports": {}}\n'
         html = b'<script type="importmap">' + text + b"</script>"
         digest = base64.b64encode(hashlib.sha256(text).digest()).decode()
-        assert script_hashes(html) == (f"sha256-{digest}",)
+        assert hash_import_maps(html) == (f"sha256-{digest}",)
 
     def test_other_inline_scripts_are_not_admitted(self) -> None:
-        assert script_hashes(b"<script>alert(1)</script><script src='/a.js'></script>") == ()
+        assert hash_import_maps(b"<script>alert(1)</script><script src='/a.js'></script>") == ()

@@ -9,11 +9,11 @@ import pytest
 from fastapi import APIRouter, FastAPI, Request
 
 from app.errors import ForbiddenError, NotLoggedInError
-from app.http.errors import install_handlers
+from app.http.errors import install_error_handlers
 from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
 from app.http.request_limits import RequestLimits
 from app.http.requests import MAX_STRANGERS_BYTES
-from app.http.route import Gate, Route, answer_no_route, list_routes, require_permissions
+from app.http.route import Gate, Route, list_routes, require_permissions, respond_to_unknown_route
 
 JSON = [(b"content-type", b"application/json")]
 BYTES = {"requestBody": {"content": {"application/octet-stream": {}}}}
@@ -65,10 +65,10 @@ class Exchange:
 
     def app(self, most: int, access: Any) -> FastAPI:
         made = FastAPI(openapi_url=None)
-        made.router.route_class, made.router.default = Route, answer_no_route
+        made.router.route_class, made.router.default = Route, respond_to_unknown_route
         keyless: Any = KeyLess()
         made.state.gate = Gate(access, keyless, RequestLimits(), most)
-        install_handlers(made)
+        install_error_handlers(made)
 
         async def read(request: Request) -> None:
             self.reached = await request.body()

@@ -21,28 +21,34 @@ from app.http.server import (
     MAX_CONNECTIONS,
     SWITCH_SECONDS,
     Server,
-    connection_limit,
-    listen,
+    find_connection_limit,
     make_server,
-    settle,
+    open_listening_socket,
+    warm_up_process,
 )
 
 
 class TestListen:
     def test_tells_the_address_that_a_browser_opens(self) -> None:
-        with listen("127.0.0.1", 0) as (server, address):
+        with open_listening_socket("127.0.0.1", 0) as (server, address):
             assert address == f"http://127.0.0.1:{server.getsockname()[1]}"
             # asyncio looks at the protocol before it turns Nagle's algorithm off.
             assert server.proto == socket.IPPROTO_TCP
 
     def test_a_port_in_use_is_a_sentence(self) -> None:
-        with listen("127.0.0.1", 0) as (server, _):
+        with open_listening_socket("127.0.0.1", 0) as (server, _):
             port = server.getsockname()[1]
-            with pytest.raises(InputError, match="is already in use"), listen("127.0.0.1", port):
+            with (
+                pytest.raises(InputError, match="is already in use"),
+                open_listening_socket("127.0.0.1", port),
+            ):
                 pass
 
     def test_an_address_of_another_machine_is_a_sentence(self) -> None:
-        with pytest.raises(InputError, match="cannot be used"), listen("192.0.2.1", 0):
+        with (
+            pytest.raises(InputError, match="cannot be used"),
+            open_listening_socket("192.0.2.1", 0),
+        ):
             pass
 
 
@@ -51,7 +57,7 @@ class TestSettle:
         before = gc.get_threshold()
         gc.unfreeze()
         try:
-            settle()
+            warm_up_process()
             assert gc.get_freeze_count() > len(gc.get_objects())
             assert gc.get_threshold() == (700, 10, 100)
         finally:
@@ -75,11 +81,11 @@ def server() -> Iterator[Server]:
 
 class TestConnections:
     def test_leave_descriptors_for_the_files_of_the_home(self) -> None:
-        assert 8 <= connection_limit() <= MAX_CONNECTIONS
+        assert 8 <= find_connection_limit() <= MAX_CONNECTIONS
 
     def test_a_head_and_connections_are_bounded(self, server: Server) -> None:
         assert server.config.h11_max_incomplete_event_size == HEAD_BYTES
-        assert server.config.limit_concurrency == connection_limit()
+        assert server.config.limit_concurrency == find_connection_limit()
         assert not server.config.proxy_headers
 
 
@@ -96,7 +102,7 @@ class TestServer:
 
 async def _growth(server: Server, clients: int) -> list[int]:
     """How many connections are new at each turn of the loop, once all wait at the door."""
-    with listen("127.0.0.1", 0) as (listening, _):
+    with open_listening_socket("127.0.0.1", 0) as (listening, _):
         server.config.load()
         server.lifespan = server.config.lifespan_class(server.config)
         await server.startup([listening])

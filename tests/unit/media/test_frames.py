@@ -175,7 +175,7 @@ class TestFrames:
         assert frames.read(media, 40, False).kind == "image/jpeg"
 
     def test_a_refusal_is_that_of_this_process(self, frames: Frames, tmp_path: Path) -> None:
-        with pytest.raises(NotFoundError, match=r"gone\.png is not where it was imported from"):
+        with pytest.raises(NotFoundError, match=r"gone\.png is no longer in the place"):
             frames.read(Media(str(tmp_path / "gone.png")), None, False)
         path = tmp_path / "x.png"
         path.write_bytes(b"hello")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.grass import field_of_play
+from app.paint.grass import find_field_of_play
 from app.sample.render import render
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
@@ -35,4 +35,4 @@ def rendered() -> Rendered:
     truth = scene.truth.view(view.key)
     assert truth is not None
     clicked = calibrate(view.station.lines, Pitch(), view.size, PAPER.calibration)
-    return Rendered(image, field_of_play(image), truth.camera, clicked)
+    return Rendered(image, find_field_of_play(image), truth.camera, clicked)

@@ -7,7 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.paint.agreement import explained_strength, measure_agreement, measure_clear_agreement
+from app.paint.agreement import (
+    measure_agreement,
+    measure_clear_agreement,
+    measure_explained_strength,
+)
 from app.paint.ridges import find_line_like, measure_line_strength
 from app.soccer.pitch import Pitch
 from tests.unit.paint.test_snap import panned
@@ -51,7 +55,7 @@ class TestClearPaint:
         return measure_line_strength(rendered.image, rendered.field)
 
     def explained(self, rendered, strength) -> tuple[float, float]:
-        paint = explained_strength(rendered.truth, rendered.field, strength, Pitch())
+        paint = measure_explained_strength(rendered.truth, rendered.field, strength, Pitch())
         clear = measure_clear_agreement(rendered.truth, rendered.field, strength, Pitch(), paint)
         known = measure_agreement(rendered.truth, rendered.field, strength > 0)
         assert (clear.supported, clear.points) == (known.supported, known.points)
@@ -66,7 +70,7 @@ class TestClearPaint:
         return rows[kept], columns[kept]
 
     def test_faint_ridges_are_left_out_and_strong_ones_are_not(self, rendered, strength):
-        paint = explained_strength(rendered.truth, rendered.field, strength, Pitch())
+        paint = measure_explained_strength(rendered.truth, rendered.field, strength, Pitch())
         rows, columns = (axis[::40] for axis in self.places(rendered, on_pitch=True))
         before = self.explained(rendered, strength)
         faint, strong = strength.copy(), strength.copy()
@@ -89,5 +93,5 @@ class TestClearPaint:
 
     def test_without_paint_nothing_is_explained(self, rendered, strength):
         nothing = np.zeros_like(strength)
-        assert explained_strength(rendered.truth, rendered.field, nothing, Pitch()) == 0
+        assert measure_explained_strength(rendered.truth, rendered.field, nothing, Pitch()) == 0
         assert self.explained(rendered, nothing) == (0, 0)

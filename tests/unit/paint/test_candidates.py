@@ -5,7 +5,14 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PAN, TILT, camera_from_parameters, parameters_from_camera
-from app.paint.candidates import KNOWN, MAIN, WIDE, Library, candidate_cameras, known_library
+from app.paint.candidates import (
+    KNOWN,
+    MAIN,
+    WIDE,
+    Library,
+    candidate_cameras,
+    make_library_of_known_cameras,
+)
 from app.soccer.pitch import Segment
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE
 
@@ -63,7 +70,7 @@ class TestKnownLibrary:
         bent = parameters_from_camera(TRUE, half)
         bent[KAPPA] = 0.08
         near = camera_from_parameters(bent, TRUE.principal_point, half)
-        found = known_library([near, near.scaled(2.0, 2.0)])
+        found = make_library_of_known_cameras([near, near.scaled(2.0, 2.0)])
         assert found.name == KNOWN
         assert found.stands.tolist() == [pytest.approx(TRUE.position.tolist())]
         low, high = found.focal_range

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.goal import goal_height, goal_lines
+from app.paint.goal import find_goal_lines, measure_goal_height
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from tests.cameras import looking
 
@@ -41,7 +41,7 @@ def off(camera: Camera, part: str, points: np.ndarray) -> float:
 
 class TestGoalLines:
     def test_the_parts_that_are_seen_are_found_to_less_than_a_pixel(self) -> None:
-        found = goal_lines(picture(*RIGHT), CAMERA, Pitch())
+        found = find_goal_lines(picture(*RIGHT), CAMERA, Pitch())
         assert sorted(found) == sorted(RIGHT) and len(RIGHT) == 3
         for part, points in found.items():
             assert len(points) == 4
@@ -50,7 +50,7 @@ class TestGoalLines:
     def test_they_are_found_beside_a_camera_that_is_a_little_off(self) -> None:
         shifted = looking((35.0, 55.0, -12.0), (49.1, 0.0, 0.0), 1500.0)
         assert 2 < off(CAMERA, RIGHT[1], shifted.project(PITCH.sample(RIGHT[1], 1.0, 1.0))) < 5
-        found = goal_lines(picture(*RIGHT), shifted, PITCH)
+        found = find_goal_lines(picture(*RIGHT), shifted, PITCH)
         assert sorted(found) == sorted(RIGHT)
         assert max(off(CAMERA, part, np.array(found[part])) for part in found) < 1.0
 
@@ -60,20 +60,20 @@ class TestGoalLines:
         ids=["none", "mostly hidden", "as dark as the crowd"],
     )
     def test_what_is_not_seen_is_not_proposed(self, image: np.ndarray) -> None:
-        assert goal_lines(image, CAMERA, PITCH) == {}
+        assert find_goal_lines(image, CAMERA, PITCH) == {}
 
     def test_a_broad_bright_board_is_no_crossbar(self) -> None:
         image = picture(RIGHT[0], width_px=30)
-        assert RIGHT[0] not in goal_lines(image, CAMERA, PITCH)
+        assert RIGHT[0] not in find_goal_lines(image, CAMERA, PITCH)
 
     def test_a_post_alone_is_proposed_alone(self) -> None:
         (post,) = [part for part in RIGHT if part.endswith("post left")]
-        assert list(goal_lines(picture(post), CAMERA, PITCH)) == [post]
+        assert list(find_goal_lines(picture(post), CAMERA, PITCH)) == [post]
 
 
 class TestGoalHeight:
     def test_a_goal_is_as_high_as_it_is(self) -> None:
-        seen = goal_height(picture(*RIGHT), CAMERA, PITCH)
+        seen = measure_goal_height(picture(*RIGHT), CAMERA, PITCH)
         assert seen is not None and seen.is_square
         assert seen.share == pytest.approx(1.0, abs=0.04)
 
@@ -83,9 +83,9 @@ class TestGoalHeight:
             places = CAMERA.project(PITCH.sample(part, 0.05, 0.05) * (1.0, 1.0, 1.4))
             shown = places.round().astype(np.int32)
             cv2.polylines(image, [shown], False, (220,) * 3, 3, cv2.LINE_AA)
-        seen = goal_height(image, CAMERA, PITCH)
+        seen = measure_goal_height(image, CAMERA, PITCH)
         assert seen is not None and not seen.is_square and seen.is_certain
         assert seen.share == pytest.approx(1.4, abs=0.06)
 
     def test_a_crowd_has_no_goal(self) -> None:
-        assert goal_height(picture(), CAMERA, PITCH) is None
+        assert measure_goal_height(picture(), CAMERA, PITCH) is None

@@ -14,12 +14,12 @@ from app.paint.evidence import find_paint, read_picture, to_paint_evidence, trac
 from app.paint.propose import (
     RankedCamera,
     SearchedFrame,
+    explain_non_square_pixels,
+    explain_uncertain_camera,
+    measure_weakest_marking,
     propose_camera,
     read_frame,
     scale_snapped,
-    weakest_marking,
-    why_not_square,
-    why_unsure,
 )
 from app.paint.snap import SnappedCamera, snap_reading
 from app.sample.render import render
@@ -213,9 +213,9 @@ class TestPropose:
     def test_a_square_picture_needs_a_goal_that_says_so(self):
         # Twice as narrow as it was taken: the grass is foreshortened as from farther up.
         blank = np.full((800, 800, 3), 60, np.uint8)
-        reason = why_not_square(blank, TRUE, PITCH)
+        reason = explain_non_square_pixels(blank, TRUE, PITCH)
         assert reason is not None and "aspect ratio is not that of a broadcast" in reason
-        assert why_not_square(np.full((540, 960, 3), 60, np.uint8), TRUE, PITCH) is None
+        assert explain_non_square_pixels(np.full((540, 960, 3), 60, np.uint8), TRUE, PITCH) is None
 
     def test_three_lines_say_too_little_of_the_camera(self):
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
@@ -225,7 +225,7 @@ class TestPropose:
         snapped = snap_reading(frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
         assert snapped.reason is None
         seen = PaintAgreement(0.9, 0.9, 400)
-        reason = why_unsure([RankedCamera(snapped, seen, 1.0)])
+        reason = explain_uncertain_camera([RankedCamera(snapped, seen, 1.0)])
         assert reason is not None and "too few markings" in reason
 
     def test_a_marking_behind_people_is_not_missed(self):
@@ -239,7 +239,7 @@ class TestPropose:
         reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
         snapped = snap_reading(reading, TRUE, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
         assert snapped.reason is None
-        assert weakest_marking(reading, snapped, PITCH) > 0.7
+        assert measure_weakest_marking(reading, snapped, PITCH) > 0.7
 
     @pytest.mark.parametrize(
         ("picture", "reason"),

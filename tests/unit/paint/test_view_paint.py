@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.paint.snap import PAINT_DISAGREES
-from app.paint.view_paint import PictureScale, read_paint_of_image, why_unreadable
+from app.paint.view_paint import PictureScale, explain_unreadable_picture, read_paint_of_image
 from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
@@ -43,11 +43,13 @@ class TestPictureScale:
 class TestWhyUnreadable:
     @pytest.mark.parametrize(("height", "readable"), [(360, True), (361, True), (362, False)])
     def test_a_rounded_side_is_no_other_shape(self, height: int, readable: bool) -> None:
-        found = why_unreadable(np.zeros((height, 640, 3), np.uint8), ImageSize(1280, 720))
+        found = explain_unreadable_picture(
+            np.zeros((height, 640, 3), np.uint8), ImageSize(1280, 720)
+        )
         assert (found is None) is readable
 
     def test_a_small_picture_is_told_with_its_width_first(self) -> None:
-        found = why_unreadable(np.zeros((90, 160, 3), np.uint8), ImageSize(1280, 720))
+        found = explain_unreadable_picture(np.zeros((90, 160, 3), np.uint8), ImageSize(1280, 720))
         assert found is not None and "(160 x 90 pixels)" in found
 
 

@@ -169,7 +169,7 @@ class TestWriteRecording:
                     ShotPlan("main", 0.4, "wipe"),
                     ShotPlan("main", 1, "wipe"),
                 ],
-                "no longer",
+                "must be longer",
             ),
         ],
     )

@@ -14,17 +14,17 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Calibration
 from app.solving.ball_3d import (
     _ViewSubsets,
-    exported_ball,
-    implausible_reasons,
+    choose_exported_ball,
+    compute_mean_ball,
     is_plausible_position,
-    judged_pairs,
-    mean_ball,
+    judge_pairs,
+    list_implausible_reasons,
 )
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.facts import facts_of
+from app.solving.facts import collect_facts
 from app.solving.judgement import judge_groups
 from app.solving.solve import solve
-from app.solving.triangulate import ball_observations, triangulate_observation_pairs
+from app.solving.triangulate import collect_ball_observations, triangulate_observation_pairs
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_views
 from tests.unit.solving.test_solve import shifted
@@ -44,19 +44,19 @@ class TestImplausible:
         ("outside", "height", "reach"), [(8.0, 14.0, 6.5), (5.0, 20.5, 4.875), (1.0, 38.0, 0.5)]
     )
     def test_the_higher_a_ball_the_less_far_outside_it_may_be(self, outside, height, reach) -> None:
-        ((number, limit, words),) = implausible_reasons(
+        ((number, limit, words),) = list_implausible_reasons(
             (52.5 + outside, 0.0, -height), PITCH, PAPER
         )
         assert (number, limit) == (pytest.approx(outside), pytest.approx(reach))
         assert words == f"is {outside:.0f} m outside the pitch at a height of {height:.2f} m"
 
     def test_each_end_alone_has_its_own_words(self) -> None:
-        found = implausible_reasons((0.0, 62.0, 10.2), PITCH, PAPER)
+        found = list_implausible_reasons((0.0, 62.0, 10.2), PITCH, PAPER)
         assert [words for _, _, words in found] == [
             "lies 10.20 m below the grass",
             "is 28 m outside the pitch",
         ]
-        ((number, limit, words),) = implausible_reasons((0.0, 0.0, -41.0), PITCH, PAPER)
+        ((number, limit, words),) = list_implausible_reasons((0.0, 0.0, -41.0), PITCH, PAPER)
         assert (number, limit, words) == (41.0, 40.0, "flies 41.00 m above the grass")
 
 
@@ -73,12 +73,14 @@ def solved(*shifts: float, policy=PAPER):
     ]
     calibrations = [Calibration("given", camera) for camera in cameras]
     meetings = triangulate_observation_pairs(
-        combinations(ball_observations(views, calibrations), 2)
+        combinations(collect_ball_observations(views, calibrations), 2)
     )
-    facts = facts_of(views, calibrations, meetings)
+    facts = collect_facts(views, calibrations, meetings)
     spread = MeanCovariance(facts)
     judgement = judge_groups(facts, policy, spread)
-    return judged_pairs(meetings, judgement), mean_ball(KEYS, facts, judgement, spread, policy)
+    return judge_pairs(meetings, judgement), compute_mean_ball(
+        KEYS, facts, judgement, spread, policy
+    )
 
 
 class TestJudgedPairs:
@@ -121,13 +123,13 @@ class TestLeavingBall:
     POLICY = replace(PAPER, point="best")
 
     def test_the_mean_leaves_unless_the_policy_asks_for_the_most_likely_point(self):
-        assert exported_ball(self.MEAN, self.BEST, PAPER) is self.MEAN
-        found = exported_ball(self.MEAN, self.BEST, self.POLICY)
+        assert choose_exported_ball(self.MEAN, self.BEST, PAPER) is self.MEAN
+        found = choose_exported_ball(self.MEAN, self.BEST, self.POLICY)
         assert found == Ball3D((1.1, 2.0, -0.4), (0.5,) * 9, 0.2, 20.0, ("a", "b"))
 
     def test_without_a_valid_pair_none_leaves_and_without_a_best_one_the_mean_does(self):
-        assert exported_ball(None, self.BEST, self.POLICY) is None
-        assert exported_ball(self.MEAN, None, self.POLICY) is self.MEAN
+        assert choose_exported_ball(None, self.BEST, self.POLICY) is None
+        assert choose_exported_ball(self.MEAN, None, self.POLICY) is self.MEAN
 
 
 CAMERAS = {"a": MAIN, "b": BEHIND_GOAL, "c": OPPOSITE}
@@ -184,7 +186,7 @@ class TestBestBall:
         assert solve(group(views()[0]), PAPER).best_ball is None
 
     def test_subsets_of_views_have_together_the_bits_that_each_has_alone(self):
-        views = _ViewSubsets(ball_observations(*random_views(11)), PAPER)
+        views = _ViewSubsets(collect_ball_observations(*random_views(11)), PAPER)
         chosen = list(combinations(range(len(views.observations)), 2))
         starts = [np.array([0.0, 0.0, -1.0])] * len(chosen)
         together = views.estimate_subsets(chosen, starts)
@@ -194,7 +196,7 @@ class TestBestBall:
             assert repr(alone) == repr(found)
 
     def test_a_view_of_which_nothing_can_be_computed_takes_no_other_along(self):
-        views = _ViewSubsets(ball_observations(*random_views(11)), PAPER)
+        views = _ViewSubsets(collect_ball_observations(*random_views(11)), PAPER)
         chosen, start = [(0, 1), (0, 2)], np.array([0.0, 0.0, -1.0])
         alone = views.estimate_subsets([chosen[1]], [start])
         # NumPy gives up on all matrices of a call where one has no eigenvalues.

@@ -27,7 +27,7 @@ from app.solving.ball_covariance import (
 from app.solving.facts import facts_from_bytes, facts_to_bytes, group_facts, join_facts
 from app.solving.judgement import judge_groups
 from app.solving.observations import principal_point
-from app.solving.picture_camera import picture_of, warp_of
+from app.solving.picture_camera import picture_to_warp, warp_to_picture
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
@@ -105,7 +105,7 @@ class TestPictureSpreads:
     def pixel(self, unknowns):
         camera = camera_from_parameters(unknowns[:8], MIDDLE, self.HALF)
         return (
-            picture_of(unknowns[8:], (0, 0, 0))
+            warp_to_picture(unknowns[8:], (0, 0, 0))
             .camera_of_shown_picture(camera, SIZE)
             .project(np.array([BALL]))[0]
         )
@@ -115,7 +115,7 @@ class TestPictureSpreads:
         mixed = np.eye(11) + 0.3 * rng.normal(size=(11, 11))
         scale = np.sqrt(np.diag(self.WHOLE))
         whole = mixed @ mixed.T * np.outer(scale, scale)
-        at = np.append(self.taken(), warp_of(self.DONE))
+        at = np.append(self.taken(), picture_to_warp(self.DONE))
         steps = 1e-6 * np.eye(11)
         slopes = (
             np.array([self.pixel(at + step) - self.pixel(at - step) for step in steps]).T / 2e-6

@@ -6,7 +6,13 @@ import pytest
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
 from app.solving.ball_covariance import CLICK_DIAGONAL
-from app.solving.ball_noise import LIMIT, TRIMMED, RayResidual, estimate_ball_noise, ray_residuals
+from app.solving.ball_noise import (
+    LIMIT,
+    TRIMMED,
+    RayResidual,
+    compute_ray_residuals,
+    estimate_ball_noise,
+)
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE
@@ -32,7 +38,7 @@ def dataset(noise_px, groups=120, seed=0, source="lines", views=tuple(VIEWS)):
     return [
         miss
         for _ in range(groups)
-        for miss in ray_residuals(ball_in(views), list(sights(noise_px, rng, source)))
+        for miss in compute_ray_residuals(ball_in(views), list(sights(noise_px, rng, source)))
     ]
 
 
@@ -175,6 +181,6 @@ class TestRigs:
             replace(sight, calibration=replace(sight.calibration, covariance=vague))
             for sight in sights(2.0, rng, "given")
         ]
-        assert ray_residuals(ball_in(VIEWS), rig) == ()
+        assert compute_ray_residuals(ball_in(VIEWS), rig) == ()
         one = [*sights(2.0, rng, "given")][:2] + rig[2:]
-        assert len(ray_residuals(ball_in(VIEWS), one)) == 1
+        assert len(compute_ray_residuals(ball_in(VIEWS), one)) == 1

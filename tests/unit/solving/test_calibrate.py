@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.cameras import error_without
+from app.evaluation.cameras import measure_error_without_marking
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
-from app.solving.calibrate import calibrate, calibrate_station, calibration_key
+from app.solving.calibrate import calibrate, calibrate_station, compute_calibration_key
 from app.solving.jaccard import camera_jaccard
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
@@ -134,14 +134,14 @@ class TestCalibrateStation:
 class TestCalibrationKey:
     def test_names_all_that_is_read(self):
         station = Station("7.png", SIZE, lines=click(MAIN), given=MAIN)
-        key = calibration_key(station, PITCH, POLICY)
+        key = compute_calibration_key(station, PITCH, POLICY)
         others = [
-            calibration_key(replace(station, lines=click(MAIN, 0.1)), PITCH, POLICY),
-            calibration_key(replace(station, given=OPPOSITE), PITCH, POLICY),
-            calibration_key(replace(station, calibration="lines"), PITCH, POLICY),
-            calibration_key(replace(station, given_covariance=(0.25,) * 64), PITCH, POLICY),
-            calibration_key(station, Pitch(104.0), POLICY),
-            calibration_key(station, PITCH, replace(POLICY, robust_scale_px=3.0)),
+            compute_calibration_key(replace(station, lines=click(MAIN, 0.1)), PITCH, POLICY),
+            compute_calibration_key(replace(station, given=OPPOSITE), PITCH, POLICY),
+            compute_calibration_key(replace(station, calibration="lines"), PITCH, POLICY),
+            compute_calibration_key(replace(station, given_covariance=(0.25,) * 64), PITCH, POLICY),
+            compute_calibration_key(station, Pitch(104.0), POLICY),
+            compute_calibration_key(station, PITCH, replace(POLICY, robust_scale_px=3.0)),
         ]
         assert len({key, *others}) == 7
 
@@ -149,14 +149,21 @@ class TestCalibrationKey:
         noisy = [replace(POLICY, line_sigma_px=1.4), replace(POLICY, line_share=0.6)]
         clicked = Station("7.png", SIZE, lines=click(MAIN))
         given = replace(clicked, given=MAIN, calibration="given")
-        assert len({calibration_key(clicked, PITCH, policy) for policy in (POLICY, *noisy)}) == 3
-        assert len({calibration_key(given, PITCH, policy) for policy in (POLICY, *noisy)}) == 1
+        assert (
+            len({compute_calibration_key(clicked, PITCH, policy) for policy in (POLICY, *noisy)})
+            == 3
+        )
+        assert (
+            len({compute_calibration_key(given, PITCH, policy) for policy in (POLICY, *noisy)}) == 1
+        )
 
     def test_does_not_depend_on_the_name_or_the_order_of_lines(self):
         lines = click(MAIN)
         station = Station("7.png", SIZE, lines=lines)
         other = Station("8.png", SIZE, lines=dict(reversed(list(lines.items()))))
-        assert calibration_key(station, PITCH, POLICY) == calibration_key(other, PITCH, POLICY)
+        assert compute_calibration_key(station, PITCH, POLICY) == compute_calibration_key(
+            other, PITCH, POLICY
+        )
 
 
 def station_of(lines, **said) -> Station:
@@ -218,9 +225,9 @@ class TestNotMissing:
         hidden = replace(plain, not_visible=("Circle left",))
         short = CalibrationPolicy(shortest_marking_px=5.0)
         keys = {
-            calibration_key(plain, PITCH, POLICY),
-            calibration_key(hidden, PITCH, POLICY),
-            calibration_key(plain, PITCH, short),
+            compute_calibration_key(plain, PITCH, POLICY),
+            compute_calibration_key(hidden, PITCH, POLICY),
+            compute_calibration_key(plain, PITCH, short),
         }
         assert len(keys) == 3
 
@@ -286,13 +293,14 @@ class TestGoals:
     def test_a_left_out_marking_is_predicted_by_what_is_fitted(self):
         name = "Small rect. right main"
         middle, inner = (
-            error_without(self.LINES, name, PITCH, SIZE, one) for one in (CLICKED, POLICY)
+            measure_error_without_marking(self.LINES, name, PITCH, SIZE, one)
+            for one in (CLICKED, POLICY)
         )
         assert middle < 0.3 < inner
         post = "Goal right post left"
-        assert error_without(self.LINES, post, PITCH, SIZE, CLICKED) < 0.3
+        assert measure_error_without_marking(self.LINES, post, PITCH, SIZE, CLICKED) < 0.3
 
     def test_its_key_is_its_own(self):
         station = Station("a", SIZE, lines=self.LINES)
-        keys = {calibration_key(station, PITCH, one) for one in (POLICY, CLICKED)}
+        keys = {compute_calibration_key(station, PITCH, one) for one in (POLICY, CLICKED)}
         assert len(keys) == 2

@@ -20,7 +20,7 @@ from app.solving.chi_square import (
     sigma_widening,
 )
 from app.solving.facts import Facts, group_facts, join_facts
-from app.solving.judgement import judge_groups, views_in_pairs
+from app.solving.judgement import find_views_in_pairs, judge_groups
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_policy, random_views
@@ -109,7 +109,7 @@ class TestResidualsOf:
         def residuals_at_ball(of: Facts) -> ChiSquareResiduals:
             judgement = judge_groups(of, policy, MeanCovariance(of))
             return chi_square_residuals(
-                of, views_in_pairs(of, judgement.valid), judgement.point, policy
+                of, find_views_in_pairs(of, judgement.valid), judgement.point, policy
             )
 
         together, alone = (
@@ -218,7 +218,7 @@ class TestResidualsWithout:
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
         of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
         judgement = judge_groups(of, policy, MeanCovariance(of))
-        used = views_in_pairs(of, judgement.valid)
+        used = find_views_in_pairs(of, judgement.valid)
         rows = chi_square_residuals_without_each_view(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()
         for row, place in enumerate(np.flatnonzero(used)):

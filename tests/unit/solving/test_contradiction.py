@@ -17,12 +17,12 @@ from app.solving.contradiction import (
     SPEEDS,
     TYPICAL_SPEED,
     Contradiction,
-    chi_square_of,
+    compute_chi_square,
     find_contradiction,
 )
-from app.solving.facts import facts_of
+from app.solving.facts import collect_facts
 from app.solving.judgement import judge_groups
-from app.solving.triangulate import ball_observations, triangulate_observation_pairs
+from app.solving.triangulate import collect_ball_observations, triangulate_observation_pairs
 from tests.balls import seen
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -42,10 +42,12 @@ def torn(
         point = BallAnnotation(point=seen(CAMERAS[key], place))
         views.append(replace(given_view(key, CAMERAS[key], ball), balls=(point,)))
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
-    sights = ball_observations(views, calibrations)
-    facts = facts_of(views, calibrations, triangulate_observation_pairs(combinations(sights, 2)))
+    sights = collect_ball_observations(views, calibrations)
+    facts = collect_facts(
+        views, calibrations, triangulate_observation_pairs(combinations(sights, 2))
+    )
     judgement = judge_groups(facts, policy, MeanCovariance(facts))
-    chi_square = chi_square_of(keys, facts, judgement, policy)
+    chi_square = compute_chi_square(keys, facts, judgement, policy)
     return chi_square, find_contradiction(chi_square, keys, facts, judgement, sights, policy)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, PaintFit, Pair
-from app.solving.gates import JudgedView, describe_gates, odds_text
+from app.solving.gates import JudgedView, describe_gates, describe_odds
 from app.solving.judgement import Judgement
 from tests.cameras import looking
 
@@ -415,4 +415,4 @@ class TestChiSquare:
         ],
     )
     def test_chance_is_said_for_people(self, p_value, words):
-        assert odds_text(p_value) == words
+        assert describe_odds(p_value) == words

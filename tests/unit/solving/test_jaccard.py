@@ -13,8 +13,8 @@ from app.solving.jaccard import (
     ProjectedMarking,
     _sample_markings,
     camera_jaccard,
+    classify_markings,
     jaccard,
-    marking_outcomes,
     measure_markings,
     project_markings,
 )
@@ -41,7 +41,7 @@ class TestProjectMarkings:
 class TestOutcomes:
     def outcomes(self, lines, gamma=2.0):
         measured = measure_markings(project_markings(ABOVE, PITCH, SMALL), make_lines(lines))
-        return marking_outcomes(measured, make_lines(lines), gamma)
+        return classify_markings(measured, make_lines(lines), gamma)
 
     def test_one_far_point_makes_the_whole_marking_a_false_positive(self):
         near, far = [(100.5, 20.0), (101.0, 150.0)], [(100.5, 20.0), (102.0, 150.0)]
@@ -109,15 +109,15 @@ class TestOutcomesOfMeasured:
 
     def test_a_point_at_gamma_is_not_close(self):
         lines = make_lines({"Middle line": [(0.0, 0.0)]})
-        assert marking_outcomes({"Middle line": self.NEAR}, lines, 2.0) == {"Middle line": "fp"}
-        assert marking_outcomes({"Middle line": self.NEAR}, lines, 2.001) == {"Middle line": "tp"}
+        assert classify_markings({"Middle line": self.NEAR}, lines, 2.0) == {"Middle line": "fp"}
+        assert classify_markings({"Middle line": self.NEAR}, lines, 2.001) == {"Middle line": "tp"}
 
     def test_an_empty_annotation_is_none(self):
         bare = ProjectedMarking(np.zeros((2, 2)), np.empty(0), np.empty((0, 2)))
-        assert marking_outcomes({"Middle line": bare}, {"Middle line": ()}, 2.0) == {
+        assert classify_markings({"Middle line": bare}, {"Middle line": ()}, 2.0) == {
             "Middle line": "fp"
         }
-        assert marking_outcomes({}, {"Middle line": ()}, 2.0) == {}
+        assert classify_markings({}, {"Middle line": ()}, 2.0) == {}
 
 
 class TestJaccard:

@@ -17,11 +17,11 @@ from app.solving.facts import Facts, group_facts, join_facts
 from app.solving.judgement import (
     PASSES,
     Judgement,
-    first_failed_gates,
+    compute_view_jac,
+    find_first_failed_gates,
     judge_groups,
     judge_known_failures,
     recompare_thresholds,
-    view_jac,
 )
 from tests.unit.solving.random_groups import random_policy, random_views
 
@@ -122,8 +122,8 @@ class TestJudge:
     def test_where_only_the_first_gate_matters_the_first_is_the_same(self, seeds, seed):
         policy = random_policy(seed)
         found = join_facts([group_facts(*random_views(seed)) for seed in seeds])
-        jac = view_jac(found, policy.jac_gamma_percent)
-        standing, uncertainty = first_failed_gates(found, jac, policy), MeanCovariance(found)
+        jac = compute_view_jac(found, policy.jac_gamma_percent)
+        standing, uncertainty = find_first_failed_gates(found, jac, policy), MeanCovariance(found)
         told = judge_known_failures(found, policy, uncertainty, jac, standing, first_alone=True)
         assert told.first.tolist() == judged(found, policy).first.tolist()
 
@@ -352,12 +352,12 @@ class TestJudge:
 class TestViewJac:
     def test_a_point_at_gamma_is_not_close(self):
         """0.2 % of 1000 px are the 2 px of the second marking."""
-        assert view_jac(facts(), 0.2).tolist() == [0.25, 0.25]
-        assert view_jac(facts(), 0.2000001).tolist() == [0.5, 0.5]
+        assert compute_view_jac(facts(), 0.2).tolist() == [0.25, 0.25]
+        assert compute_view_jac(facts(), 0.2000001).tolist() == [0.5, 0.5]
 
     def test_measured_with_nothing_to_see_is_zero(self):
         bare = facts(mark_view=np.empty(0, np.int64), mark_px=np.empty(0))
-        assert view_jac(bare, 0.5).tolist() == [0.0, 0.0]
+        assert compute_view_jac(bare, 0.5).tolist() == [0.0, 0.0]
 
 
 FOUR = join_facts([facts()] * 4)

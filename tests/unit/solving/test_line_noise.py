@@ -10,10 +10,10 @@ from app.solving.line_noise import (
     EXPECTED_PX,
     LinePrior,
     calibrated_log_sigma,
+    collect_line_evidence,
     estimate_line_noise,
     interpolate_cost,
     jackknife_variance,
-    line_evidence,
     line_noise,
     lowest_cost_vertex,
     posterior_variance,
@@ -51,7 +51,7 @@ def held(share):
 
 def evidence_of(share, sigma=1.0, seed=0):
     jacobian, residuals, marking, _ = fitted(share, sigma, seed)
-    return line_evidence(residuals, jacobian, marking, NO_PRIOR)
+    return collect_line_evidence(residuals, jacobian, marking, NO_PRIOR)
 
 
 class TestEstimateLineNoise:

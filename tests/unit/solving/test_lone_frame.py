@@ -16,13 +16,13 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
 from app.solving.calibrate import (
+    analyse_lone_frame,
     calibrate,
     calibrate_view,
-    lone_frame_of,
-    view_keys,
+    compute_view_keys,
     with_lone_covariance,
 )
-from app.solving.calibration_findings import lone_findings
+from app.solving.calibration_findings import find_pitch_findings_of_lone_frame
 from app.solving.lone_frame import PRIORS, LoneFrame
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, PITCH, click
@@ -38,7 +38,7 @@ INSIDE = float(chi2.ppf(0.95, 3))
 def alone(lines: Lines, policy: CalibrationPolicy = ANY) -> tuple[Camera, FloatArray, LoneFrame]:
     """The camera, its covariance by the clicks, and what nobody says of the frame."""
     found = calibrate(lines, PITCH, SIZE, policy)
-    lone = lone_frame_of(found, lines, PITCH, SIZE, policy)
+    lone = analyse_lone_frame(found, lines, PITCH, SIZE, policy)
     assert found.camera is not None and found.covariance is not None and lone is not None
     return found.camera, np.reshape(found.covariance, (8, 8)), lone
 
@@ -96,25 +96,25 @@ class TestLoneFrame:
         lines = click(camera, 1.0, 3, Pitch(95.0, 68.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
         assert found.suspects
-        lone = lone_frame_of(found, lines, PITCH, SIZE, ANY)
+        lone = analyse_lone_frame(found, lines, PITCH, SIZE, ANY)
         assert lone is not None
         assert set(lone.explains) == {suspect.marking for suspect in found.suspects}
         assert lone.pitch.length == pytest.approx(95.0, abs=1.0)
-        (finding,) = lone_findings(lone, PITCH)
+        (finding,) = find_pitch_findings_of_lone_frame(lone, PITCH)
         assert finding.kind == "pitch_size"
         assert f"{lone.explains[0]}" in finding.sentence
 
     def test_where_both_are_known_nothing_is_added(self) -> None:
         lines = click(WIDE, 1.0)
         found = calibrate(lines, PITCH, SIZE, PAPER.calibration)
-        assert lone_frame_of(found, lines, PITCH, SIZE, PAPER.calibration) is None
+        assert analyse_lone_frame(found, lines, PITCH, SIZE, PAPER.calibration) is None
         assert with_lone_covariance(found, None) is found
         assert PAPER.calibration.lone_frames == STRICT.calibration.lone_frames == "exact"
 
     def test_the_camera_itself_stays(self) -> None:
         lines = click(WIDE, 1.0, 3, Pitch(98.0, 64.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
-        told = with_lone_covariance(found, lone_frame_of(found, lines, PITCH, SIZE, ANY))
+        told = with_lone_covariance(found, analyse_lone_frame(found, lines, PITCH, SIZE, ANY))
         assert told == replace(found, covariance=told.covariance)
         assert told.covariance != found.covariance
 
@@ -134,9 +134,9 @@ class TestOfDataset:
     def test_a_single_view_without_a_match_is_alone(self) -> None:
         group = self.group(self.view("a"))
         assert self.sigma(group, TOUCHLINE.calibration) > 2 * self.sigma(group, PAPER.calibration)
-        key, clicks = view_keys(group, group.views[0], TOUCHLINE.calibration)
+        key, clicks = compute_view_keys(group, group.views[0], TOUCHLINE.calibration)
         exact = replace(TOUCHLINE.calibration, lone_frames="exact")
-        assert view_keys(group, group.views[0], exact) == (clicks,) != (key,)
+        assert compute_view_keys(group, group.views[0], exact) == (clicks,) != (key,)
 
     @pytest.mark.parametrize("kind", ["of a match", "two views", "said picture", "other pitch"])
     def test_others_are_as_they_were(self, kind: str) -> None:
@@ -150,5 +150,5 @@ class TestOfDataset:
             group = replace(group, pitch=Pitch(104.0, 68.0))
         policies = (TOUCHLINE.calibration, replace(TOUCHLINE.calibration, lone_frames="exact"))
         assert self.sigma(group, policies[0]) == self.sigma(group, policies[1])
-        keys = [view_keys(group, group.views[0], policy) for policy in policies]
+        keys = [compute_view_keys(group, group.views[0], policy) for policy in policies]
         assert keys[0] == keys[1]

@@ -13,7 +13,7 @@ from app.solving.match_picture import (
     choose_frames,
     estimate_match_picture,
 )
-from app.solving.picture_camera import warp_of
+from app.solving.picture_camera import picture_to_warp
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
 
@@ -39,7 +39,7 @@ def wide():
 
 class TestEstimateMatchPicture:
     def test_many_frames_tell_pixels_that_are_five_per_cent_too_wide(self, wide):
-        off = np.abs(warp_of(wide.picture) - warp_of(WIDE))
+        off = np.abs(picture_to_warp(wide.picture) - picture_to_warp(WIDE))
         assert off[0] < 0.012
         assert (off < 3 * np.array(wide.picture.sigma)).all()
         assert wide.frames == 6

@@ -11,8 +11,8 @@ from app.solving.match_position import (
     NO_PLACES,
     FramePlace,
     Places,
+    find_camera_place,
     guess_matches,
-    place_of,
     share_position,
 )
 from tests.cameras import SIZE, looking
@@ -51,7 +51,7 @@ def few(seed, stand=STAND):
 
 def others(stand=STAND):
     frames = [frame(x, seed=seed, stand=stand) for seed, x in enumerate((-38, -30, 28, 34, 38, 40))]
-    places = [place_of(calibrate(lines, PITCH, SIZE, POLICY), SIZE) for lines in frames]
+    places = [find_camera_place(calibrate(lines, PITCH, SIZE, POLICY), SIZE) for lines in frames]
     return Places([found for found in places if found is not None])
 
 
@@ -62,12 +62,12 @@ def match():
 
 class TestPlaceOf:
     def test_a_main_camera_that_its_lines_determine_has_a_place(self):
-        found = place_of(calibrate(frame(34.0), PITCH, SIZE, POLICY), SIZE)
+        found = find_camera_place(calibrate(frame(34.0), PITCH, SIZE, POLICY), SIZE)
         assert found.position == pytest.approx(STAND, abs=1.5)
         assert np.degrees(found.pan) == pytest.approx(29, abs=3)
 
     def test_a_replay_has_none(self):
-        assert place_of(calibrate(click(BEHIND_GOAL), PITCH, SIZE, POLICY), SIZE) is None
+        assert find_camera_place(calibrate(click(BEHIND_GOAL), PITCH, SIZE, POLICY), SIZE) is None
 
 
 class TestPrior:

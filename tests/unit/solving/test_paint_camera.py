@@ -19,7 +19,7 @@ from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.solving.calibrate import calibrate_view, paint_search_key, view_key
+from app.solving.calibrate import calibrate_view, compute_paint_search_key, compute_view_key
 from app.solving.paint_camera import step_to_paint
 from app.solving.solve import solve
 from tests.balls import box_around
@@ -70,7 +70,7 @@ def clicked() -> Group:
 def read(group: Group, **changes) -> Group:
     """The group, the paint of whose first picture was read."""
     view = group.views[0]
-    key = paint_search_key(group, view, CLICKS)
+    key = compute_paint_search_key(group, view, CLICKS)
     reading = PaintReading("f" * 32, key, painted(MAIN), None, 0.9, 0.8)
     return replace(group, paint={view.key: replace(reading, **changes)})
 
@@ -106,7 +106,7 @@ class TestCamera:
         pitch, apart = Pitch(goal="laws"), {}
         for policy in (TOLD, replace(TOLD, goal="laws")):
             group = clicked()
-            key = paint_search_key(group, group.views[0], replace(policy, source="lines"))
+            key = compute_paint_search_key(group, group.views[0], replace(policy, source="lines"))
             reading = PaintReading("f" * 32, key, painted(MAIN, pitch=pitch), None, 0.9, 0.8)
             found = first(replace(group, paint={group.views[0].key: reading}), policy)
             assert found.source == "paint"
@@ -157,12 +157,14 @@ class TestKey:
         group = read(clicked())
         view = group.views[0]
         for policy in (CLICKS, PAPER.calibration):
-            assert view_key(group, view, policy) == view_key(clicked(), view, policy)
+            assert compute_view_key(group, view, policy) == compute_view_key(
+                clicked(), view, policy
+            )
             assert first(group, policy) == first(clicked(), policy)
 
     def test_paint_that_was_not_read_leaves_the_key_of_the_clicks(self):
         view = clicked().views[0]
-        assert view_key(clicked(), view, TOLD) == view_key(clicked(), view, CLICKS)
+        assert compute_view_key(clicked(), view, TOLD) == compute_view_key(clicked(), view, CLICKS)
 
     def test_what_counts_as_missing_leaves_paint_as_it_was_read(self):
         """It changes how a camera is measured, and no camera."""
@@ -176,7 +178,7 @@ class TestKey:
             assert found.source == other.source == "paint"
             assert found.camera == other.camera == first(group).camera
         keys = {
-            view_key(group, view, replace(TOLD, shortest_marking_px=shortest))
+            compute_view_key(group, view, replace(TOLD, shortest_marking_px=shortest))
             for shortest in (0.0, 5.0)
         }
         assert len(keys) == 2
@@ -187,12 +189,15 @@ class TestKey:
         station = Station("a", ImageSize(960, 540), lines=make_lines(lines))
         group = Group("g", (View("a", station, ()),))
         before = replace(TOLD, goal="inner", weighed="points")
-        assert paint_search_key(group, group.views[0], before) == "5e1cff3d68f54b070aa1f12d1f685e29"
+        assert (
+            compute_paint_search_key(group, group.views[0], before)
+            == "5e1cff3d68f54b070aa1f12d1f685e29"
+        )
 
     def test_the_noise_that_a_dataset_shows_moves_no_camera_and_makes_no_reading_stale(self):
         group, noise = clicked(), {"line_sigma_px": 2.5, "line_share": 0.4}
-        quiet, noisy = paint_search_key(group, group.views[0], TOLD), replace(TOLD, **noise)
-        assert paint_search_key(group, group.views[0], noisy) == quiet
+        quiet, noisy = compute_paint_search_key(group, group.views[0], TOLD), replace(TOLD, **noise)
+        assert compute_paint_search_key(group, group.views[0], noisy) == quiet
         found, other = first(group, CLICKS), first(group, replace(CLICKS, **noise))
         assert found.camera == other.camera and found.covariance != other.covariance
 
@@ -207,7 +212,7 @@ class TestKey:
 
     def test_each_reading_has_a_key_of_its_own(self):
         groups = (clicked(), read(clicked()), read(clicked(), supported=0.5))
-        assert len({view_key(group, group.views[0], TOLD) for group in groups}) == 3
+        assert len({compute_view_key(group, group.views[0], TOLD) for group in groups}) == 3
 
     def test_a_reading_for_other_lines_does_not_count(self):
         group = read(clicked())
@@ -228,7 +233,9 @@ class TestKey:
         painted = read(bare)
         assert first(painted).source != "paint"
         assert first(painted) == first(bare)
-        assert view_key(painted, painted.views[0], TOLD) == view_key(bare, bare.views[0], TOLD)
+        assert compute_view_key(painted, painted.views[0], TOLD) == compute_view_key(
+            bare, bare.views[0], TOLD
+        )
 
 
 def kinds(group: Group, policy=TOUCHLINE):

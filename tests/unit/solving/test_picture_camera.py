@@ -8,9 +8,14 @@ from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.picture import OPEN, PictureGeometry
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import calibrate, calibrate_picture, calibrate_station, calibration_key
+from app.solving.calibrate import (
+    calibrate,
+    calibrate_picture,
+    calibrate_station,
+    compute_calibration_key,
+)
 from app.solving.observations import observations_of_lines
-from app.solving.picture_camera import PictureProblem, estimate_picture, warp_of
+from app.solving.picture_camera import PictureProblem, estimate_picture, picture_to_warp
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, click
@@ -33,7 +38,7 @@ def fitted(picture, lines):
 class TestRows:
     def test_derivatives_are_those_of_the_distances(self):
         search = fitted(OPEN, shown(BOTH, noise_px=1.0))
-        at = np.append(search.problem.parameters(BEHIND_GOAL), warp_of(BOTH) + 0.01)
+        at = np.append(search.problem.parameters(BEHIND_GOAL), picture_to_warp(BOTH) + 0.01)
         _, jacobian = search.rows(at)
         for column in range(PARAMETERS, PARAMETERS + 3):
             step = np.zeros(PARAMETERS + 3)
@@ -46,7 +51,7 @@ class TestRows:
         lines = shown(STRETCHED)
         moved = make_lines({name: [(x + 2.0, y) for x, y in at] for name, at in lines.items()})
         search = fitted(OPEN, moved)
-        at = np.append(search.problem.parameters(BEHIND_GOAL), warp_of(STRETCHED))
+        at = np.append(search.problem.parameters(BEHIND_GOAL), picture_to_warp(STRETCHED))
         apart = np.abs(search.rows(at)[0])
         # Two pixels aside, whatever the direction of a line: at most two pixels off, and not 1.5.
         assert 1.8 < apart.max() < 2.1
@@ -59,7 +64,7 @@ class TestEstimatePicture:
         found = estimate_picture(
             problem, observations_of_lines(shown(truth, noise_px=0.3), PITCH, SIZE), OPEN
         )
-        off = np.abs(warp_of(found) - warp_of(truth))
+        off = np.abs(picture_to_warp(found) - picture_to_warp(truth))
         assert (off < 4 * np.array(found.sigma)).all()
         assert off.max() < 0.05
 
@@ -124,6 +129,10 @@ class TestCalibrateStation:
     def test_the_key_knows_the_picture_where_the_lines_count(self):
         station = Station("a", SIZE, lines=click(MAIN, 0.5))
         other = replace(station, picture=OPEN)
-        assert calibration_key(station, PITCH, POLICY) != calibration_key(other, PITCH, POLICY)
+        assert compute_calibration_key(station, PITCH, POLICY) != compute_calibration_key(
+            other, PITCH, POLICY
+        )
         given, same = (replace(item, given=MAIN) for item in (station, other))
-        assert calibration_key(given, PITCH, POLICY) == calibration_key(same, PITCH, POLICY)
+        assert compute_calibration_key(given, PITCH, POLICY) == compute_calibration_key(
+            same, PITCH, POLICY
+        )

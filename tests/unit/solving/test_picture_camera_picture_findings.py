@@ -6,7 +6,7 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.calibration_findings import calibration_findings
+from app.solving.calibration_findings import find_calibration_findings
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, click
 
@@ -31,7 +31,7 @@ def found(camera, noise_px=0.5, seed=0):
 
 
 def sentence(calibration):
-    said = list(calibration_findings(calibration, SIZE, "a"))
+    said = list(find_calibration_findings(calibration, SIZE, "a"))
     return next(item.sentence for item in said if item.kind == "picture_geometry")
 
 

@@ -15,7 +15,7 @@ from app.solving.pitch_size import (
     eliminate_camera,
     eliminate_own_numbers,
     estimate_pitch,
-    sigmas_of_shared_numbers,
+    estimate_sigmas_of_shared_numbers,
 )
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
@@ -170,10 +170,10 @@ class TestWithOwnNumbers:
 
 class TestSharedSigmas:
     def test_frames_that_agree_leave_what_clicks_say(self) -> None:
-        found = sigmas_of_shared_numbers(np.zeros((5, 2)), np.diag([4.0, 25.0]), spent=1)
+        found = estimate_sigmas_of_shared_numbers(np.zeros((5, 2)), np.diag([4.0, 25.0]), spent=1)
         assert found == pytest.approx([0.5, 0.2])
 
     def test_frames_that_disagree_know_it_worse_than_clicks_say(self) -> None:
         pulls = np.array([[3.0, 0.0], [-3.0, 0.0], [3.0, 0.0], [-3.0, 0.0]])
-        found = sigmas_of_shared_numbers(pulls, np.diag([4.0, 25.0]), spent=2)
+        found = estimate_sigmas_of_shared_numbers(pulls, np.diag([4.0, 25.0]), spent=2)
         assert found == pytest.approx([np.sqrt(36 * 4 / 2) / 4, 0.2])

@@ -8,7 +8,7 @@ from app.geometry.resection import parameters_from_camera, projection_jacobians
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.rig import RigCamera, RigFrame, adjust_rig, grass_in_view, make_rig
+from app.solving.rig import RigCamera, RigFrame, adjust_rig, make_rig, sample_grass_in_view
 from tests.cameras import EVERY_COEFFICIENT, SIZE, wide
 from tests.rigs import TRUTH, cameras, frames
 
@@ -29,7 +29,7 @@ def off_px(rig, parameters) -> list[float]:
     """How far each camera shows the grass from where the true one does, pixels."""
     apart = []
     for camera, row, true in zip(rig.cameras, parameters, TRUTH.values(), strict=True):
-        grass = grass_in_view(camera)
+        grass = sample_grass_in_view(camera)
         moved = camera.with_parameters(row).project(grass) - true.project(grass)
         apart.append(float(np.median(np.hypot(*moved.T))))
     return apart
@@ -116,7 +116,7 @@ class TestAdjust:
             rig = rig_of(seed)
             fit = adjust_rig(rig)
             for row, camera in enumerate(rig.cameras):
-                grass = grass_in_view(camera)[::7]
+                grass = sample_grass_in_view(camera)[::7]
                 rows = np.repeat(TRUE[row][None], len(grass), axis=0)
                 slopes = projection_jacobians(rows, grass, np.full(len(grass), HALF))
                 spread = slopes @ fit.covariance_of(row) @ slopes.transpose(0, 2, 1)

@@ -9,7 +9,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.rig import RigFrame, make_rig
-from app.solving.rig_proposal import BLOCK, error_covariance, propose_rig
+from app.solving.rig_proposal import BLOCK, compute_error_covariance, propose_rig
 from tests.cameras import SIZE
 from tests.rigs import GIVEN, TRUTH, cameras, frames, off
 
@@ -102,7 +102,9 @@ def gaps_of(seed: int) -> np.ndarray:
     balls = best_points(TRUE, rig.rays, np.inf)
     covariances = np.array(
         [
-            error_covariance(camera, TRUE[row], balls[rig.rays.point[rig.rays.camera == row]])
+            compute_error_covariance(
+                camera, TRUE[row], balls[rig.rays.point[rig.rays.camera == row]]
+            )
             for row, camera in enumerate(rig.cameras)
         ]
     )
@@ -123,7 +125,7 @@ def rig():
 class TestErrorCovariance:
     def test_moves_balls_in_the_mean_square_as_far_as_the_error_does(self, rig):
         camera, balls = rig.cameras[0], best_points(TRUE, rig.rays, np.inf)
-        covariance = error_covariance(camera, TRUE[0], balls)
+        covariance = compute_error_covariance(camera, TRUE[0], balls)
         moved = camera.camera.project(balls) - TRUTH["cam1"].project(balls)
         rng = np.random.default_rng(5)
         draws = rng.multivariate_normal(TRUE[0], covariance, 400)
@@ -134,7 +136,9 @@ class TestErrorCovariance:
         assert np.mean(np.square(apart)) == pytest.approx(np.mean(moved**2), rel=0.2)
 
     def test_any_error_is_possible(self, rig):
-        covariance = error_covariance(rig.cameras[0], TRUE[0], best_points(TRUE, rig.rays, np.inf))
+        covariance = compute_error_covariance(
+            rig.cameras[0], TRUE[0], best_points(TRUE, rig.rays, np.inf)
+        )
         lengths = np.sqrt(np.diag(covariance))
         assert np.linalg.eigvalsh(covariance / np.outer(lengths, lengths))[0] > 1e-6
 
@@ -146,4 +150,6 @@ class TestErrorCovariance:
     def test_a_camera_that_stands_right_is_not_off(self, rig):
         camera = replace(rig.cameras[0], camera=rig.cameras[0].with_parameters(TRUE[0]))
         own = camera.parameters
-        assert (error_covariance(camera, own, best_points(TRUE, rig.rays, np.inf)) == 0).all()
+        assert (
+            compute_error_covariance(camera, own, best_points(TRUE, rig.rays, np.inf)) == 0
+        ).all()

@@ -11,7 +11,7 @@ from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.sides import SwappedView, find_swaps, turned_camera
+from app.solving.sides import SwappedView, find_swaps, turn_camera
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
@@ -29,7 +29,7 @@ def sight(
 
 
 A, B, C = sight("a", MAIN), sight("b", BEHIND_GOAL), sight("c", OPPOSITE)
-TURNED = sight("b", BEHIND_GOAL, labelled=turned_camera(BEHIND_GOAL))
+TURNED = sight("b", BEHIND_GOAL, labelled=turn_camera(BEHIND_GOAL))
 
 
 def swaps(
@@ -41,11 +41,11 @@ def swaps(
 class TestTurnedCamera:
     @given(st.floats(5, 50), st.floats(-30, 30), st.floats(-8, 0))
     def test_sees_the_turned_point_where_the_camera_sees_the_point(self, x, y, z):
-        there = turned_camera(MAIN).project(np.array([[-x, -y, z]]))
+        there = turn_camera(MAIN).project(np.array([[-x, -y, z]]))
         assert np.allclose(there, MAIN.project(np.array([[x, y, z]])), equal_nan=True)
 
     def test_turned_twice_is_the_camera(self):
-        assert turned_camera(turned_camera(OPPOSITE)) == OPPOSITE
+        assert turn_camera(turn_camera(OPPOSITE)) == OPPOSITE
 
 
 class TestFindSwaps:
@@ -86,12 +86,12 @@ class TestFindSwaps:
     def test_a_view_whose_lines_fit_badly_says_nothing_of_others(self):
         assert find_swaps(A, (A,), PITCH, PAPER, doubtful=(B, C)) == ()
         assert find_swaps(None, (TURNED,), PITCH, PAPER, doubtful=()) == ()
-        wrong = sight("c", OPPOSITE, labelled=turned_camera(OPPOSITE))
+        wrong = sight("c", OPPOSITE, labelled=turn_camera(OPPOSITE))
         named = find_swaps(A, (A, B), PITCH, PAPER, doubtful=(wrong,))
         assert [swap.view for swap in named] == ["c"]
 
     def test_a_main_camera_on_the_far_side_is_the_one_to_turn(self):
-        wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
+        wrong = sight("a", MAIN, labelled=turn_camera(MAIN))
         (found,) = swaps(wrong, B, C, first=wrong)
         assert (found.view, found.turned_error_px) == ("a", pytest.approx(0.0, abs=1e-3))
 
@@ -99,13 +99,13 @@ class TestFindSwaps:
     def test_a_main_camera_on_the_far_side_is_named_though_all_agree_or_nobody_can_tell(
         self, usable
     ):
-        wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
+        wrong = sight("a", MAIN, labelled=turn_camera(MAIN))
         others = (wrong, TURNED)
         found = swaps(*(others[place] for place in usable), first=wrong)
         assert found == (SwappedView("a", None, None, 0.9),)
 
     def test_a_given_main_camera_may_stand_where_it_likes(self):
-        far = sight("a", turned_camera(MAIN), source="given")
+        far = sight("a", turn_camera(MAIN), source="given")
         far = replace(far, center=ImagePoint(9.0, 9.0))
         assert [swap.view for swap in swaps(far, B, first=far)] != ["a"]
 
@@ -131,5 +131,5 @@ class TestAnAccident:
         assert found.view == "b"
 
     def test_two_replays_that_are_both_swapped_do_not_clear_each_other(self):
-        other = sight("c", OPPOSITE, labelled=turned_camera(OPPOSITE))
+        other = sight("c", OPPOSITE, labelled=turn_camera(OPPOSITE))
         assert [swap.view for swap in swaps(A, TURNED, other)] == ["b", "c"]

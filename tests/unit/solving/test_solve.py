@@ -12,7 +12,7 @@ from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
 from app.solving.calibrate import calibrate_station
-from app.solving.calibration_findings import calibration_findings
+from app.solving.calibration_findings import find_calibration_findings
 from app.solving.solve import solve
 from tests.balls import BALL_M
 from tests.cameras import SIZE, looking, wide
@@ -439,13 +439,13 @@ class TestCalibrationFindings:
         ]
 
     def test_one_slipped_point_is_no_wrong_label_even_where_the_marking_was_left_out(self, clean):
-        found = calibration_findings(left_out("Side line top", (0.4, 0.3, 48.5, 0.2)), SIZE)
+        found = find_calibration_findings(left_out("Side line top", (0.4, 0.3, 48.5, 0.2)), SIZE)
         assert [(item.kind, item.fix.action, item.fix.index) for item in found] == [
             ("bad_point", "drop_point", 2)
         ]
 
     def test_a_marking_that_is_off_with_all_its_points_contradicts_the_others(self, clean):
-        found = calibration_findings(left_out("Side line top", (30.0, 33.0, 48.5, 29.0)), SIZE)
+        found = find_calibration_findings(left_out("Side line top", (30.0, 33.0, 48.5, 29.0)), SIZE)
         assert [(item.kind, item.fix.action) for item in found] == [("wrong_label", "drop_marking")]
 
     def test_a_marking_in_sight_that_nobody_annotated_is_said(self, clean):

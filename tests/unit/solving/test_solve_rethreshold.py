@@ -10,9 +10,9 @@ from app.soccer.policy import PAPER, STRICT, Policy
 from app.soccer.solution import Solution
 from app.solving.facts import Facts
 from app.solving.solve import (
-    differs_in_smaller_tau,
+    differs_only_in_smaller_tau,
     has_unchanged_pairs,
-    rethreshold,
+    rethreshold_solution,
     solve,
     solve_with_facts,
 )
@@ -51,15 +51,15 @@ def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None
     now = solve(found, policy)
     if not has_unchanged_pairs(facts, before, policy)[0]:
         return None, now
-    return rethreshold(then, facts.view_diagonal.tolist(), policy), now
+    return rethreshold_solution(then, facts.view_diagonal.tolist(), policy), now
 
 
 class TestHasSmallerTau:
     def test_nothing_else_may_differ_but_the_name(self):
-        assert differs_in_smaller_tau(with_tau(0.9), PAPER)
-        assert not differs_in_smaller_tau(PAPER, PAPER)
-        assert not differs_in_smaller_tau(with_tau(1.1), PAPER)
-        assert not differs_in_smaller_tau(replace(with_tau(0.9), min_jac=0.8), PAPER)
+        assert differs_only_in_smaller_tau(with_tau(0.9), PAPER)
+        assert not differs_only_in_smaller_tau(PAPER, PAPER)
+        assert not differs_only_in_smaller_tau(with_tau(1.1), PAPER)
+        assert not differs_only_in_smaller_tau(replace(with_tau(0.9), min_jac=0.8), PAPER)
 
 
 class TestUndecided:
@@ -100,12 +100,12 @@ class TestRetold:
         assert told is None or told == solved
         then, facts = solve_with_facts(of, PAPER, {})
         least = with_tau(0.99 * max(errors))
-        assert rethreshold(then, facts.view_diagonal.tolist(), least) is None
+        assert rethreshold_solution(then, facts.view_diagonal.tolist(), least) is None
 
     def test_leaves_turned_views_to_the_solver(self):
         then, facts = solve_with_facts(apart(0.0, 0.0), PAPER, {})
         turned = replace(then, findings=(replace(PLAIN, kind="sides_swapped"), *then.findings))
-        assert rethreshold(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
+        assert rethreshold_solution(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
 
 
 PLAIN = solve(apart(0.0, 8 * TAU_PX), PAPER).findings[0]

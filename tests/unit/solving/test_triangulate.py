@@ -21,8 +21,8 @@ from app.soccer.solution import Calibration
 from app.solving.triangulate import (
     BallObservation,
     CameraNumbers,
-    arrays_of_pairs,
-    ball_observations,
+    collect_ball_observations,
+    stack_pairs,
     triangulate_observation_pairs,
 )
 from tests.cameras import SIZE
@@ -83,7 +83,7 @@ def looks_at(key: str, camera: Camera, point: tuple[float, float, float]) -> Bal
 
 
 def sights(*views: View, cameras=(MAIN, BEHIND_GOAL)) -> list[BallObservation]:
-    return ball_observations(views, [Calibration("given", camera) for camera in cameras])
+    return collect_ball_observations(views, [Calibration("given", camera) for camera in cameras])
 
 
 class TestSight:
@@ -137,13 +137,13 @@ class TestSightsOf:
 
     def test_a_point_has_no_diameter(self):
         a = replace(given_view("a", MAIN, BALL), balls=(BallAnnotation(point=ImagePoint(9, 8)),))
-        (found,) = ball_observations([a], [Calibration("given", MAIN)])
+        (found,) = collect_ball_observations([a], [Calibration("given", MAIN)])
         assert (found.diameter_px, found.center) == (0.0, (9, 8))
 
     def test_a_ball_where_the_lens_shows_nothing_is_none(self):
         barrel = replace(MAIN, distortion=np.array([-5.0, *np.zeros(11)]))
         a = View("a", Station("a", SIZE, given=barrel), (BallAnnotation(box=Box(0, 0, 9, 9)),))
-        assert ball_observations([a], [Calibration("given", barrel)]) == []
+        assert collect_ball_observations([a], [Calibration("given", barrel)]) == []
 
     def test_every_view_needs_its_calibration(self):
         with pytest.raises(ValueError, match="longer"):
@@ -271,7 +271,7 @@ class TestMeet:
 class TestLinesOfSight:
     def test_come_in_the_order_that_triangulation_takes(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", OPPOSITE, BALL)
-        P_a, P_b, pixels_a, pixels_b = arrays_of_pairs([a, b], [b, a])
+        P_a, P_b, pixels_a, pixels_b = stack_pairs([a, b], [b, a])
         assert np.array_equal(P_a, [MAIN.P, OPPOSITE.P])
         assert np.array_equal(P_b, [OPPOSITE.P, MAIN.P])
         assert np.array_equal(pixels_a, [a.ideal_center, b.ideal_center])

@@ -35,7 +35,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.solve.jobs import solve_fully
 from app.features.versions.service import list_versions
 from app.formats.soccernet_v3_writer import write_soccernet_v3
-from app.http.server import listen, make_server
+from app.http.server import make_server, open_listening_socket
 from app.http.team import Team
 from app.json_text import json_text
 from app.log import log_to_stderr
@@ -83,7 +83,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     # The server is in this process: what it logs must not stand in what commands print.
     log_to_stderr()
     served = create_app(settings)
-    with listen("127.0.0.1", 0) as (socket, url):
+    with open_listening_socket("127.0.0.1", 0) as (socket, url):
         server = make_server(served)
         thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
         thread.start()
@@ -457,6 +457,6 @@ class TestRefusals:
     def test_another_version_is_not_spoken_to(
         self, place: Place, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.formats.manifest.software_version", lambda: "9.9.0")
+        monkeypatch.setattr("app.formats.manifest.read_software_version", lambda: "9.9.0")
         done = CliRunner().invoke(app, ["--server", place.url, "datasets", "list"])
         assert "and this is 9.9.0" in str(done.exception)

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.formats.export_record import ExportRecord, frame_name
+from app.formats.export_record import ExportRecord, find_export_frame_name
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.output import output_tree, write_zip
+from app.formats.output import open_output_folder, write_zip
 from app.formats.parquet import write_parquet
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
@@ -43,11 +43,11 @@ def export(records: list[ExportRecord], tmp_path_factory: pytest.TempPathFactory
 
 def write_export(out: Path, records: list[ExportRecord], images: bool = True) -> Path:
     """Write an export as the review floor does: table, plain frames, manifest."""
-    with output_tree(out) as root:
+    with open_output_folder(out) as root:
         counts = write_parquet(root, records)
         for record in records if images else ():
             for number, view in enumerate(record.group.views):
-                path = root / frame_name(record, view)
+                path = root / find_export_frame_name(record, view)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 shape = (view.size.height, view.size.width, 3)
                 Image.fromarray(np.full(shape, 40 * number, np.uint8)).save(path)

@@ -116,7 +116,7 @@ def test_lines_of_a_frame_that_is_not_there_are_refused(film: Film, tmp_path: Pa
     with pytest.raises(InputError, match="has 2 frames, and frame 7 is not one of them"):
         track_clip(path, {7: lines})
     few = make_lines(dict(list(lines.items())[:1]))
-    with pytest.raises(InputError, match="lines of frame 0 make no camera"):
+    with pytest.raises(InputError, match="no camera can be computed from the lines of frame 0"):
         track_clip(path, {0: few})
 
 

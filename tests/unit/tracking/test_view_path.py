@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.view_path import ViewPath, compare_paths, view_path
 from tests.bench.link import at_times, film, made_ball
 
@@ -57,7 +57,7 @@ class TestLiken:
     def test_one_that_was_tracked_turned_is_like_it_once_it_is_turned(self) -> None:
         times = np.arange(0, 6, 0.04)
         filmed = film(at_times(BALL, 7 + 0.5 * times), times, OPPOSITE, 1900.0, lag=24)
-        replay = view_path(times.tolist(), [turned_camera(one) for one in filmed.cameras])
+        replay = view_path(times.tolist(), [turn_camera(one) for one in filmed.cameras])
         found = compare_paths(shown(2, 14, LIVE_STAND), replay)
         assert found is not None and found.turned and found.apart_m < 3
 

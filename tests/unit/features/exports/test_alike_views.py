@@ -24,7 +24,7 @@ from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
-from app.formats.export_formats import FORMATS, TRACKS, options_used_by
+from app.formats.export_formats import FORMATS, TRACKS, list_options_of_format
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.parquet import read_parquet
 from app.formats.report import Report
@@ -185,7 +185,7 @@ class TestEveryFormat:
         groups = made(scheme, tmp_path / "in")
         fill(*groups)
         out = tmp_path / "out"
-        boxes = "annotated" if "boxes" in options_used_by(name) else "optimized"
+        boxes = "annotated" if "boxes" in list_options_of_format(name) else "optimized"
         try:
             report = export_dataset(
                 store, "demo", name, out, everything=True, boxes=boxes, images=images
@@ -242,7 +242,7 @@ class TestEveryFormat:
         freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
         for out, version in (("live", None), ("frozen", "v1")):
             options = {"images": "copy", "version": version}
-            if "views" in options_used_by(name):
+            if "views" in list_options_of_format(name):
                 options["views"] = "all"
             export_dataset(store, "demo", name, tmp_path / out, **options)
         assert on_disk(tmp_path / "live") == on_disk(tmp_path / "frozen")

@@ -25,7 +25,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.formats.export_formats import options_used_by
+from app.formats.export_formats import list_options_of_format
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Media
@@ -232,14 +232,16 @@ class TestExport:
             lambda: export_dataset(store, "demo", form, tmp_path / "out", everything=True, **asked),
             lambda: require_possible(store, "demo", form, everything=True, **asked),
         ):
-            with pytest.raises(InputError, match=f"{form} does not use --{name}") as refused:
+            with pytest.raises(
+                InputError, match=f"exports in the format {form} do not use --{name}"
+            ) as refused:
                 run()
             assert refused.value.pointer == f"/{name}"
-            assert f"It is for {formats}" in str(refused.value.hint)
+            assert f"Only these formats use it: {formats}" in str(refused.value.hint)
         assert not (tmp_path / "out").exists()
 
     def test_every_format_uses_the_options_that_it_says(self) -> None:
-        assert {name: options_used_by(name) for name in FORMATS} == {
+        assert {name: list_options_of_format(name) for name in FORMATS} == {
             "soccernet-v3d": ["boxes", "images"],
             "soccernet-v3": ["images"],
             "issia-3d": ["images"],

@@ -33,8 +33,8 @@ class TestReadHead:
         ("threshold", "value", "said"),
         [
             ("point", "xyz", "point is "),
-            ("min_p_value", "a", "min_p_value is a number"),
-            ("tau_percent", -1.0, "tau_percent lies between"),
+            ("min_p_value", "a", "min_p_value must be a number"),
+            ("tau_percent", -1.0, "tau_percent must lie between"),
         ],
     )
     def test_an_impossible_threshold_is_named(

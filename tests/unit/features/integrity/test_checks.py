@@ -78,7 +78,9 @@ class TestSignOn:
             )
         assert "valid response" in faults(settings)["single sign-on"].sentence
         half = Settings(home=tmp_path / "home", sso_issuer=provider.address)
-        assert "lacks TOUCHLINE_SSO_CLIENT_ID" in faults(half)["single sign-on"].sentence
+        assert (
+            "needs the settings TOUCHLINE_SSO_CLIENT_ID" in faults(half)["single sign-on"].sentence
+        )
 
     def test_an_admin_has_to_be_linked_where_there_is_no_other_way(self, tmp_path: Path) -> None:
         said = {**SIGN_ON, "sso_issuer": "https://club.example", "sso_only": True}

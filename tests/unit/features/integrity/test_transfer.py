@@ -92,7 +92,7 @@ class TestTransfer:
 
     def test_a_database_in_use_is_left_alone(self, source: Settings, filled: Store) -> None:
         before = contents(filled.settings)
-        with pytest.raises(InputError, match="in use"):
+        with pytest.raises(InputError, match="already uses the target"):
             transfer_database(source, filled.settings)
         assert contents(filled.settings) == before
 

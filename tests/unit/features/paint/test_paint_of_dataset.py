@@ -54,7 +54,7 @@ class TestPaint:
         [
             (("paper",), 1, "does not use the paint"),
             (("demo", "--match", "final"), 1, "has no match final"),
-            (("demo", "--undo"), 1, "no paint was read"),
+            (("demo", "--undo"), 1, "has a measurement of its paint"),
             (("demo", "--undo", "--show"), 2, "one at a time"),
         ],
     )

@@ -460,5 +460,5 @@ class TestTakeBackPaint:
         assert load(painted, 1).group.paint == first
         take_back(painted)
         assert state(painted).read == 0
-        with pytest.raises(ConflictError, match="no paint was read"):
+        with pytest.raises(ConflictError, match="has a measurement of its paint"):
             take_back(painted)

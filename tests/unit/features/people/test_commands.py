@@ -254,7 +254,7 @@ class TestServe:
         monkeypatch.setenv("TOUCHLINE_SSO_ISSUER", "https://accounts.club.example")
         done = run("serve", "--team")
         assert done.exit_code == 1
-        assert "lacks TOUCHLINE_SSO_CLIENT_ID and" in str(done.exception)
+        assert "needs the settings TOUCHLINE_SSO_CLIENT_ID and" in str(done.exception)
         assert not home.exists()
 
     def test_the_first_start_prints_a_link_for_an_admin_until_there_is_one(

@@ -75,7 +75,7 @@ class TestInviteMany:
         assert problems[2] == (
             '"boss" is not a role; the roles are none, viewer, annotator, reviewer, lead, admin'
         )
-        assert "cannot be the name of a person" in problems[3]
+        assert "is not a valid user name" in problems[3]
         assert problems[4] == "anna is already in row 1"
         assert problems[5] == '"dora at home" is not an email address'
         assert problems[6].startswith("the role is missing")

@@ -242,7 +242,7 @@ class TestLogins:
         join(home, "anna")
         tokens = [logins.log_in("anna", SECRET) for _ in range(3)]
         login = found(logins, tokens[0])
-        with pytest.raises(InputError, match="present password"):
+        with pytest.raises(InputError, match="current password"):
             logins.change_password(login, "wrong wrong wrong", "other other other")
         fresh = logins.change_password(login, SECRET, "other other other")
         assert [logins.find(token) for token in tokens] == [None] * 3

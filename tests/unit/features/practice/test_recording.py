@@ -104,6 +104,6 @@ def test_a_dataset_of_that_name_is_left_alone(store: Store, tmp_path: Path) -> N
     ensure_dataset(store, DATASET, "ann")
     film = write_video(tmp_path / "own.mp4", "mp4v", 20)
     add_recording(store, DATASET, film, actor="ann")
-    with pytest.raises(ConflictError, match="of your own"):
+    with pytest.raises(ConflictError, match="you already have a dataset"):
         make_recording_practice(store, lambda *_: None, actor="ann")
     assert read_recording_practice(store, store.settings).lessons == ()

@@ -294,7 +294,7 @@ class TestCompare:
     def test_says_when_the_software_is_another(self, store, exact, monkeypatch) -> None:
         request = EvaluationRequest(predictions=exact.id)
         first = run_evaluation(store, "demo", request, actor="ann")
-        monkeypatch.setattr("app.features.predictions.frames.software_version", lambda: "99.0")
+        monkeypatch.setattr("app.features.predictions.frames.read_software_version", lambda: "99.0")
         second = run_evaluation(store, "demo", request, actor="ann")
         found = compare_runs(store, first.id, second.id)
         assert (found.same_truth, found.differs) == (True, ("software_version",))

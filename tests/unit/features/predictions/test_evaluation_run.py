@@ -45,9 +45,9 @@ class TestCheck:
         ("options", "words"),
         [
             ({"format": "csv"}, "--format needs a file of boxes"),
-            ({"category": 32}, "--category is for"),
-            ({"size": ImageSize(960, 540)}, "--size is for"),
-            ({"images": Path("t.json")}, "--images is for"),
+            ({"category": 32}, "--category needs a file of boxes"),
+            ({"size": ImageSize(960, 540)}, "--size needs a file of boxes"),
+            ({"images": Path("t.json")}, "--images needs a file of boxes"),
             (
                 {"cameras_size": ImageSize(960, 540)},
                 "--cameras-size needs predicted cameras",
@@ -62,13 +62,13 @@ class TestCheck:
     def test_so_are_those_of_careful_boxes_by_their_own_name(self) -> None:
         careful = PredictionFiles(None, category=1)
         request = SourcesRequest(EvaluationRequest(), PredictionFiles(Path("a-set")), careful)
-        with pytest.raises(InputError, match="--careful-category is for"):
+        with pytest.raises(InputError, match="--careful-category needs a file of boxes"):
             request.check()
 
     def test_a_version_has_its_own_groups(self) -> None:
         nothing = PredictionFiles(None)
         request = SourcesRequest(EvaluationRequest(groups="all"), nothing, nothing, version="v1")
-        with pytest.raises(InputError, match='groups "all" is not used'):
+        with pytest.raises(InputError, match='groups "all" cannot be combined with a version'):
             request.check()
 
 

@@ -40,7 +40,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.track import FrameCamera, Track
 from tests.tripod_films import Film, render_film
 from tests.videos import write_pictures
@@ -189,7 +189,11 @@ def test_a_shot_is_tracked_and_its_frames_have_cameras(
 
 @pytest.mark.parametrize(
     ("first", "last", "problem"),
-    [(5, 4, "are none of"), (0, 12, "its last one is 11"), (0, 10**6, "its last one is 11")],
+    [
+        (5, 4, "does not have all of the frames"),
+        (0, 12, "its last one is 11"),
+        (0, 10**6, "its last one is 11"),
+    ],
 )
 def test_frames_that_are_not_there_are_refused(
     api: Any, recording: str, first: int, last: int, problem: str
@@ -337,7 +341,7 @@ def test_cameras_are_turned_by_half_and_back_and_groups_follow(
         assert after[4:] == pytest.approx(before[4:], abs=1e-5)
     assert shown["sigma"] == as_tracked["sigma"]
     views = given()
-    assert views[5] == turned_camera(tracker.truth[1]) and views[7] == own
+    assert views[5] == turn_camera(tracker.truth[1]) and views[7] == own
     with store.read() as session:
         assert replay_log(session) == read_state_snapshot(session)
     (one,) = api.get(f"{recording}/cameras").json()["items"]
@@ -521,7 +525,7 @@ def test_a_disk_that_is_full_is_one_message_and_changes_nothing(
     with monkeypatch.context() as patch:
         patch.setattr(module, "replace_file", full)
         job = finished(api.post(f"{recording}/cameras", json={"first": FIRST, "last": 11}))
-    assert job.state == "failed" and "cannot be kept" in job.problem["detail"]
+    assert job.state == "failed" and "cannot be stored" in job.problem["detail"]
     (one,) = api.get(f"{recording}/cameras").json()["items"]
     assert one["revision"] == 1
     assert api.get(f"{recording}/cameras/5").status_code == 200

@@ -109,7 +109,7 @@ class TestFile:
             assert list_unused_frame_files(session, store.settings) == []
         (kept,) = store.settings.recordings.glob("*.balls.npz")
         kept.write_bytes(b"no boxes")
-        with pytest.raises(StorageError, match="ball is damaged"):
+        with pytest.raises(StorageError, match="detections of ball are damaged"):
             boxes_in(store.settings, recording, EVERY)
 
 

@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.features.recordings.camera_tracking import Tracked, save_cameras
 from app.features.recordings.service import get_recording
 from app.geometry.camera import Camera
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from tests.bench.link import at_times, film, made_ball
 from tests.tracked_frames import frame
 from tests.videos import write_video
@@ -63,7 +63,7 @@ def test_the_shot_that_looks_where_the_replay_looks_comes_before_a_nearer_one(
 ) -> None:
     store, stand = app.state.services.store, (0.0, 62.0, -16.0)
     assert [one["first"] for one in suggested(api, match)] == [150, 75, 0]
-    replay = [turned_camera(one) for one in follow(2.0, (10.0, -66.0, -14.0), 0.5)]
+    replay = [turn_camera(one) for one in follow(2.0, (10.0, -66.0, -14.0), 0.5)]
     track(store, 0, follow(1.0, stand))
     track(store, 3, replay)
     one, *others = suggested(api, match)

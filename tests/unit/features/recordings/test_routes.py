@@ -127,7 +127,10 @@ class TestGetFrame:
         assert finished(api.post(f"{recording}/shots")).result["frames"] == 30
         assert number_of(picture_of(api.get(f"{recording}/frames/29"))) == 29
         film.unlink()
-        assert "not where it was imported from" in api.get(recording).json()["problem"]
+        assert (
+            "no longer in the place that it was imported from"
+            in api.get(recording).json()["problem"]
+        )
         assert api.get(f"{recording}/frames/0").status_code == 409
         assert str(film.parent) not in api.get(f"{recording}/frames/0").text
 

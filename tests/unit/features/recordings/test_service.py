@@ -126,7 +126,7 @@ class TestIndexNow:
         with pytest.raises(ConflictError, match="not indexed yet"):
             recording.require_readable()
         film.unlink()
-        with pytest.raises(NotFoundError, match="not where it was imported from"):
+        with pytest.raises(NotFoundError, match="no longer in the place that it was imported from"):
             indexed(store, film)
 
     def test_a_link_is_not_followed(self, store: Store, film: Path, tmp_path: Path) -> None:

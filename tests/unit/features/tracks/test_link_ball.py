@@ -26,7 +26,7 @@ from app.features.tracks.stored import TrackSummary, track_stamp
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical
 from app.soccer.pitch import Pitch
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.ball_track import BallMeasurements, BallTrack
 from tests.bench.link import Filmed, at_times, film, made_ball
 from tests.tracked_frames import CAMERA, frame
@@ -122,7 +122,7 @@ class TestLinkByBall:
         self, api: Any, store: Store, link: str, finished: Finished
     ) -> None:
         live, replay = views = both(made_ball(8.0, seed=3))
-        opposite = [turned_camera(camera) for camera in replay.cameras]
+        opposite = [turn_camera(camera) for camera in replay.cameras]
         tracked(store, (live, replace(replay, cameras=opposite)))
         sent = uploads(api, views)
         finished(api.post(f"{link}/ball", json=sent))

@@ -27,7 +27,7 @@ from app.soccer.policy import PAPER, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import group_facts, join_facts
-from app.solving.judgement import PASSES, Judgement, judge_groups, view_jac
+from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups
 from app.solving.solve import solve
 from tests.scenes import make_scenes
 
@@ -208,7 +208,7 @@ class TestJudgeTable:
                 for _, solution in solutions
                 for view in solution.views
             ]
-            assert np.array_equal(view_jac(table.facts, gamma), stored, equal_nan=True)
+            assert np.array_equal(compute_view_jac(table.facts, gamma), stored, equal_nan=True)
 
 
 def counted(found: Yield) -> None:
