@@ -34,7 +34,7 @@ from app.features.tracks import commands as tracks
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
 from app.json_text import quoted
-from app.terminal.options import act_as
+from app.terminal.options import set_current_actor
 from app.terminal.server import work_against_server
 from app.terminal.terminal import allow_any_text, escape_controls, print_error
 from app.workers import commands as cluster
@@ -134,7 +134,7 @@ def options(
     ] = False,
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
-    act_as(actor)
+    set_current_actor(actor)
     work_against_server(server, token_file, context.invoked_subcommand)
     if server is not None and token_file is not None and actor is not None:
         raise typer.BadParameter(

@@ -32,7 +32,7 @@ def _user_data_folder() -> Path:
     return (Path(root) if root else Path.home() / ".local" / "share") / "touchline"
 
 
-def memory_bytes(
+def find_memory_limit(
     own: Path = Path("/proc/self/cgroup"), groups: Path = Path("/sys/fs/cgroup")
 ) -> int:
     """Memory that this process may have: the machine's, or what a container or unit is given.
@@ -235,7 +235,7 @@ class Settings(BaseSettings):
     are deleted first."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
-    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, memory_bytes() // 2))
+    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, find_memory_limit() // 2))
     """Bytes of memory that an import over REST may use."""
     import_seconds: int = 3600
     """Seconds of processor time that an import over REST may take."""
@@ -334,7 +334,7 @@ class Settings(BaseSettings):
 _PACKAGE = Path(__file__).resolve().parent
 
 
-def own_folder(name: str) -> Path:
+def find_own_folder(name: str) -> Path:
     """Where ``static`` or ``migrations`` lies: inside the package when it was installed from a
     wheel, beside it in a checkout."""
     installed = _PACKAGE / name

@@ -52,7 +52,7 @@ PARTIAL = ".partial"
 """How the name of what is not complete yet ends; it begins with a dot."""
 
 
-def sync(path: Path) -> None:
+def sync_to_disk(path: Path) -> None:
     """Put a file, or the names in a folder, on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
@@ -87,4 +87,4 @@ def replace_file(
     finally:
         partial.unlink(missing_ok=True)
     if durable:
-        sync(path.parent)
+        sync_to_disk(path.parent)

@@ -23,7 +23,7 @@ _ENCODER = json.JSONEncoder(
 )
 
 
-def canonical(value: Any) -> str:
+def canonical_json_text(value: Any) -> str:
     """The one JSON text of a value: sorted keys, no spaces.
 
     Raises:
@@ -63,7 +63,7 @@ Moment = Annotated[str, _TimeFormat()]
 """A time as ``text_of`` writes it; RFC 3339 where it is served."""
 
 
-def finite(value: Any) -> Any:
+def replace_non_finite(value: Any) -> Any:
     """A value of dicts, lists and plain values in which no number is infinite or NaN.
 
     Example:
@@ -73,14 +73,16 @@ def finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {key: finite(item) for key, item in value.items()}
-    return [finite(item) for item in value] if isinstance(value, (list, tuple)) else value
+        return {key: replace_non_finite(item) for key, item in value.items()}
+    return (
+        [replace_non_finite(item) for item in value] if isinstance(value, (list, tuple)) else value
+    )
 
 
 _LOOKING = Lock()
 
 
-def look_through(kind: Any) -> None:
+def prepare_msgspec_type(kind: Any) -> None:
     """Let msgspec find out what a type is made of, once and by one thread, before it is read.
 
     It keeps what it found at the classes before that is whole: of two threads that are the first to
@@ -122,7 +124,11 @@ def _json_text_slowly(value: Any, indent: int | None, ascii_: bool, compact: boo
     halves of a surrogate pair; and of letters that are to be escaped."""
     separators = (",", ":") if compact else None
     return json.dumps(
-        finite(value), indent=indent, ensure_ascii=ascii_, separators=separators, allow_nan=False
+        replace_non_finite(value),
+        indent=indent,
+        ensure_ascii=ascii_,
+        separators=separators,
+        allow_nan=False,
     )
 
 

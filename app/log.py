@@ -9,7 +9,7 @@ from typing import Any, Literal, TextIO, cast
 
 import structlog
 
-from app.json_text import finite
+from app.json_text import replace_non_finite
 
 LogFormat = Literal["text", "json"]
 
@@ -23,7 +23,7 @@ def log_to_stderr(form: LogFormat = "text") -> None:
     """
     before: list[Any] = [
         structlog.contextvars.merge_contextvars,
-        only_finite,
+        replace_non_finite_numbers,
         structlog.processors.add_log_level,
         structlog.processors.TimeStamper(fmt="iso", utc=True),
         structlog.processors.format_exc_info,
@@ -47,9 +47,11 @@ def log_to_stderr(form: LogFormat = "text") -> None:
     logging.basicConfig(handlers=[handler], level=logging.WARNING, force=form == "json")
 
 
-def only_finite(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+def replace_non_finite_numbers(
+    _logger: Any, _method: str, event: MutableMapping[str, Any]
+) -> Mapping[str, Any]:
     """What is logged without numbers that are infinite or NaN."""
-    return {name: finite(value) for name, value in event.items()}
+    return {name: replace_non_finite(value) for name, value in event.items()}
 
 
 class _Stderr:

@@ -188,7 +188,7 @@ def read_mail_server(settings: Settings) -> MailServer | None:
             hint="Set the address that mail is from.",
         )
     try:
-        sender = checked_address(settings.smtp_from)
+        sender = parse_mail_address(settings.smtp_from)
     except InputError as error:
         raise InputError(f"TOUCHLINE_SMTP_FROM: {error.message}", hint=error.hint) from None
     password = _password(settings)
@@ -207,7 +207,7 @@ def read_mail_server(settings: Settings) -> MailServer | None:
     )
 
 
-def checked_address(text: str, *, pointer: str | None = None) -> str:
+def parse_mail_address(text: str, *, pointer: str | None = None) -> str:
     """A mail address of one mailbox, in ASCII, without a name beside it.
 
     Raises:

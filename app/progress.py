@@ -24,7 +24,7 @@ class ReportProgress(Protocol):
         """
 
 
-def partial_progress(
+def make_partial_progress(
     progress: ReportProgress, sentence: str, *, start: int = 0, total: int | None = None
 ) -> ReportProgress:
     """A progress for one part of some work: its counts go on from ``start``, under a sentence.

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.terminal.options import Cluster, current_actor, read_settings
-from app.terminal.server import opened_store
+from app.terminal.options import Cluster, get_current_actor, read_settings
+from app.terminal.server import open_store
 from app.terminal.terminal import say, show_progress
 
 if TYPE_CHECKING:
@@ -58,20 +58,20 @@ def serve(
     )
     _require_safe(settings)
     from app.db.dialects.dialect import dialect_of, require_processes
-    from app.db.locks import server_lock
+    from app.db.locks import hold_server_lock
     from app.features.maintenance.upkeep import read_database_file_sizes
     from app.features.people.service import require_no_people
     from app.http.server import open_listening_socket, run, serve_with
     from app.log import log_to_stderr
     from app.main import create_app
-    from app.workers.executors import server_pool
+    from app.workers.executors import make_server_pool_opener
 
     require_processes(settings, settings.web_workers)
     log_to_stderr(settings.log_format)
-    with server_lock(settings, shared=not dialect_of(settings).is_file):
+    with hold_server_lock(settings, shared=not dialect_of(settings).is_file):
         _prepare_home(settings)
         if not settings.team and team is None:
-            with opened_store(settings) as store:
+            with open_store(settings) as store:
                 require_no_people(store)
         if with_sample:
             _make_sample(settings)
@@ -80,7 +80,7 @@ def serve(
                 _print_address(settings, address)
                 serve_with(settings.web_workers, _serve_part, settings, socket)
                 return
-            application = create_app(settings, pool=server_pool(settings))
+            application = create_app(settings, pool=make_server_pool_opener(settings))
             if read_database_file_sizes(settings).get("database", 0) <= QUICK_BYTES:
                 application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
@@ -106,12 +106,12 @@ def _make_sample(settings: Settings) -> None:
     """The dataset ``sample``, where it is missing or not complete."""
     from app.features.practice.service import SAMPLE, make_sample_dataset
     from app.sample import SampleOrder
-    from app.workers.executors import executor_of
+    from app.workers.executors import open_executor
 
-    folder, pool = settings.home / SAMPLE, partial(executor_of, settings)
-    with opened_store(settings) as store, show_progress("Making the sample") as progress:
+    folder, pool = settings.home / SAMPLE, partial(open_executor, settings)
+    with open_store(settings) as store, show_progress("Making the sample") as progress:
         make_sample_dataset(
-            store, SAMPLE, folder, SampleOrder(), pool, progress, actor=current_actor()
+            store, SAMPLE, folder, SampleOrder(), pool, progress, actor=get_current_actor()
         )
 
 
@@ -120,16 +120,16 @@ def _serve_part(settings: Settings, socket: socket) -> None:
     from app.http.server import run
     from app.log import log_to_stderr
     from app.main import create_app
-    from app.workers.executors import server_pool
+    from app.workers.executors import make_server_pool_opener
 
     log_to_stderr(settings.log_format)
-    run(create_app(settings, pool=server_pool(settings)), socket)
+    run(create_app(settings, pool=make_server_pool_opener(settings)), socket)
 
 
 def _print_address(settings: Settings, address: str) -> None:
     say(f"Touchline is at {address}")
     if settings.team:
-        with opened_store(settings) as store:
+        with open_store(settings) as store:
             _print_first_link(store, settings.url or address)
 
 
@@ -137,7 +137,7 @@ def _print_first_link(store: Store, base: str) -> None:
     """Show whoever starts a server without an admin how to become one."""
     from app.features.people.links import FIRST_LASTS, make_first_link
 
-    link = make_first_link(store, actor=current_actor())
+    link = make_first_link(store, actor=get_current_actor())
     if link is not None:
         hours = int(FIRST_LASTS.total_seconds() // 3600)
         say(f"No admin can log in yet. Become one here (good once, for {hours} hours):")
@@ -147,11 +147,11 @@ def _print_first_link(store: Store, base: str) -> None:
 @commands.command()
 def migrate() -> None:
     """Bring the database to this version's schema, after a backup; no server may run."""
-    from app.db.locks import server_lock
-    from app.db.migrate import migrate as run_migrations
+    from app.db.locks import hold_server_lock
+    from app.db.migrate import migrate_database as run_migrations
 
     settings = read_settings()
-    with server_lock(settings):
+    with hold_server_lock(settings):
         migrated = run_migrations(settings)
     if migrated.copy is not None:
         say(f"backup {migrated.copy}")
@@ -163,7 +163,7 @@ def _prepare_home(settings: Settings) -> None:
     import structlog
 
     from app.db.home import make_private
-    from app.db.migrate import migrate as run_migrations
+    from app.db.migrate import migrate_database as run_migrations
 
     log = structlog.get_logger("touchline")
     mended = make_private(settings)

@@ -252,7 +252,7 @@ class ReadyWorker(WorkerPool):
             log.warning(f"there is no process for {self._what}", error=str(error))
 
 
-def least_busy(workers: Sequence[ReadyWorker]) -> ReadyWorker | None:
+def choose_least_busy_worker(workers: Sequence[ReadyWorker]) -> ReadyWorker | None:
     """The ready worker that has fewest tasks; the workers are started one after the other."""
     ready = list(takewhile(ReadyWorker.begin, workers))
     return min(ready, key=lambda worker: worker.tasks, default=None)

@@ -339,7 +339,7 @@ def end_with_parent() -> None:
 
 
 @contextmanager
-def spawned_pool(
+def open_spawned_pool(
     workers: int, initialize: Callable[[], object] | None = None
 ) -> Iterator[ProcessPoolExecutor]:
     """An executor of processes without limits, for our own work; they end with this process.

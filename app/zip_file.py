@@ -27,7 +27,7 @@ from app.object_store.path import StoredPath
 MAX_UNPACKED = 4 * 1024**3
 """Bytes of a compressed zip that are unpacked to reach its members."""
 MAX_LIST = 1024**2
-"""Bytes of a list of members that ``first_member_names`` reads: a zip of 2 GiB may list 40 million members."""
+"""Bytes of a list of members that ``list_first_member_names`` reads: a zip of 2 GiB may list 40 million members."""
 UNREADABLE = 0x20
 """Flag of members that ``zipfile`` refuses to open (it means patched data, which nobody writes)."""
 
@@ -99,7 +99,7 @@ def open_nested(
         return _open_zip_part(_part_of_handle(os.dup(unpacked.fileno()), total))
 
 
-def nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
+def split_nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
     """The member that is a zip, and the name inside it; None where ``name`` is not of this kind.
 
     A member of exactly this name goes before.
@@ -125,7 +125,7 @@ def count_truncated(archive: zipfile.ZipFile) -> int:
     return end.members - (listed if end.is_wide else listed & 0xFFFF)
 
 
-def first_member_names(path: Path, most: int) -> list[str]:
+def list_first_member_names(path: Path, most: int) -> list[str]:
     """Names of the first members that a zip lists; none where no list is where it has to be.
 
     Args:

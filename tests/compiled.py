@@ -11,7 +11,7 @@ import numpy as np
 
 from app.paint.view_paint import read_paint_of_image
 from app.paint.view_proposal import propose_lines_in_image
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
 from app.solving.solve import solve, warm_up_solver
@@ -30,7 +30,7 @@ def compile_all() -> None:
     solving = Process(target=_solve, args=(scene,))
     solving.start()
     view, pitch, policy = scene.group.views[0], scene.group.pitch, PAPER.calibration
-    image = np.ascontiguousarray(render(scene, view.key)[:, :, ::-1])
+    image = np.ascontiguousarray(render_view(scene, view.key)[:, :, ::-1])
     assert propose_lines_in_image(image, view.size, (), pitch, policy).lines
     solving.join()
     assert solving.exitcode == 0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.db.json_columns import pack
+from app.db.json_columns import compress_json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
@@ -22,7 +22,7 @@ from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import open_output_folder
 from app.formats.tracks_writer import TrackRecord
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
@@ -120,9 +120,9 @@ def insert_bare_track(session: Session, dataset_id: int, key: str) -> int:
         "match": key,
         "first": FIRST,
         "last": FIRST,
-        "inputs": pack(inputs_to_json(TrackInputs(frames, times, Pitch(), measured))),
-        "body": pack(track_to_json(nothing)),
-        "summary": canonical(asdict(summary)),
+        "inputs": compress_json(inputs_to_json(TrackInputs(frames, times, Pitch(), measured))),
+        "body": compress_json(track_to_json(nothing)),
+        "summary": canonical_json_text(asdict(summary)),
         "corrections": "[]",
         "revision": 0,
         **dict.fromkeys(("stamp", "digest", "actor"), "none"),

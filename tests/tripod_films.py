@@ -10,7 +10,7 @@ import numpy as np
 
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PAN, camera_from_parameters, parameters_from_camera
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import Scene
 from tests.scenes import make_scenes
 
@@ -70,5 +70,5 @@ def render_film(frames: int = FRAMES) -> Film:
         parameters[LOG_FOCAL] += np.log(ZOOM) * number
         camera = camera_from_parameters(parameters, start.principal_point, half)
         cameras.append(camera)
-        images.append(render(_posed(scene, camera), view.key))
+        images.append(render_view(_posed(scene, camera), view.key))
     return Film(images, cameras)

@@ -27,10 +27,10 @@ from app.db.dialects.dialect import dialect_in, dialect_of, make_engine, report_
 from app.db.home import is_half_written, refused_file_error
 from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain
-from app.db.recovery.anchor import Anchor, anchor_of, require_own_database
-from app.db.recovery.preopen_check import require_sound, signs_of_use
+from app.db.recovery.anchor import Anchor, read_anchor_of_database, require_own_database
+from app.db.recovery.preopen_check import list_signs_of_use, require_sound
 from app.db.session import Session, now
-from app.durable import PARTIAL, sync
+from app.durable import PARTIAL, sync_to_disk
 from app.errors import EXAMINE, DamagedError, InputError, StorageError
 from app.json_text import json_text
 
@@ -82,7 +82,7 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Backu
         InputError: The home has no database, or it is a server's.
     """
     require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
-    if not settings.database_file.exists() and not signs_of_use(settings):
+    if not settings.database_file.exists() and not list_signs_of_use(settings):
         raise InputError(
             f"there is no database in {settings.home}",
             hint="Set TOUCHLINE_HOME to the home folder of an installation.",
@@ -135,7 +135,7 @@ def write_backup(
             verify_backup(partial)
             _require_free_place(out, replace)
             partial.replace(out)
-            sync(out.parent)
+            sync_to_disk(out.parent)
     except OSError as error:
         hint = f"Make {out.parent} writable for this user, or name another folder."
         raise refused_file_error(Path(error.filename or out), error, hint) from error
@@ -226,7 +226,7 @@ def examine_database(
                 for name in _COUNTED
                 if name in tables
             }
-            return anchor_of(session) or _anchor_without_installation(session), counts
+            return read_anchor_of_database(session) or _anchor_without_installation(session), counts
     finally:
         engine.dispose()
 

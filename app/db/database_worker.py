@@ -39,7 +39,7 @@ Answer = tuple[bool, Any]
 """Whether it is an error; the answer or the error."""
 
 
-def no_answer(_question: Any) -> None:
+def refuse_question(_question: Any) -> None:
     """The answer where no questions are asked."""
 
 
@@ -99,7 +99,7 @@ def run_in_worker(
     limits: WorkerLimits = NO_LIMIT,
     progress: ReportProgress,
     stop: Callable[[], None],
-    answer: Callable[[Any], Any] = no_answer,
+    answer: Callable[[Any], Any] = refuse_question,
 ) -> Result:
     """Call ``work(store, *arguments, caller)`` in a worker process and return its result.
 
@@ -155,7 +155,7 @@ def run_in_this_thread(
     work: Callable[..., Result],
     *arguments: Any,
     progress: ReportProgress,
-    answer: Callable[[Any], Any] = no_answer,
+    answer: Callable[[Any], Any] = refuse_question,
 ) -> Result:
     """Like ``run_in_worker``, in this thread: for work that is done before a process would have started."""
 

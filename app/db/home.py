@@ -20,7 +20,7 @@ from pathlib import Path
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.db.recovery.anchor import read_anchor
-from app.durable import PARTIAL, keep_private, sync
+from app.durable import PARTIAL, keep_private, sync_to_disk
 from app.errors import DamagedError, StorageError
 
 NETWORK_FILE_SYSTEMS = frozenset(
@@ -58,7 +58,7 @@ def make_home(settings: Settings) -> Path:
             f"the home folder {settings.home} cannot be created: {error.strerror}",
             hint="Set TOUCHLINE_HOME to a folder that this user may write to.",
         ) from error
-    kind = file_system(settings.home)
+    kind = find_file_system(settings.home)
     # A database on a server lets several machines share the files.
     if kind in NETWORK_FILE_SYSTEMS and dialect_of(settings).is_file:
         raise StorageError(
@@ -78,7 +78,7 @@ def make_private(settings: Settings) -> int:
     """
     keep_private()
     mended = 0
-    for path in private_files(settings):
+    for path in iterate_private_files(settings):
         # Other commands may delete files meanwhile.
         with suppress(FileNotFoundError, PermissionError):
             mode = path.lstat().st_mode
@@ -93,7 +93,7 @@ def open_to_others(settings: Settings) -> list[Path]:
     """What of a home others than its owner can read or write: a closed home closes all in it."""
     closed = not settings.home.stat().st_mode & 0o077
     found = []
-    for path in private_files(settings):
+    for path in iterate_private_files(settings):
         with suppress(FileNotFoundError):
             mode = path.lstat().st_mode
             inside = closed and path.is_relative_to(settings.home)
@@ -102,7 +102,7 @@ def open_to_others(settings: Settings) -> list[Path]:
     return found
 
 
-def private_files(settings: Settings) -> Iterator[Path]:
+def iterate_private_files(settings: Settings) -> Iterator[Path]:
     """The home, and all in it that is ours; whatever else somebody keeps there is theirs."""
     home, database = settings.home, settings.database_file
     yield home
@@ -160,7 +160,7 @@ def make_file(path: Path) -> None:
         raise refused_file_error(path, error) from error
 
 
-def file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
+def find_file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
     """Kind of the file system that holds a folder, or an empty text where nobody says."""
     if not mounts.exists():
         return ""
@@ -181,7 +181,7 @@ KEYS = SECOND_FACTOR, WEBHOOKS, BEGUN, DEVICES
 _BYTES = 32
 
 
-def installation_key(settings: Settings, name: str) -> bytes:
+def get_installation_key(settings: Settings, name: str) -> bytes:
     """A random key of a home, made when it is asked for the first time; ``name`` is its file's.
 
     Raises:
@@ -217,7 +217,7 @@ def _make_key_file(path: Path) -> None:
             os.link(partial, path)
         except FileExistsError:
             return
-        sync(path.parent)
+        sync_to_disk(path.parent)
     finally:
         partial.unlink(missing_ok=True)
 
@@ -264,7 +264,7 @@ def find_leftovers(settings: Settings) -> Iterator[Path]:
         # Unlike that of pathlib, it passes over a folder that is deleted meanwhile.
         for name in iglob(pattern, root_dir=settings.home):  # noqa: PTH207
             path = settings.home / name
-            written = last_written(path)
+            written = find_last_write_time(path)
             if written is not None and written < oldest:
                 yield path
 
@@ -277,7 +277,7 @@ def delete_leftovers(settings: Settings) -> int:
     return len(found)
 
 
-def last_written(path: Path) -> float | None:
+def find_last_write_time(path: Path) -> float | None:
     """When a file, or the newest in a folder, was written (seconds since 1970); None: it is gone."""
     inside = [Path(folder, name) for folder, _, names in os.walk(path) for name in names]
     times = []

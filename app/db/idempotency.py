@@ -17,7 +17,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import insert
-from app.db.json_columns import Json, decompress, parse
+from app.db.json_columns import Json, decompress, parse_json_column
 from app.db.session import Base, Session, now, pending_response, text_of
 from app.db.store import Store
 from app.errors import ConflictError
@@ -83,7 +83,7 @@ def find_response(session: Session, key: str, actor: str) -> StoredResponse | No
     if row is None:
         return None
     body = decompress(row.body) if row.body else None
-    return StoredResponse(row.request_digest, row.status, parse(row.headers), body)
+    return StoredResponse(row.request_digest, row.status, parse_json_column(row.headers), body)
 
 
 def insert_response(session: Session, key: str, actor: str, response: StoredResponse) -> bool:
@@ -262,7 +262,7 @@ def read_progress(session: Session) -> Json | None:
     found = None if key is None else find_response(session, key.key, key.actor)
     if found is None or found.body is None or not found.under_way:
         return None
-    return parse(found.body)
+    return parse_json_column(found.body)
 
 
 def save_progress(session: Session, value: Json) -> None:
@@ -292,7 +292,7 @@ def find_stored(
         return find_response(session, key, actor)
 
 
-def claim(store: Store, key: str, actor: str) -> bool:
+def claim_key(store: Store, key: str, actor: str) -> bool:
     """Let no other process respond under a key; False where one does at the moment.
 
     Raises:

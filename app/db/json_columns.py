@@ -12,7 +12,7 @@ import msgspec
 from zlib_ng import zlib_ng
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 
 Shape = TypeVar("Shape")
 Json = Any
@@ -30,7 +30,7 @@ _MISSHAPEN = (
 )
 
 
-def parse(text: str | bytes) -> Json:
+def parse_json_column(text: str | bytes) -> Json:
     """The value of a JSON text of the database.
 
     Raises:
@@ -55,7 +55,7 @@ def parse_as(text: str | bytes, kind: type[Shape]) -> Shape:
 
 
 @contextmanager
-def as_written() -> Iterator[None]:
+def report_damaged_values() -> Iterator[None]:
     """For making values of stored JSON: what has another shape than we gave it is damage.
 
     Raises:
@@ -67,19 +67,21 @@ def as_written() -> Iterator[None]:
         raise _damaged_record_error() from error
 
 
-def pack(value: Json) -> bytes:
+def compress_json(value: Json) -> bytes:
     """A value as compressed canonical JSON."""
-    return zlib_ng.compress(canonical(value).encode())
+    return zlib_ng.compress(canonical_json_text(value).encode())
 
 
-def unpack(data: bytes) -> Json:
+def decompress_json(data: bytes) -> Json:
     """The value of compressed JSON.
 
     Raises:
         DamagedError: The bytes are not what was written.
     """
     text = decompress(data)
-    return parse(_NULL_CHARACTERS.sub(rb"\1\\ufffd", text) if b"\\u0000" in text else text)
+    return parse_json_column(
+        _NULL_CHARACTERS.sub(rb"\1\\ufffd", text) if b"\\u0000" in text else text
+    )
 
 
 def decompress(data: bytes) -> bytes:

@@ -95,7 +95,7 @@ class DatabaseInUse:
 
 
 @contextmanager
-def database_alone(settings: Settings, why: str) -> Iterator[None]:
+def hold_database_alone(settings: Settings, why: str) -> Iterator[None]:
     """Hold the database while its file is replaced or its schema changed.
 
     Raises:
@@ -114,7 +114,7 @@ def database_alone(settings: Settings, why: str) -> Iterator[None]:
 
 
 @contextmanager
-def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
+def hold_server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
     """Hold the home for one server, or ``shared`` for several; the file tells a process id.
 
     Raises:
@@ -140,7 +140,7 @@ def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
 
 
 @contextmanager
-def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[None]:
+def hold_practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[None]:
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
     handle = _open_lock_file(make_home(settings) / PRACTICE_LOCK)
     try:

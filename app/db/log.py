@@ -22,10 +22,10 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import dialect_in
-from app.db.json_columns import Json, unpack
+from app.db.json_columns import Json, decompress_json
 from app.db.session import Base, Session
 from app.errors import DamagedError
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 
 
 class LogModel(Base):
@@ -97,7 +97,7 @@ class LogEntry(Entry):
     hash: str = ""
 
 
-def append(session: Session, entries: Sequence[Entry]) -> list[int]:
+def append_entries(session: Session, entries: Sequence[Entry]) -> list[int]:
     """Write entries at the end of the log, inside the caller's write transaction.
 
     Returns:
@@ -112,8 +112,8 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
     rows: list[dict[str, Any]] = []
     for entry in entries:
         number += 1
-        body = canonical(entry.body).encode()
-        previous = chain_hash(previous, number, entry, body)
+        body = canonical_json_text(entry.body).encode()
+        previous = compute_chain_hash(previous, number, entry, body)
         row = {name: getattr(entry, name) for name in _COLUMNS}
         rows.append({**row, "id": number, "hash": previous, "body": zlib_ng.compress(body)})
     session.execute(insert(_LOG), rows)
@@ -148,13 +148,15 @@ def group_steps(session: Session, group_ids: Sequence[int], kinds: Iterable[str]
     return session.execute(_STEPS, {"groups": list(group_ids), "kinds": list(kinds)}).all()
 
 
-def newest_steps(session: Session, group_id: int, kinds: Iterable[str], most: int) -> Sequence[Any]:
+def list_newest_steps(
+    session: Session, group_id: int, kinds: Iterable[str], most: int
+) -> Sequence[Any]:
     """Rows (id, kind) of the newest entries of some kinds about a group, the newest first."""
     parameters = {"group": group_id, "kinds": list(kinds), "most": most}
     return session.execute(_NEWEST_STEPS, parameters).all()
 
 
-def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:
+def list_station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:
     """Rows (id, kind) of the entries of some kinds about a station, in order."""
     statement = (
         select(LogModel.id, LogModel.kind)
@@ -164,12 +166,12 @@ def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Se
     return session.execute(statement).all()
 
 
-def newest_entry(session: Session) -> int:
+def find_newest_entry_id(session: Session) -> int:
     """Id of the last entry; 0 for an empty log."""
     return session.scalar(select(func.max(LogModel.id))) or 0
 
 
-def entry_hash(session: Session, log_id: int) -> str | None:
+def read_entry_hash(session: Session, log_id: int) -> str | None:
     """Hash of an entry; None where there is no such entry."""
     found: str | None = session.scalar(select(LogModel.hash).where(LogModel.id == log_id))
     return found
@@ -188,18 +190,18 @@ def read_entries_of(
     return read_log(session, LogModel.group_id.in_(group_ids), LogModel.kind.in_(list(kinds)))
 
 
-def entries_of_kinds(session: Session, kinds: Iterable[str]) -> Iterator[LogEntry]:
+def iterate_entries_of_kinds(session: Session, kinds: Iterable[str]) -> Iterator[LogEntry]:
     """All entries of some kinds, oldest first."""
     return read_log(session, LogModel.kind.in_(list(kinds)))
 
 
-def station_entries(session: Session, station_id: int) -> list[LogEntry]:
+def list_station_entries(session: Session, station_id: int) -> list[LogEntry]:
     """Everything that was said about a static camera, oldest first."""
     where = (LogModel.station_id == station_id, LogModel.group_id.is_(None))
     return list(read_log(session, *where))
 
 
-def groups_with_past(session: Session, group_ids: Sequence[int]) -> set[int]:
+def filter_groups_with_history(session: Session, group_ids: Sequence[int]) -> set[int]:
     """Those of the groups of which more was said than their first import, but for verdicts and comments."""
     statement = (
         select(LogModel.group_id)
@@ -226,7 +228,7 @@ def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> I
             .limit(_BATCH)
         ).all()
         for row in rows:
-            yield LogEntry(**{**row._mapping, "body": unpack(row.body)})
+            yield LogEntry(**{**row._mapping, "body": decompress_json(row.body)})
         if len(rows) < _BATCH:
             return
         after = rows[-1].id
@@ -238,14 +240,14 @@ def read_entries(session: Session, ids: Sequence[int]) -> Iterator[LogEntry]:
         yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))
 
 
-def entries_after(session: Session, at: str) -> tuple[int, str | None]:
+def count_entries_after(session: Session, at: str) -> tuple[int, str | None]:
     """How many entries were written after a time, by their own clock, and the latest of these times."""
     statement = select(func.count(), func.max(LogModel.at)).where(LogModel.at > at)
     count, latest = session.execute(statement).one()
     return count, latest
 
 
-def last_time(session: Session) -> str | None:
+def find_last_entry_time(session: Session) -> str | None:
     """When the last entry was written; None for an empty log."""
     return session.scalar(select(LogModel.at).order_by(LogModel.id.desc()).limit(1))
 
@@ -259,7 +261,9 @@ def verify_chain(session: Session) -> int:
     count, previous = 0, GENESIS
     for entry in read_log(session):
         count += 1
-        previous = chain_hash(previous, count, entry, canonical(entry.body).encode())
+        previous = compute_chain_hash(
+            previous, count, entry, canonical_json_text(entry.body).encode()
+        )
         if entry.id != count or entry.hash != previous:
             raise DamagedError(
                 f"row {entry.id} of the log was changed or is damaged: its hash does not continue"
@@ -269,7 +273,7 @@ def verify_chain(session: Session) -> int:
     return count
 
 
-def chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
+def compute_chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
     """Hash of a row: SHA-256 over the hash before it, its columns and the hash of its body.
 
     Args:
@@ -280,16 +284,16 @@ def chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
     """
     values: dict[str, Json] = {name: getattr(entry, name) for name in _COLUMNS}
     values |= {"id": number, "body": hashlib.sha256(body).hexdigest()}
-    return hashlib.sha256((previous + canonical(values)).encode()).hexdigest()
+    return hashlib.sha256((previous + canonical_json_text(values)).encode()).hexdigest()
 
 
 _COLUMNS = ("kind", "actor", "at", "dataset_id", "group_id", "station_id")
 
 
-def single_edits(value: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+def iterate_single_edits(value: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     """A logged edit, or those that it consists of where it is several."""
     if value.get("edit") != "several":
         yield value
         return
     for one in value["edits"]:
-        yield from single_edits(one)
+        yield from iterate_single_edits(one)

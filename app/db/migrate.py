@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
-from app.config import Settings, own_folder
+from app.config import Settings, find_own_folder
 from app.db.backup import write_backup
 from app.db.dialects.dialect import WRITE, Dialect, dialect_of, make_engine, report_storage_errors
 from app.db.home import make_file
@@ -17,7 +17,9 @@ from app.db.recovery.preopen_check import require_sound
 from app.errors import StorageError
 
 KNOWN_REVISIONS = tuple(
-    sorted(script.name[:4] for script in (own_folder("migrations") / "versions").glob("[0-9]*.py"))
+    sorted(
+        script.name[:4] for script in (find_own_folder("migrations") / "versions").glob("[0-9]*.py")
+    )
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1] if KNOWN_REVISIONS else ""
@@ -41,19 +43,19 @@ class MigrationResult:
     copy: Path | None = None
 
 
-def migrations_folder() -> Path:
+def find_migrations_folder() -> Path:
     """Where the migration scripts lie.
 
     Raises:
         StorageError: They do not.
     """
-    folder = own_folder("migrations")
+    folder = find_own_folder("migrations")
     if not (folder / "env.py").is_file():
         raise StorageError("the migration scripts are missing from this installation")
     return folder
 
 
-def migrate(settings: Settings) -> MigrationResult:
+def migrate_database(settings: Settings) -> MigrationResult:
     """Run the migrations that are missing, after a backup of what is there.
 
     All of them are one transaction: killed midway nothing has happened.
@@ -66,12 +68,12 @@ def migrate(settings: Settings) -> MigrationResult:
     try:
         if lock.alone and dialect_of(settings).is_file:
             require_sound(settings)
-        return bring_up_to_date(settings, alone=lock.alone)
+        return migrate_locked_database(settings, alone=lock.alone)
     finally:
         lock.release()
 
 
-def bring_up_to_date(settings: Settings, *, alone: bool) -> MigrationResult:
+def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResult:
     """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
     dialect = dialect_of(settings)
     if dialect.is_file:
@@ -80,7 +82,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> MigrationResult:
     copy = None
     try:
         with report_storage_errors(settings):
-            revision = schema_revision(engine)
+            revision = read_schema_revision(engine)
             _refuse_newer(revision, settings)
             require_own_database(engine, settings)
             if revision not in (None, SCHEMA_REVISION):
@@ -110,7 +112,7 @@ def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
     from alembic.config import Config
 
     config = Config()
-    config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
+    config.set_main_option("script_location", str(find_migrations_folder()).replace("%", "%%"))
     with (
         engine.execution_options(**WRITE).begin() as connection,
         dialect.migrating(connection, new=new),
@@ -132,7 +134,7 @@ def _delete_older_copies(copy: Path) -> None:
             other.unlink()
 
 
-def schema_revision(engine: Engine) -> str | None:
+def read_schema_revision(engine: Engine) -> str | None:
     """The revision that the database says it has; None for an empty one."""
     with engine.connect() as connection:
         return _read_revision(connection)
@@ -147,10 +149,10 @@ def _read_revision(connection: Connection) -> str | None:
 
 def _refuse_newer(revision: str | None, settings: Settings) -> None:
     if revision is not None and revision not in KNOWN_REVISIONS:
-        raise newer_schema(revision, settings)
+        raise newer_schema_error(revision, settings)
 
 
-def newer_schema(revision: str, settings: Settings) -> StorageError:
+def newer_schema_error(revision: str, settings: Settings) -> StorageError:
     """The refusal of a database that a newer version made, with the way back."""
     if revision == UNFINISHED:
         return StorageError(

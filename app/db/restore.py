@@ -14,11 +14,11 @@ from pathlib import Path, PurePosixPath
 from app.config import Settings
 from app.db.backup import DATABASE, EXPORTS, FRAMES, examine_database, require_file, verify_backup
 from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused_file_error
-from app.db.locks import database_alone, server_lock
-from app.db.migrate import KNOWN_REVISIONS, newer_schema
+from app.db.locks import hold_database_alone, hold_server_lock
+from app.db.migrate import KNOWN_REVISIONS, newer_schema_error
 from app.db.recovery.anchor import Anchor, anchor_file, make_anchor
 from app.db.recovery.preopen_check import MAGIC, log_file, read_header, read_log
-from app.durable import sync
+from app.durable import sync_to_disk
 from app.errors import DamagedError, InputError
 
 
@@ -45,7 +45,7 @@ class RestoreResult:
     foreign_log: bool = False
 
 
-def restore(settings: Settings, source: Path) -> RestoreResult:
+def restore_database(settings: Settings, source: Path) -> RestoreResult:
     """Put a backup, or a database file, into the place of a home's database.
 
     The source is examined first. Killed at any moment, the home is as it was, or without a
@@ -64,8 +64,8 @@ def restore(settings: Settings, source: Path) -> RestoreResult:
     if not source.is_file():
         raise InputError(f"there is no file {source}")
     with (
-        server_lock(settings),
-        database_alone(settings, "it cannot be replaced meanwhile"),
+        hold_server_lock(settings),
+        hold_database_alone(settings, "it cannot be replaced meanwhile"),
     ):
         try:
             with _temporary_folder(settings) as folder:
@@ -81,7 +81,7 @@ def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restor
         expected, foreign_log = None, _copy_files(source, folder)
     anchor, rows = examine_database(settings, folder / DATABASE, source)
     if anchor.schema not in KNOWN_REVISIONS:
-        raise newer_schema(anchor.schema, settings)
+        raise newer_schema_error(anchor.schema, settings)
     if expected not in (None, (anchor.entries, anchor.hash)):
         raise DamagedError(
             f"the log in the backup {source} differs from the log that its manifest describes"
@@ -164,7 +164,7 @@ def _move_aside(settings: Settings, folders: list[str]) -> Path | None:
     for path in present:
         shutil.move(path, aside / path.name)
     for path in (aside, settings.home, database.parent):
-        sync(path)
+        sync_to_disk(path)
     return aside
 
 
@@ -184,9 +184,9 @@ def _move_into_home(settings: Settings, folder: Path, anchor: Anchor) -> None:
     for path in folder.iterdir():
         if path.is_dir():
             shutil.move(path, settings.home / path.name)
-    sync(settings.home)
+    sync_to_disk(settings.home)
     shutil.move(folder / DATABASE, settings.database_file)
-    sync(settings.database_file.parent)
+    sync_to_disk(settings.database_file.parent)
     if anchor.installation:
         make_anchor(settings.database_file, anchor)
     else:

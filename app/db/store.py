@@ -19,9 +19,9 @@ from app.db.locks import DatabaseInUse
 from app.db.migrate import (
     KNOWN_REVISIONS,
     SCHEMA_REVISION,
-    bring_up_to_date,
-    newer_schema,
-    schema_revision,
+    migrate_locked_database,
+    newer_schema_error,
+    read_schema_revision,
 )
 from app.db.recovery.anchor import (
     Anchor,
@@ -356,8 +356,8 @@ def _open_engine(settings: Settings, alone: bool) -> Engine:
     try:
         with report_storage_errors(settings):
             dialect.require_promises(engine)
-            if schema_revision(engine) is None:
-                bring_up_to_date(settings, alone=alone)
+            if read_schema_revision(engine) is None:
+                migrate_locked_database(settings, alone=alone)
             _require_schema(engine, settings)
             require_own_database(engine, settings)
             renew_anchor(engine, settings, alone=alone)
@@ -368,11 +368,11 @@ def _open_engine(settings: Settings, alone: bool) -> Engine:
 
 
 def _require_schema(engine: Engine, settings: Settings) -> None:
-    revision = schema_revision(engine)
+    revision = read_schema_revision(engine)
     if revision == SCHEMA_REVISION:
         return
     if revision in KNOWN_REVISIONS:
         raise StorageError(
             "the database was made by an older version of Touchline", hint="Run touchline migrate."
         )
-    raise newer_schema(str(revision), settings)
+    raise newer_schema_error(str(revision), settings)

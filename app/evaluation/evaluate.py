@@ -46,7 +46,7 @@ from app.evaluation.result import (
     Table,
 )
 from app.geometry.camera import Camera
-from app.progress import ReportProgress, partial_progress
+from app.progress import ReportProgress, make_partial_progress
 from app.soccer.frames import Box
 from app.wording import plural
 
@@ -285,8 +285,8 @@ def _score_all_cameras(
     own = {frame.id: frame.camera for frame in frames if frame.camera is not None}
     total = 2 * len(frames)
     sentence = "Measuring cameras"
-    first = partial_progress(say, sentence, total=total)
-    second = partial_progress(say, sentence, start=len(frames), total=total)
+    first = make_partial_progress(say, sentence, total=total)
+    second = make_partial_progress(say, sentence, start=len(frames), total=total)
     predicted = score_cameras(frames, inputs.cameras, first)
     oracle = score_cameras(frames, own, second)
     return predicted, oracle

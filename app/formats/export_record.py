@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from app.formats.frame_names import expected_frame_suffix, frame_path_by_match, with_export_key
 from app.geometry.camera import Camera
-from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
+from app.soccer.ball_boxes import ball_fit, collect_ball_boxes, has_ball_3d
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
@@ -106,7 +106,7 @@ class ExportRecord:
 
 def choose_ball_box(record: ExportRecord, view: View, kind: str) -> Box | None:
     """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it."""
-    boxes = ball_boxes(record.solution, view)
+    boxes = collect_ball_boxes(record.solution, view)
     return boxes.get(kind) or boxes.get("annotated")
 
 

@@ -18,7 +18,13 @@ from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, require_safe_path
 from app.formats.trees import open_tree_while_read
-from app.object_store.path import StoredPath, find_path, is_address, seal_address, target_path
+from app.object_store.path import (
+    StoredPath,
+    find_path,
+    is_address,
+    resolve_target_path,
+    seal_address,
+)
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.wording import plural
@@ -238,7 +244,7 @@ class FrameList:
                 )
             return str(self._folder / require_safe_path(path))
         require_safe_path(path.removeprefix("s3://"))
-        return str(target_path(self._settings, path))
+        return str(resolve_target_path(self._settings, path))
 
     def _add_entity_tag(self, address: str) -> str:
         """The address with the entity tag of what is there now; asked once for each zip."""

@@ -18,7 +18,7 @@ from app.formats.report import Report
 from app.formats.safe_path import MAX_PART
 from app.formats.trees import open_tree_while_read
 from app.object_store.path import StoredPath
-from app.zip_file import first_member_names
+from app.zip_file import list_first_member_names
 
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""
@@ -80,7 +80,7 @@ def _file_names(path: Path | StoredPath) -> Iterable[str]:
     if path.suffix.lower() != ".zip" or not path.is_file():
         return [path.name]
     try:
-        return first_member_names(path, MAX_NAMES)
+        return list_first_member_names(path, MAX_NAMES)
     except OSError:
         return []
 

@@ -132,7 +132,7 @@ def read_json(
         record: Record inside the file, for the error.
         double_encoded: Also accept a JSON string that holds JSON or a Python dict literal.
         nan: Without a report: whether NaN, Infinity and numbers that are too large refuse the text, or
-            are kept, for a reader that refuses them field by field (``fields.number``).
+            are kept, for a reader that refuses them field by field (``fields.parse_number``).
         max_bytes: Longest text that is looked at.
         report: Takes a remark for each NaN, Infinity and number that is too large, which are null
             in the value: what is left out for want of it, the reader of its field says.

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from app.durable import PARTIAL, sync
+from app.durable import PARTIAL, sync_to_disk
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.formats.file_tree import Root
 from app.formats.manifest import MANIFEST, SOFTWARE
@@ -134,7 +134,7 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: ReportProgress
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
-    sync(out.parent)
+    sync_to_disk(out.parent)
 
 
 def write_zip(root: Path, file: object, progress: ReportProgress | None = None) -> None:
@@ -174,8 +174,8 @@ def write_files_to_zip(
 def _publish_folder(staging: Path, out: Path) -> None:
     for folder, _, files in os.walk(staging, topdown=False):
         for name in files:
-            sync(Path(folder) / name)
-        sync(Path(folder))
+            sync_to_disk(Path(folder) / name)
+        sync_to_disk(Path(folder))
     staging.chmod(0o755)
     if not out.exists():
         staging.rename(out)
@@ -185,7 +185,7 @@ def _publish_folder(staging: Path, out: Path) -> None:
         out.rename(aside)
         staging.rename(out)
         shutil.rmtree(aside, ignore_errors=True)
-    sync(out.parent)
+    sync_to_disk(out.parent)
 
 
 _CHUNK = 1024 * 1024

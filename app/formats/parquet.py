@@ -28,8 +28,8 @@ from app.formats.view_state import (
     view_to_json,
 )
 from app.geometry.camera import Camera
-from app.json_text import finite
 from app.json_text import json_text as finite_text
+from app.json_text import replace_non_finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, Media, View
 from app.soccer.solution import Ball3D, BallFit, BestBall, Solution, ViewSolution
@@ -121,7 +121,7 @@ def write_parquet(
             counts["groups"] += 1
             for position, view in enumerate(record.group.views):
                 row = ViewRow(record, view, position, boxes, everything, provenance or {})
-                waiting.append(finite({name: get(row) for name, _, get in COLUMNS}))
+                waiting.append(replace_non_finite({name: get(row) for name, _, get in COLUMNS}))
                 counts["views"] += 1
                 counts["boxes"] += _exported_box(row) is not None
                 counts["balls"] += record.has_ball_3d(view)

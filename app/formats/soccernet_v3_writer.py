@@ -31,7 +31,7 @@ from app.formats.soccernet_v3 import (
     parse_image_numbers,
     record_to_json,
 )
-from app.json_text import finite, json_text
+from app.json_text import json_text, replace_non_finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -250,7 +250,7 @@ def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterat
     yield from (action, replay is None, None if replay is None else float(replay))
     yield from (view.size.width, view.size.height, view.ball is not None)
     yield format_box(box) if box else None
-    yield repr(finite(camera_to_json(camera))) if camera else None
+    yield repr(replace_non_finite(camera_to_json(camera))) if camera else None
     yield from _jac_of_view(record, view) or (None,) * len(JAC_NAMES)
     yield f"[array({list_text(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)

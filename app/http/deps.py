@@ -54,7 +54,7 @@ from app.http.errors import PreconditionRequiredError
 from app.http.events import Events
 from app.json_text import MAX_ID
 from app.media.frames import Frames
-from app.soccer.actors import LOCAL_USER, script_name
+from app.soccer.actors import LOCAL_USER, parse_script_name
 from app.solving.solve import warm_up_solver
 
 log = structlog.get_logger("touchline.api")
@@ -271,7 +271,7 @@ async def get_actor(
                 pointer=f"/{ACTOR_HEADER}",
             )
         return login.actor
-    return LOCAL_USER if name is None else script_name(name, pointer=f"/{ACTOR_HEADER}")
+    return LOCAL_USER if name is None else parse_script_name(name, pointer=f"/{ACTOR_HEADER}")
 
 
 async def get_visibility(request: Request) -> Visibility:

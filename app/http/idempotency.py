@@ -25,7 +25,7 @@ from app.db.idempotency import (
     IdempotencyKey,
     KeyedRequest,
     StoredResponse,
-    claim,
+    claim_key,
     end_claim,
     find_stored,
     store_sent,
@@ -36,7 +36,7 @@ from app.http.deps import ACTOR_HEADER
 from app.http.documents import KEYED_REQUEST, response_to_stored
 from app.http.problem import make_problem, problem_response
 from app.http.requests import TimedBody
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 
 log = structlog.get_logger("touchline.api")
 
@@ -101,8 +101,8 @@ class RequestDigest:
         if self.is_streamed:
             body = self._sum.hexdigest()
         else:
-            body = canonical(self._value) if self._has_value else ""
-        return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
+            body = canonical_json_text(self._value) if self._has_value else ""
+        return hashlib.sha256(canonical_json_text([*place, body]).encode()).hexdigest()
 
 
 class Idempotency:
@@ -171,7 +171,7 @@ class Idempotency:
     async def _claim_key(self, store: Store, key: str, actor: str) -> None:
         """Let no other process answer; raises OverloadedError where patience comes to its end."""
         until = time.monotonic() + PATIENCE
-        while not await run_sync(claim, store, key, actor, limiter=self._finding):
+        while not await run_sync(claim_key, store, key, actor, limiter=self._finding):
             if time.monotonic() > until:
                 raise _in_progress_error()
             await asyncio.sleep(AGAIN_SECONDS)

@@ -20,7 +20,7 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
-from app.config import own_folder
+from app.config import find_own_folder
 from app.errors import StorageError
 from app.http.headers import make_content_security_policy
 from app.http.permissions import open_to_all
@@ -37,7 +37,7 @@ _ENTRY = re.compile(rb'(<script type="module"[^>]* src="/static/)((?:ahead|main)
 _PRELOAD = re.compile(rb'\s*<link rel="modulepreload"[^>]*>')
 
 
-STATIC = own_folder("static")
+STATIC = find_own_folder("static")
 _INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
 _SHEET = re.compile(rb'\s*<link rel="stylesheet" href="/static/(?P<path>css/[^"]+)">')
 _ALL_SHEETS = b'\n\t<link rel="stylesheet" href="/static/all.css">'

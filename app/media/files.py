@@ -21,7 +21,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.json_text import digest_of
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.media.object_frames import ArchiveMembers, is_stored, read_object
-from app.media.video import Times, frame_at, kept_index, make_index, open_video
+from app.media.video import Times, make_index, open_video, read_frame_at, read_kept_index
 from app.object_store.path import unseal_address
 from app.soccer.group import Media
 from app.wording import plural
@@ -60,12 +60,12 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     """
     _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
-        data, name = _read_source(media, settings), frame_name(media)
+        data, name = _read_source(media, settings), describe_frame(media)
         if read_header(data, name).orientation == 1:
             # They are sent once they were seen to decode.
             _decode_pixels(data, settings, name)
             return data
-    found = cached_frame(media, width, flipped, settings)
+    found = read_cached_frame(media, width, flipped, settings)
     if found is not None:
         return found
     picture = _decode_frame(media, settings)
@@ -97,7 +97,7 @@ def read_pixels(
         picture = _video_frame(media, settings)
         digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
-        data, name = _read_source(media, settings), frame_name(media)
+        data, name = _read_source(media, settings), describe_frame(media)
         digest = digest_of(data)
         if read_header(data, name).orientation != 1:
             # What was once read of the stored pixels, under the plain digest, is read again.
@@ -109,7 +109,7 @@ def read_pixels(
     return digest, turn_as_annotated(picture, flipped)
 
 
-def cached_frame(
+def read_cached_frame(
     media: Media, width: int | None, flipped: bool, settings: Settings
 ) -> bytes | None:
     """The JPEG that was made of a frame before, where it is kept; opens no file but that.
@@ -122,7 +122,7 @@ def cached_frame(
     return None
 
 
-def frame_stamp(media: Media) -> str:
+def make_frame_stamp(media: Media) -> str:
     """Name of a frame by content: another file under the same path has another time or size.
 
     The address of one in an object store says its content itself.
@@ -137,7 +137,7 @@ def frame_stamp(media: Media) -> str:
     return repr((*place, status.st_ino, status.st_mtime_ns, status.st_size))
 
 
-def content_type(data: bytes) -> str:
+def guess_content_type(data: bytes) -> str:
     """Media type by the bytes themselves; names have no say.
 
     Raises:
@@ -146,7 +146,7 @@ def content_type(data: bytes) -> str:
     return read_header(data).kind
 
 
-def picture_header(media: Media) -> ImageHeader | None:
+def read_picture_header(media: Media) -> ImageHeader | None:
     """Size and orientation of a frame on this disk, from the beginning of its file.
 
     None where it lies in an object store, cannot be read, or says nothing there.
@@ -164,7 +164,7 @@ def picture_header(media: Media) -> ImageHeader | None:
     return None
 
 
-def frame_name(media: Media) -> str:
+def describe_frame(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
     file = Path(unseal_address(media.path)[0]).name
     if media.member is not None:
@@ -172,7 +172,7 @@ def frame_name(media: Media) -> str:
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
 
 
-def video_times(
+def read_video_times(
     media: Media, settings: Settings, tell: Callable[[int], None] | None = None
 ) -> Times:
     """When each frame of a view's video is shown; decoded where no index is kept.
@@ -188,15 +188,15 @@ def video_times(
         TooLargeError: It is larger than the limits, in pixels or frames.
     """
     _require_contained(media, settings)
-    path, stamp = Path(media.path), video_stamp(media)
-    known = kept_index(stamp, settings)
+    path, stamp = Path(media.path), make_video_stamp(media)
+    known = read_kept_index(stamp, settings)
     if known is not None:
         return known
     check_size(_video_header(path), settings, path.name)
     return make_index(path, stamp, settings, tell)
 
 
-def video_length(media: Media) -> int:
+def read_video_length(media: Media) -> int:
     """How many frames a view's video promises to have, which is a guess.
 
     Raises:
@@ -217,19 +217,19 @@ def has_index(media: Media, settings: Settings) -> bool:
     Raises:
         NotFoundError: The video is not there.
     """
-    return kept_index(video_stamp(media), settings) is not None
+    return read_kept_index(make_video_stamp(media), settings) is not None
 
 
-def video_stamp(media: Media) -> str:
+def make_video_stamp(media: Media) -> str:
     """Name of the content of a view's video.
 
     Raises:
         NotFoundError: The video is not there.
     """
-    return frame_stamp(replace(media, frame=None))
+    return make_frame_stamp(replace(media, frame=None))
 
 
-def media_facts(media: Media) -> dict[str, int]:
+def read_media_facts(media: Media) -> dict[str, int]:
     """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone.
 
     Empty, too, of a frame in an object store: it is known by its address.
@@ -260,7 +260,7 @@ def has_member(media: Media, member: str) -> bool:
 def _decode_frame(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
         return _video_frame(media, settings)
-    return _decode_pixels(_read_source(media, settings), settings, frame_name(media))
+    return _decode_pixels(_read_source(media, settings), settings, describe_frame(media))
 
 
 def _read_source(media: Media, settings: Settings) -> bytes:
@@ -375,12 +375,12 @@ def _require_declared_size(picture: Any, header: ImageHeader, name: str) -> None
 
 def _video_frame(media: Media, settings: Settings) -> Any:
     path, number = Path(media.path), media.frame or 0
-    times = video_times(media, settings)
+    times = read_video_times(media, settings)
     if not 0 <= number < len(times):
         raise NotFoundError(
             f"{path.name} has no frame {number}; it has {plural(len(times), 'frame')}"
         )
-    picture = frame_at(path, number, times)
+    picture = read_frame_at(path, number, times)
     if picture is None:
         raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")
     # A stream may change its size on the way.
@@ -418,7 +418,7 @@ def _encode_jpeg(picture: Any) -> bytes:
 
 def _cache_path(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
     """Where what is made of a frame is kept."""
-    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY, _CACHE_VERSION))
+    key = repr((make_frame_stamp(media), width, flipped, JPEG_QUALITY, _CACHE_VERSION))
     name = hashlib.sha256(key.encode()).hexdigest()
     return settings.cache / "frames" / name[:2] / f"{name[2:34]}.jpg"
 

@@ -29,26 +29,26 @@ from app.errors import (
 )
 from app.json_text import digest_of
 from app.media.files import (
-    cached_frame,
-    content_type,
-    frame_name,
-    frame_stamp,
+    describe_frame,
+    guess_content_type,
     has_index,
     has_member,
+    make_frame_stamp,
+    make_video_stamp,
+    read_cached_frame,
     read_frame,
-    video_stamp,
-    video_times,
+    read_video_times,
 )
 from app.media.images import JPEG
 from app.media.object_frames import fetch_frame, is_kept, is_stored
-from app.media.video import Times, remember_index, remembered_index
+from app.media.video import Times, get_remembered_index, remember_index
 from app.progress import ReportProgress
 from app.soccer.group import FARTHEST, Media, split_frame_number
 from app.worker_pool import Explain, PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
 
 
-def neighbouring_frames(
+def find_neighbouring_frames(
     media: Media, group: str, static: bool, settings: Settings
 ) -> dict[int, Media]:
     """Frames of the same camera up to ``FARTHEST`` before and after, by how many frames later.
@@ -65,7 +65,9 @@ def neighbouring_frames(
         return {}
     try:
         if media.frame is not None:
-            return dict(_neighbours_in_video(media, media.frame, len(video_times(media, settings))))
+            return dict(
+                _neighbours_in_video(media, media.frame, len(read_video_times(media, settings)))
+            )
         return dict(_neighbours_among_files(media, group, static))
     except (NotFoundError, ImageError, StorageError, TooLargeError):
         return {}
@@ -184,14 +186,14 @@ class Frames:
             TooLargeError: It was tried before, and went beyond the limits.
         """
         self._require_not_refused(media)
-        data = cached_frame(media, width, flipped, self._settings)
+        data = read_cached_frame(media, width, flipped, self._settings)
         return None if data is None else SentPicture.of(JPEG, data)
 
     def ask_fetch(self, media: Media) -> PoolTask | None:
         """Have a frame made ready; None where it is: one of a store is brought to this disk, and
         the video of one is indexed.
 
-        Its future may have the errors of ``fetch_frame`` and ``video_times``.
+        Its future may have the errors of ``fetch_frame`` and ``read_video_times``.
 
         Raises:
             OverloadedError: Too many wait.
@@ -220,7 +222,7 @@ class Frames:
         return made
 
     def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
-        """Have ``neighbouring_frames`` called, which opens videos and archives.
+        """Have ``find_neighbouring_frames`` called, which opens videos and archives.
 
         Its future may have ``WorkerEnded``.
 
@@ -228,7 +230,7 @@ class Frames:
             OverloadedError: Too many wait.
         """
         work = self._videos.with_index(
-            media, neighbouring_frames, media, group, static, self._settings
+            media, find_neighbouring_frames, media, group, static, self._settings
         )
         return self._pool.submit(*work)
 
@@ -251,7 +253,7 @@ class Frames:
         """
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return refused_picture(frame_name(media), error)
+            return picture_error_of_ended_process(describe_frame(media), error)
 
         return self._submit_read(
             media, work, media, flipped, self._settings, *arguments, explain=explain
@@ -320,7 +322,7 @@ class Frames:
             return None
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return StorageError(f"{frame_name(media)} {error}", hint="Try again in a moment.")
+            return StorageError(f"{describe_frame(media)} {error}", hint="Try again in a moment.")
 
         return self._fetchers.submit(
             fetch_frame, media, self._settings, explain=explain, bounded=bounded
@@ -330,7 +332,7 @@ class Frames:
         self, media: Media, width: int | None, flipped: bool, *, bounded: bool
     ) -> PoolTask:
         def explain(error: WorkerEnded) -> ReviewError:
-            refusal = refused_picture(frame_name(media), error)
+            refusal = picture_error_of_ended_process(describe_frame(media), error)
             if error.reason in REMEMBERED_SECONDS:
                 self._remember_refusal(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
@@ -347,13 +349,13 @@ class Frames:
     def _require_not_refused(self, media: Media) -> None:
         """Raise the refusal of a frame that went beyond the limits, while it is remembered."""
         with self._lock:
-            refusal, until = self._refused.get(frame_stamp(media), (None, 0.0))
+            refusal, until = self._refused.get(make_frame_stamp(media), (None, 0.0))
         if refusal is not None and monotonic() < until:
             raise refusal
 
     def _remember_refusal(self, media: Media, refusal: ReviewError, seconds: float) -> None:
         with self._lock:
-            self._refused[frame_stamp(media)] = (refusal, monotonic() + seconds)
+            self._refused[make_frame_stamp(media)] = (refusal, monotonic() + seconds)
             while len(self._refused) > REMEMBERED:
                 self._refused.popitem(last=False)
 
@@ -371,7 +373,7 @@ class VideoIndexer:
     def ask(self, media: Media, *, bounded: bool = True) -> PoolTask | None:
         """Have the video of a frame indexed; None where it is, and where it is no video.
 
-        Its future may have the errors of ``video_times``.
+        Its future may have the errors of ``read_video_times``.
 
         Raises:
             NotFoundError: The video is not there.
@@ -381,7 +383,7 @@ class VideoIndexer:
             return None
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return refused_picture(frame_name(replace(media, frame=None)), error)
+            return picture_error_of_ended_process(describe_frame(replace(media, frame=None)), error)
 
         with self._lock:
             running = self._running.get(media.path)
@@ -439,7 +441,7 @@ class VideoIndexer:
         if has_index(media, self._settings):
             return True
         stamp, _ = self._unkept.get(media.path, ("", None))
-        return stamp == video_stamp(media)
+        return stamp == make_video_stamp(media)
 
     def _forget_finished(self, path: str, done: Future[Any]) -> None:
         if not done.cancelled() and done.exception() is None:
@@ -464,7 +466,7 @@ def _forward_result(waiting: Future[Any], done: Future[Any]) -> None:
             waiting.set_exception(error)
 
 
-def refused_picture(name: str, error: WorkerEnded) -> ReviewError:
+def picture_error_of_ended_process(name: str, error: WorkerEnded) -> ReviewError:
     """What the end of a process over a picture says: of the picture, or of the machine."""
     if error.reason in ("killed", "terminated"):
         more = " Where it happens often, give more memory." if error.reason == "killed" else ""
@@ -476,15 +478,15 @@ def refused_picture(name: str, error: WorkerEnded) -> ReviewError:
 def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> SentPicture:
     """A picture, made in this process."""
     data = read_frame(media, width, flipped, settings)
-    return SentPicture.of(content_type(data), data)
+    return SentPicture.of(guess_content_type(data), data)
 
 
 def index_video(media: Media, settings: Settings) -> tuple[str, Times | None]:
     """Make the index of a video, in this process: name of its content, and the index itself where
     the disk refuses it."""
-    video_times(media, settings)
-    stamp = video_stamp(media)
-    return stamp, remembered_index(stamp)
+    read_video_times(media, settings)
+    stamp = make_video_stamp(media)
+    return stamp, get_remembered_index(stamp)
 
 
 def with_index(stamp: str, times: Times, work: Callable[..., Any], *arguments: Any) -> Any:

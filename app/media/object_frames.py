@@ -23,7 +23,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.path import StoredPath, is_address, split_address, unseal_address
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.soccer.group import Media
-from app.zip_file import nested_name, open_nested, open_zip
+from app.zip_file import open_nested, open_zip, split_nested_name
 
 MAX_OPEN = 16
 
@@ -95,7 +95,7 @@ class ArchiveMembers:
         """The open archive that a member lies in, and its name there."""
         key = _archive_key(path)
         archive = self._get_archive(key, lambda: _open_archive(path))
-        if member in archive.NameToInfo or (nested := nested_name(archive, member)) is None:
+        if member in archive.NameToInfo or (nested := split_nested_name(archive, member)) is None:
             return archive, member
         outer, inner = nested
         info = archive.getinfo(outer)

@@ -53,7 +53,7 @@ MOST_DAMAGED = 500
 """Pictures in a row that may be damaged; the end of a video is where no more come than that."""
 
 
-def skipped_to_next(video: cv2.VideoCapture) -> int | None:
+def grab_next_frame(video: cv2.VideoCapture) -> int | None:
     """Grab the next frame that can be decoded.
 
     Returns:
@@ -118,14 +118,14 @@ def remember_index(stamp: str, times: Times) -> None:
         _REMEMBERED.popitem(last=False)
 
 
-def remembered_index(stamp: str) -> Times | None:
+def get_remembered_index(stamp: str) -> Times | None:
     """The index of a video that this process remembers."""
     return _REMEMBERED.get(stamp)
 
 
-def kept_index(stamp: str, settings: Settings) -> Times | None:
+def read_kept_index(stamp: str, settings: Settings) -> Times | None:
     """The index of a video that was decoded before; None where there is none."""
-    if (remembered := remembered_index(stamp)) is not None:
+    if (remembered := get_remembered_index(stamp)) is not None:
         return remembered
     with suppress(OSError, ValueError, EOFError):
         times: Times = np.load(_index_path(stamp, settings), allow_pickle=False)
@@ -134,7 +134,7 @@ def kept_index(stamp: str, settings: Settings) -> Times | None:
     return None
 
 
-def frame_at(path: Path, number: int, times: Times) -> Any:
+def read_frame_at(path: Path, number: int, times: Times) -> Any:
     """The frame of that number, or None where it cannot be decoded.
 
     Args:
@@ -193,7 +193,7 @@ class FrameReader:
         self.close()
         video = self._opened()
         while self._next <= number:
-            if skipped_to_next(video) is None:
+            if grab_next_frame(video) is None:
                 self.close()
                 return None
             self._next += 1
@@ -228,7 +228,7 @@ class FrameReader:
 
     def skip(self) -> bool:
         """Pass over the frame that follows the one read last; whether there is one."""
-        if self._video is None or skipped_to_next(self._video) is None:
+        if self._video is None or grab_next_frame(self._video) is None:
             return False
         self._next += 1
         return True
@@ -257,7 +257,7 @@ class FrameReader:
         """Go to about a frame on the way to another one; whether it is known which one this is."""
         video = self._opened()
         video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
-        if skipped_to_next(video) is None:
+        if grab_next_frame(video) is None:
             return False
         places = np.flatnonzero(_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
         # Where the jump led too far, or two frames have one time, nothing says which one this is.
@@ -275,7 +275,7 @@ class FrameReader:
         """Decode on to a frame; whether every frame on the way came when it should."""
         video = self._opened()
         while self._next <= number:
-            gone = skipped_to_next(video) is None
+            gone = grab_next_frame(video) is None
             if gone or not _same_time(self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)):
                 return False
             self._next += 1
@@ -303,7 +303,7 @@ def _retrieve_frame(video: Any) -> Any:
 def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
     with _open_video(path) as video:
-        while skipped_to_next(video) is not None:
+        while grab_next_frame(video) is not None:
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")

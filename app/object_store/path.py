@@ -159,7 +159,7 @@ def find_path(settings: Settings, address: str) -> StoredPath:
     return path
 
 
-def target_path(settings: Settings, address: str) -> StoredPath:
+def resolve_target_path(settings: Settings, address: str) -> StoredPath:
     """Where an address is, whatever lies there.
 
     Raises:

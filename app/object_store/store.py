@@ -224,7 +224,7 @@ class ObjectStore:
             return str(self._engine.sign(self._store, "GET", key, timedelta(seconds=seconds)))
 
     def _translated(self, key: str) -> AbstractContextManager[None]:
-        return translated_errors(self.name, self.address(key), self._engine.exceptions)
+        return translate_store_errors(self.name, self.address(key), self._engine.exceptions)
 
 
 class _ObjectWriter:
@@ -328,7 +328,7 @@ def _read_key_file(settings: StoreSettings) -> tuple[str, ...]:
 
 
 @contextmanager
-def translated_errors(store: str, address: str, wrong: Any) -> Iterator[None]:
+def translate_store_errors(store: str, address: str, wrong: Any) -> Iterator[None]:
     """Raise errors of the library as ours, in sentences without keys, buckets or endpoints.
 
     Args:

@@ -98,7 +98,7 @@ def snap_camera(
 
     Args:
         image: Red green blue, shape (H, W, 3).
-        field: The field of play (``grass.field_of_play``), shape (H, W).
+        field: The field of play (``grass.find_field_of_play``), shape (H, W).
         start: A camera of the picture that is right to about the first window.
         pitch: The pitch.
         hidden: Boxes in which nothing is believed, pixels.

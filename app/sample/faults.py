@@ -46,14 +46,16 @@ def plan_fault(rng: np.random.Generator, views: int) -> FaultPlan | None:
     return FaultPlan(name, index, int(rng.integers(1 << 31)))
 
 
-def position_beside_main(rng: np.random.Generator, main: FloatArray) -> tuple[FloatArray, float]:
+def choose_position_beside_main(
+    rng: np.random.Generator, main: FloatArray
+) -> tuple[FloatArray, float]:
     """A replay camera next to the main camera, and its distance from it, metres."""
     direction = rng.normal(0, 1, 3) * (1.0, 0.6, 0.3)
     distance = float(rng.uniform(*TINY_BASELINE_M))
     return main + direction / np.linalg.norm(direction) * distance, distance
 
 
-def another_instant(
+def choose_another_instant(
     rng: np.random.Generator, instant: Instant, main: FloatArray, replay: FloatArray
 ) -> tuple[Instant, float]:
     """A moment at which the ball is elsewhere, such that the two rays miss each other.
@@ -148,19 +150,19 @@ def _swap_label(rng: np.random.Generator, view: View) -> tuple[View, PlantedFaul
     mistakes = [
         (true, label)
         for true, points in lines.items()
-        for label in confusable_markings(true)
+        for label in list_confusable_markings(true)
         if label not in lines and _extent_of_points(points) > 60
     ]
     if not mistakes:
         # All that could be confused is annotated itself: the wrong clicks replace the right ones.
         longest = max(lines, key=lambda name: _extent_of_points(lines[name]))
-        mistakes = [(longest, label) for label in confusable_markings(longest)]
+        mistakes = [(longest, label) for label in list_confusable_markings(longest)]
     true, label = mistakes[int(rng.integers(len(mistakes)))]
     lines[label] = lines.pop(true)
     return _with_lines(view, make_lines(lines)), PlantedFault("wrong_label", view.key, label, true)
 
 
-def confusable_markings(marking: str) -> tuple[str, ...]:
+def list_confusable_markings(marking: str) -> tuple[str, ...]:
     """Names that annotators write for this marking by mistake.
 
     Example:

@@ -165,7 +165,9 @@ class DrawnPerson:
     height: float
 
 
-def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -> list[DrawnPerson]:
+def list_people_in_view(
+    camera: Camera, instant: Instant, pose: Pose, image: Image
+) -> list[DrawnPerson]:
     """Everybody who is at least partly in the frame."""
     count, joints = pose.joints.shape[:2]
     flat = pose.joints.reshape(-1, 3)
@@ -191,7 +193,7 @@ def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -
     return people
 
 
-def outfit_of_person(look: MatchLook, index: int) -> Outfit:
+def choose_outfit(look: MatchLook, index: int) -> Outfit:
     """What person ``index`` of an instant wears."""
     if index == 2 * TEAM:
         return look.referee
@@ -221,7 +223,7 @@ def draw_person(
         choices[int(rng.integers(len(choices)))] for choices in (SKIN, HAIR, BOOTS)
     )
     painter = _PersonPainter(
-        patch, person, outfit_of_person(look, person.index), skin, hair, boots, lit_from
+        patch, person, choose_outfit(look, person.index), skin, hair, boots, lit_from
     )
     painter.draw(number)
     patch.draw_on_frame(gain)
@@ -243,7 +245,7 @@ def draw_distant_person(image: Image, person: DrawnPerson, look: MatchLook, gain
     Args:
         gain: Light on the person, per channel.
     """
-    kit, metre = outfit_of_person(look, person.index), person.height * person.scale
+    kit, metre = choose_outfit(look, person.index), person.height * person.scale
     joints = np.round(person.joints * (1 << _SHIFT)).astype(int)
     for a, b, radius, part in _DISTANT:
         colour = _apply_light(getattr(kit, part), gain)

@@ -16,17 +16,17 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.sample.cameras import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
-from app.sample.figures import draw_distant_person, draw_person, people_in_view, pose_people
+from app.sample.figures import draw_distant_person, draw_person, list_people_in_view, pose_people
 from app.sample.fixture import MatchLook
 from app.sample.play import HALF_LENGTH, Instant
 from app.sample.props import Image, draw_ball, draw_goal_posts, draw_net
 from app.sample.render import (
     light_direction_in_image,
     light_gain_at,
-    noise_tiles,
-    shading_camera,
-    shading_grass,
-    shading_stadium,
+    make_noise_tiles,
+    make_shading_camera,
+    make_shading_grass,
+    make_shading_stadium,
 )
 from app.sample.surface import shade_frame
 
@@ -140,12 +140,14 @@ def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
     background = np.empty((height, width), np.uint8)
     exposure, light = np.array(look.light.exposure), np.full((height, STRIP), 255, np.uint8)
     strip, behind = np.empty((height, STRIP, 3), np.uint8), np.empty((height, STRIP), np.uint8)
-    bowl = shading_stadium(cameras[0], look)
+    bowl = make_shading_stadium(cameras[0], look)
     for left in range(0, width, STRIP):
-        eye = shading_camera(
+        eye = make_shading_camera(
             _level_camera(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP)
         )
-        shade_frame(strip, behind, light, exposure, eye, shading_grass(look), bowl, *noise_tiles())
+        shade_frame(
+            strip, behind, light, exposure, eye, make_shading_grass(look), bowl, *make_noise_tiles()
+        )
         columns = min(STRIP, width - left)
         drawn.image[:, left : left + columns] = strip[:, :columns]
         background[:, left : left + columns] = behind[:, :columns]
@@ -204,7 +206,7 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: MatchLook)
 def render_picture(backdrop: Backdrop, camera: Camera, instant: Instant, look: MatchLook) -> Image:
     """A picture: blue green red, shape (720, 1280, 3), without noise and captions."""
     image = backdrop.render_from(camera)
-    people = people_in_view(camera, instant, pose_people(instant), image)
+    people = list_people_in_view(camera, instant, pose_people(instant), image)
     for person in people:
         _draw_soft_shadow(image, camera, instant.feet[person.index], 0.42)
     if instant.ball[2] > -3.0:
@@ -239,7 +241,7 @@ def is_ball_hidden(camera: Camera, instant: Instant) -> bool:
         person.depths.mean() < depth
         and bool((person.joints.min(axis=0) - 1 < pixel).all())
         and bool((pixel < person.joints.max(axis=0) + 1).all())
-        for person in people_in_view(camera, instant, pose_people(instant), image)
+        for person in list_people_in_view(camera, instant, pose_people(instant), image)
     )
 
 

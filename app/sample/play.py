@@ -71,7 +71,7 @@ def make_instant(rng: np.random.Generator, numbers: tuple[int, ...]) -> Instant:
     )
 
 
-def shirt_numbers(rng: np.random.Generator) -> tuple[int, ...]:
+def choose_shirt_numbers(rng: np.random.Generator) -> tuple[int, ...]:
     """Shirt numbers of a match: a keeper wears 1, the others do not repeat within a team."""
     teams = []
     for _ in range(2):

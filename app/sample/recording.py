@@ -35,7 +35,7 @@ from app.sample.film import (
     render_picture,
 )
 from app.sample.fixture import make_fixture
-from app.sample.play import BALL_DIAMETER, TEAM, Play, make_play, shirt_numbers
+from app.sample.play import BALL_DIAMETER, TEAM, Play, choose_shirt_numbers, make_play
 from app.sample.props import Image, draw_scoreboard
 
 FPS, REPLAY_FPS = 25, 50
@@ -210,7 +210,7 @@ def _plan_recording(
     """The play of a recording, and the shots that show it."""
     bounds = [round(FPS * end) for end in accumulate((p.seconds for p in parts), initial=0.0)]
     soft = [*(SOFT.get(part.entered_by, 0) for part in parts), 0]
-    numbers = shirt_numbers(np.random.default_rng([seed, MATCH, 0x21]))
+    numbers = choose_shirt_numbers(np.random.default_rng([seed, MATCH, 0x21]))
     play = make_play(since + bounds[-1] / FPS, seed, numbers)
     live: tuple[int, float, float] | None = None
     shots = []

@@ -20,7 +20,7 @@ from app.sample.figures import (
     DrawnPerson,
     Pose,
     draw_person,
-    people_in_view,
+    list_people_in_view,
     pose_people,
 )
 from app.sample.fixture import Colour, Lamp, Light, MatchLook
@@ -60,7 +60,7 @@ BRANDS = (
 
 
 @lru_cache(maxsize=1)
-def noise_tiles() -> tuple[Tile, Tile]:
+def make_noise_tiles() -> tuple[Tile, Tile]:
     """Wrapping noise with unit spread: broad patches, and blades of grass."""
     rng = np.random.default_rng(20_260_101)
     coarse = sum(
@@ -85,7 +85,7 @@ def _to_unit_spread(tile: npt.NDArray[Any]) -> Tile:
 
 
 @lru_cache(maxsize=8)
-def board_mipmap(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
+def make_board_mipmap(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     """The boards of a match at five sizes, one below the other.
 
     Returns:
@@ -131,7 +131,7 @@ _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _SHIFT = 4
 
 
-def shadow_mask(
+def make_shadow_mask(
     camera: Camera, instant: Instant, pose: Pose, light: Light, height: int, width: int
 ) -> Image:
     """Light left on the grass, 255 is all, shape (height, width)."""
@@ -218,7 +218,7 @@ GRAIN = 2.2
 """Standard deviation of the sensor's noise, grey levels."""
 
 
-def render(scene: Scene, view_key: str) -> Image:
+def render_view(scene: Scene, view_key: str) -> Image:
     """The frame of one view: blue green red, shape (720, 1280, 3).
 
     The same scene gives the same pixels.
@@ -243,17 +243,17 @@ def render(scene: Scene, view_key: str) -> Image:
 def _empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
-    shadow = shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
+    shadow = make_shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
     exposure = np.array(look.light.exposure)
     shade_frame(
         image,
         background,
         shadow,
         exposure,
-        shading_camera(camera),
-        shading_grass(look),
-        shading_stadium(camera, look),
-        *noise_tiles(),
+        make_shading_camera(camera),
+        make_shading_grass(look),
+        make_shading_stadium(camera, look),
+        *make_noise_tiles(),
     )
     # A long lens that is focused on the play shows the crowd out of focus.
     sigma = float(np.clip(camera.focal_length[0] / 2600.0, 0.5, 2.4))
@@ -262,22 +262,22 @@ def _empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
     return image
 
 
-def shading_camera(camera: Camera) -> ShadingCamera:
+def make_shading_camera(camera: Camera) -> ShadingCamera:
     """The camera as ``shade_frame`` takes it."""
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
     return ShadingCamera(camera.rotation, camera.position, *lens)
 
 
-def shading_grass(look: MatchLook) -> ShadingGrass:
+def make_shading_grass(look: MatchLook) -> ShadingGrass:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
     return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
+def make_shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
-    atlas, levels = board_mipmap(look.seed)
+    atlas, levels = make_board_mipmap(look.seed)
     along, beyond = stands.board_distance
     x, y = (float(value) for value in camera.position[:2])
     # A camera beyond a line stands before the boards of that side, or among the crowd.
@@ -320,7 +320,7 @@ def _draw_play(
     image: Image, camera: Camera, instant: Instant, look: MatchLook, side: float
 ) -> None:
     """People and the ball, far ones first."""
-    people = people_in_view(camera, instant, pose_people(instant), image)
+    people = list_people_in_view(camera, instant, pose_people(instant), image)
     ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
     order: list[tuple[float, DrawnPerson | None]] = [(ball_depth, None)]
     order += [(float(person.depths.mean()), person) for person in people]

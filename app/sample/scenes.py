@@ -29,10 +29,10 @@ from app.sample.cameras import (
 )
 from app.sample.faults import (
     FaultPlan,
-    another_instant,
+    choose_another_instant,
+    choose_position_beside_main,
     plan_fault,
     plant_annotation_fault,
-    position_beside_main,
     remove_markings,
 )
 from app.sample.fixture import Fixture, make_fixture
@@ -41,9 +41,9 @@ from app.sample.play import (
     PLAYER_RADIUS,
     TEAM,
     Instant,
+    choose_shirt_numbers,
     clear_lines_of_sight,
     make_instant,
-    shirt_numbers,
 )
 from app.sample.scene import PlantedFault, Scene, SceneTruth, ViewTruth
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
@@ -64,13 +64,13 @@ _IS_CIRCLE = np.array([name in CIRCLES for name in MARKINGS])
 TAGS = "abcdefghijklmnopqrstuvwxyz"
 
 
-def click_lines(rng: np.random.Generator, camera: Camera) -> Lines:
+def simulate_line_clicks(rng: np.random.Generator, camera: Camera) -> Lines:
     """Clicks on every marking in view, clipped at the image border.
 
     Straight markings get 2 to 8 points, circles 5 to 12, in any order now and then. A marking is
     forgotten rarely, and never one of the last six.
     """
-    paths = visible_paths(camera)
+    paths = find_visible_paths(camera)
     markings = _drop_some_markings(rng, np.flatnonzero(paths.lengths >= SHORTEST_PX))
     owner, share = _draw_click_places(rng, markings, paths.lengths)
     clicks = paths.pixels_at(owner, share)
@@ -120,7 +120,7 @@ class VisiblePaths:
         return np.asarray(np.searchsorted(self.along, place, side="right") - 1, np.int64)
 
 
-def visible_paths(camera: Camera) -> VisiblePaths:
+def find_visible_paths(camera: Camera) -> VisiblePaths:
     """What each marking shows of itself, with its ends on the image border where it is cut."""
     pixels = camera.project(FINE.points)
     seen = is_inside_image(pixels)
@@ -177,7 +177,7 @@ def _draw_click_places(
     return owner, ((index + jitter) / gaps)[np.lexsort((key, owner))]
 
 
-def loose_box(rng: np.random.Generator, tight: Box) -> BallAnnotation:
+def simulate_loose_box(rng: np.random.Generator, tight: Box) -> BallAnnotation:
     """A ball box as people draw it: 10 to 40 per cent too large and a little off centre."""
     grow = 1.0 + rng.uniform(*BOX_EXCESS)
     sides = np.array([tight.width, tight.height]) * grow * (1.0 + rng.uniform(-0.04, 0.04, 2))
@@ -188,7 +188,7 @@ def loose_box(rng: np.random.Generator, tight: Box) -> BallAnnotation:
     return BallAnnotation(box=Box(*map(float, (*low, *(high - low)))))
 
 
-def person_tags(rng: np.random.Generator, instant: Instant) -> tuple[str, ...]:
+def make_person_tags(rng: np.random.Generator, instant: Instant) -> tuple[str, ...]:
     """The ID of each person in all views of a group: the shirt number, or a letter."""
     known = rng.random(len(instant.numbers)) < 0.7
     return tuple(
@@ -197,7 +197,7 @@ def person_tags(rng: np.random.Generator, instant: Instant) -> tuple[str, ...]:
     )
 
 
-def person_boxes(
+def make_person_boxes(
     rng: np.random.Generator, camera: Camera, instant: Instant, tags: tuple[str, ...]
 ) -> tuple[dict[str, Any], ...]:
     """Boxes of the people in view as SoccerNet-v3 keeps them, with class and ID."""
@@ -279,7 +279,7 @@ def make_stage(match: int, groups: int, seed: int) -> MatchStage:
     """What the groups of a match share: the same for the same seed."""
     rng = np.random.default_rng([seed, match, 0x21])
     return MatchStage(
-        make_fixture(match, seed), place_cameras(rng), shirt_numbers(rng), seed, groups
+        make_fixture(match, seed), place_cameras(rng), choose_shirt_numbers(rng), seed, groups
     )
 
 
@@ -310,18 +310,18 @@ def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
     replays = _draw_replay_count(rng)
     shots, planted = _film_moment(rng, stage, replays, plan)
     keys = [f"{number}.png"] + [f"{number}_{index}.png" for index in range(1, replays + 1)]
-    tags = person_tags(rng, shots[0].instant)
+    tags = make_person_tags(rng, shots[0].instant)
     metadata = {IMAGE: _image_metadata(rng, stage, number)}
     views = []
     truths = []
     for key, shot in zip(keys, shots, strict=True):
-        box = true_ball_box(shot.camera, shot.instant.ball)
+        box = compute_true_ball_box(shot.camera, shot.instant.ball)
         truths.append(ViewTruth(key, shot.camera, _to_triple(shot.instant.ball), box))
         station = Station(
-            f"{stage.fixture.folder}/{key}", SIZE, lines=click_lines(rng, shot.camera)
+            f"{stage.fixture.folder}/{key}", SIZE, lines=simulate_line_clicks(rng, shot.camera)
         )
-        ball = loose_box(rng, box)
-        people = person_boxes(rng, shot.camera, shot.instant, tags)
+        ball = simulate_loose_box(rng, box)
+        people = make_person_boxes(rng, shot.camera, shot.instant, tags)
         views.append(View(key, station, (ball,), extras=Extras(people, metadata=metadata)))
     recorded = _record_fault(plan, planted, keys)
     if plan is not None and plan.kind == "undrawn_line":
@@ -391,7 +391,7 @@ def _aim_neighbour(
     rng: np.random.Generator, stage: MatchStage, main: Camera, ball: FloatArray
 ) -> tuple[Camera, float]:
     while True:
-        position, distance = position_beside_main(rng, main.position)
+        position, distance = choose_position_beside_main(rng, main.position)
         camera = find_camera(rng, position, ball, is_main=False)
         if camera is not None:
             return camera, distance
@@ -402,7 +402,7 @@ def _film_other_moment(
 ) -> tuple[Camera, Instant, float]:
     while True:
         _, seat = choose_replay_position(rng, stage.rig, instant.ball)
-        moved, amount = another_instant(rng, instant, main.position, seat)
+        moved, amount = choose_another_instant(rng, instant, main.position, seat)
         camera = find_camera(rng, seat, moved.ball, is_main=False) if amount > 0 else None
         if camera is not None:
             return camera, moved, amount
@@ -433,7 +433,7 @@ def _image_metadata(rng: np.random.Generator, stage: MatchStage, number: int) ->
     }
 
 
-def true_ball_box(camera: Camera, ball: FloatArray) -> Box:
+def compute_true_ball_box(camera: Camera, ball: FloatArray) -> Box:
     """The box that a careful annotator would draw, pixels.
 
     Args:

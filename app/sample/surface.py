@@ -138,7 +138,7 @@ class ShadingStadium(NamedTuple):
     ``profile`` is the cross section of the stands, shape (N, 2), ``kinds`` of its pieces,
     shape (N - 1,). ``crowd`` holds colours of clothes, shape (M, 3), ``empty`` the share of empty
     seats, ``light`` the light on it all, ``sky`` the colours at the horizon and higher up.
-    ``atlas`` and ``levels`` are the boards at all sizes, see ``board_mipmap``.
+    ``atlas`` and ``levels`` are the boards at all sizes, see ``make_board_mipmap``.
     """
 
     seen: np.ndarray

@@ -24,10 +24,10 @@ from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample import GROUPS, SEED
 from app.sample.fixture import group_counts, make_fixture
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import TRUTH, TruthWriter, truth_to_json
 from app.sample.scenes import make_match
-from app.worker_process import spawned_pool
+from app.worker_process import open_spawned_pool
 
 JPEG_QUALITY = 85
 GROUPS_PER_JOB = 3
@@ -203,7 +203,7 @@ def _draw_groups(job: _GroupsJob) -> list[tuple[str, bytes]]:
     members = []
     for scene in make_match(job.match, job.groups, job.seed, job.faults, numbers):
         for view in scene.group.views:
-            image = render(scene, view.key)
+            image = render_view(scene, view.key)
             _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
             members.append((view.key, content.tobytes()))
     return members
@@ -225,7 +225,7 @@ def _open_job_map(workers: int | None, jobs: int) -> Iterator[_OrderedMap]:
     if count == 1:
         yield _OrderedMap(None)
         return
-    with spawned_pool(count, _use_one_thread) as pool:
+    with open_spawned_pool(count, _use_one_thread) as pool:
         yield _OrderedMap(pool)
 
 

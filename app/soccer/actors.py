@@ -45,7 +45,7 @@ def is_actor_of(actor: str, name: str) -> bool:
     return name in (actor, person_of(actor))
 
 
-def script_name(text: str, *, pointer: str | None = None) -> str:
+def parse_script_name(text: str, *, pointer: str | None = None) -> str:
     """The name under which a script acts.
 
     Example:

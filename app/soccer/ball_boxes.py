@@ -28,7 +28,7 @@ def has_ball_3d(solution: Solution | None, view: View) -> bool:
     return solved is not None and solution is not None and bool(solution.ball and solved.included)
 
 
-def ball_boxes(solution: Solution | None, view: View) -> dict[str, Box]:
+def collect_ball_boxes(solution: Solution | None, view: View) -> dict[str, Box]:
     """The boxes that a view has, by kind of ``BOX_KINDS``."""
     boxes = {"annotated": view.ball.box if view.ball else None}
     solved = solution.view(view.key) if solution else None

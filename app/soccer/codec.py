@@ -16,7 +16,7 @@ import numpy as np
 
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
-from app.json_text import canonical, digest_of, look_through
+from app.json_text import canonical_json_text, digest_of, prepare_msgspec_type
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
@@ -28,7 +28,7 @@ from app.soccer.policy import CalibrationPolicy, Policy
 Json = Any
 """Dicts, lists and plain values."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
-look_through(_LINES)
+prepare_msgspec_type(_LINES)
 
 
 def lines_to_json(lines: Lines) -> Json:
@@ -363,7 +363,7 @@ def _known_fields(
 
 def digest(value: Json) -> str:
     """Digest of a JSON value, 32 hexadecimal digits."""
-    return digest_of(canonical(value).encode())
+    return digest_of(canonical_json_text(value).encode())
 
 
 def station_digest(station: Station) -> str:
@@ -437,7 +437,7 @@ def group_inputs_hash(
     return inputs_hash(group.pitch, pairs, group.positions, read, group.noise)
 
 
-def source_hash(group: Group) -> str:
+def hash_imported_group(group: Group) -> str:
     """Digest of everything that a dataset says about a group, media and extras too.
 
     A shared station counts by its key alone: it is compared once, not once a group.

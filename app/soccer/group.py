@@ -48,7 +48,7 @@ def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
     Raises:
         InputError: The reason is none, or a note is missing, stands alone or is too long.
     """
-    note = checked_note(note)
+    note = strip_and_check_note(note)
     if reason is None and note is None:
         return None
     if reason not in REASONS:
@@ -61,7 +61,7 @@ def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
     return LeftOut(reason, note)
 
 
-def checked_note(note: str | None) -> str | None:
+def strip_and_check_note(note: str | None) -> str | None:
     """A note without white space around it; None where nothing is left.
 
     Raises:
@@ -134,7 +134,7 @@ def _last_number(group: str) -> int | None:
 CALIBRATIONS: tuple[str, ...] = get_args(CalibrationChoice)
 
 
-def view_letter(index: int) -> str:
+def make_view_letter(index: int) -> str:
     """What people call the view at that place of its group: A, B, ..., Z, V27, V28, ..."""
     return ascii_uppercase[index] if index < len(ascii_uppercase) else f"V{index + 1}"
 

@@ -93,7 +93,7 @@ class CalibrationPolicy:
         shown=False,
     )
     """Of a clicked point across its marking, about which images differ; None: what real annotations
-    show, and each image by itself. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
+    show, and each image by itself. Not in the ``repr``: ``compute_calibration_key`` knows it where it is set."""
     line_share: float | None = _threshold_field(
         None,
         CALIBRATION,
@@ -116,7 +116,7 @@ class CalibrationPolicy:
         shown=False,
     )
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
-    are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
+    are none that people draw. Not in the ``repr``: ``compute_calibration_key`` knows it where it is set."""
 
     lone_frames: Literal["exact", "professional", "any"] = _threshold_field(
         "exact",
@@ -142,7 +142,7 @@ class CalibrationPolicy:
     """``inner``: the inner edges of posts and crossbar, as the public evaluator has them;
     ``middle``: their middle, where people click; ``laws``: that, and lines half their width
     inside the plan, as the Laws measure to outer edges. JaC asks for the inner edges and the plan
-    in any case. Not in the ``repr``: ``calibration_key`` knows it where it is another."""
+    in any case. Not in the ``repr``: ``compute_calibration_key`` knows it where it is another."""
 
     weighed: Literal["points", "markings"] = _threshold_field(
         "points",
@@ -154,7 +154,7 @@ class CalibrationPolicy:
     )
     """``points``: each one, as if they erred each by itself; ``markings``: those of a marking err together,
     so that many of one say less than as many of several (``observations.SHARED_SHARE``). Not in the
-    ``repr``: ``calibration_key`` knows it where it is set."""
+    ``repr``: ``compute_calibration_key`` knows it where it is set."""
 
     def fitted(self, pitch: Pitch) -> Pitch:
         """A pitch with the goals and lines that are fitted."""
@@ -409,7 +409,9 @@ class Threshold:
         return value
 
 
-def thresholds_of(part: type[Policy | CalibrationPolicy], prefix: str = "") -> Iterator[Threshold]:
+def list_thresholds(
+    part: type[Policy | CalibrationPolicy], prefix: str = ""
+) -> Iterator[Threshold]:
     """The thresholds of a policy or of its part for calibrations, as they are declared."""
     hints = get_type_hints(part)
     for item in fields(part):
@@ -420,7 +422,7 @@ def thresholds_of(part: type[Policy | CalibrationPolicy], prefix: str = "") -> I
 
 THRESHOLDS = tuple(
     sorted(
-        (*thresholds_of(Policy), *thresholds_of(CalibrationPolicy, f"{CALIBRATION}.")),
+        (*list_thresholds(Policy), *list_thresholds(CalibrationPolicy, f"{CALIBRATION}.")),
         key=lambda threshold: SUBJECTS.index(threshold.subject),
     )
 )

@@ -315,7 +315,7 @@ class ExpectedBall:
 class ViewSolution:
     """What was computed for one view.
 
-    ``calibration_key`` names the calibration among others of the same lines and policy.
+    ``compute_calibration_key`` names the calibration among others of the same lines and policy.
     """
 
     view: str
@@ -331,9 +331,7 @@ class ViewSolution:
     """Where the 3D ball is to be seen; None without a camera, and where it is not in front of it."""
 
 
-def margin_to_threshold(
-    value: float, threshold: float | None, *, at_most: bool = False
-) -> float | None:
+def compute_margin(value: float, threshold: float | None, *, at_most: bool = False) -> float | None:
     """How far a value is from its threshold, as a share of the threshold.
 
     Shares of different gates compare with each other, which metres and pixels do not.
@@ -386,7 +384,7 @@ class Solution:
     """Everything computed for one group under one policy.
 
     ``ball`` is the one that leaves, and that boxes and errors follow. Where the policy asks for
-    the most likely point, ``mean_ball`` is the mean of the valid pairs in whose place it stands.
+    the most likely point, ``compute_mean_ball`` is the mean of the valid pairs in whose place it stands.
     """
 
     views: tuple[ViewSolution, ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
-from app.soccer.group import Group, View, view_letter
+from app.soccer.group import Group, View, make_view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Pair, ViewSolution
@@ -153,7 +153,7 @@ def _view_disagrees_findings(
     ]
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
-    letters = {other.key: view_letter(place) for place, other in enumerate(group.views)}
+    letters = {other.key: make_view_letter(place) for place, other in enumerate(group.views)}
     yield make_view_disagrees_finding(
         view.key, find_closest_pair(judged), letters, policy.tau_px(view.size.diagonal)
     )

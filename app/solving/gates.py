@@ -17,7 +17,7 @@ from app.soccer.solution import (
     ChiSquare,
     Gate,
     Pair,
-    margin_to_threshold,
+    compute_margin,
 )
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
@@ -290,7 +290,7 @@ def make_reprojection_gate(
     sentence = f"{_pair_letters(best, letters)} {format_pixels(error)}, {_percent_of_limit(error / tau, tau_percent)}"
     if len(judged) > 1:
         sentence += " (best pair)"
-    margin = margin_to_threshold(error, tau, at_most=True)
+    margin = compute_margin(error, tau, at_most=True)
     if not best.valid and error <= tau:
         # Its pixels are near enough, and there is no ball: no share of tau says how far it is off.
         sentence, margin = f"the rays of {_pair_letters(best, letters)} meet behind a camera", None
@@ -339,7 +339,7 @@ def _sigma_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gat
     if ball is None:
         return _unjudged_gate("sigma", threshold, active=active)
     value, passed = ball.sigma_m, "sigma" not in group.failed
-    margin = margin_to_threshold(value, threshold, at_most=True)
+    margin = compute_margin(value, threshold, at_most=True)
     return Gate("sigma", passed, value, threshold, margin, format_metres(value), active=active)
 
 
@@ -411,7 +411,7 @@ def _make_gate(
     view: str | None = None,
     active: bool = True,
 ) -> Gate:
-    margin = margin_to_threshold(value, threshold)
+    margin = compute_margin(value, threshold)
     return Gate(name, passed, float(value), threshold, margin, sentence, view, active)
 
 

@@ -25,7 +25,7 @@ from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.annotation import make_lines
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, View, view_letter
+from app.soccer.group import Group, View, make_view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.solution import (
@@ -71,7 +71,7 @@ def solve(
     Args:
         group: What was said.
         policy: Every threshold.
-        calibrations: Calibrations known from before under their ``calibration_key``; they save
+        calibrations: Calibrations known from before under their ``compute_calibration_key``; they save
             time and change nothing.
     """
     return solve_with_facts(group, policy, calibrations)[0]
@@ -177,7 +177,7 @@ def _judged_views(
     return tuple(
         JudgedView(
             key=view.key,
-            letter=view_letter(index),
+            letter=make_view_letter(index),
             calibration=solved.calibration,
             jac=None if np.isnan(jac) else jac,
             tau_px=policy.tau_px(view.size.diagonal),
@@ -194,7 +194,7 @@ def _judged_views(
 
 def _letters_of_left_out_views(group: Group) -> tuple[str, ...]:
     """Letters of the views that a person left out."""
-    return tuple(view_letter(i) for i, view in enumerate(group.views) if not view.included)
+    return tuple(make_view_letter(i) for i, view in enumerate(group.views) if not view.included)
 
 
 _SQUARE = {
@@ -266,7 +266,7 @@ def rethreshold_solution(
     reported = {item.view for item in solution.findings if item.kind == "view_disagrees"}
     if not missed <= reported:
         return None
-    letters = {key: view_letter(place) for place, key in enumerate(keys)}
+    letters = {key: make_view_letter(place) for place, key in enumerate(keys)}
     gate = make_reprojection_gate(solution.pairs, letters, tau_px, policy.tau_percent)
     return replace(
         solution,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from app.soccer.actors import LOCAL_USER, script_name
+from app.soccer.actors import LOCAL_USER, parse_script_name
 from app.soccer.choices import PolicyName
 from app.soccer.frames import ImageSize
 
@@ -56,18 +56,18 @@ def parse_place(text: str) -> str:
     return text
 
 
-def current_actor() -> str:
+def get_current_actor() -> str:
     """Who acts in this command: the local user, or the script that `--actor` names."""
     return _ACTING.get()
 
 
-def act_as(name: str | None) -> None:
+def set_current_actor(name: str | None) -> None:
     """Let this command act under the name of a script; None: as the local user.
 
     Raises:
         InputError: It cannot be a name.
     """
-    _ACTING.set(LOCAL_USER if name is None else script_name(name))
+    _ACTING.set(LOCAL_USER if name is None else parse_script_name(name))
 
 
 _ACTING = ContextVar("acting", default=LOCAL_USER)

@@ -82,13 +82,13 @@ VERSION = (
 )
 
 
-def dataset_values(client: Client) -> list[dict[str, Any]]:
+def fetch_datasets(client: Client) -> list[dict[str, Any]]:
     """As ``datasets list`` has them."""
     items = client.get("datasets")["items"]
     return [{**select_values(item, *DATASET), "policy": item["policy"]["name"]} for item in items]
 
 
-def finding_values(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
+def fetch_findings(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
     """As ``findings`` has them."""
     names = ("kind", "group", "sentence", "view", "marking", "suggested", "number", "threshold")
     for item in client.pages("findings", dataset=dataset):
@@ -123,12 +123,12 @@ def solve_values(
     return {**values, "failed": failed}, sentence
 
 
-def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
+def fetch_policy(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset as YAML, and as ``policy show`` has it."""
     found = client.get(f"datasets/{quote_address_part(dataset)}/policy")
     names = ("version", "name", "hash", "at", "actor")
     history = [
-        select_values({**item, "at": time_text(item["at"])}, *names) for item in found["history"]
+        select_values({**item, "at": format_time(item["at"])}, *names) for item in found["history"]
     ]
     values = {
         **select_values(found, "dataset", "name", "hash", "version", "values"),
@@ -146,7 +146,7 @@ def set_policy(client: Client, dataset: str, policy: Policy) -> dict[str, Any]:
     return dict(client.put(place, {"yaml": policy_to_yaml(policy)}, if_match=present))
 
 
-def policy_change(job: Mapping[str, Any]) -> dict[str, Any]:
+def describe_policy_change(job: Mapping[str, Any]) -> dict[str, Any]:
     """What ``set_policy`` did, as ``policy set`` has it."""
     policy = job["result"]["policy"]
     return {
@@ -155,7 +155,7 @@ def policy_change(job: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def verdict_values(
+def plan_or_give_verdicts(
     client: Client, dataset: str, body: Mapping[str, Any], *, dry_run: bool
 ) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """What a verdict on all groups of a query would do on the server, and what it did."""
@@ -180,7 +180,7 @@ def freeze_values(
     return _version_values(client.get(f"versions/{job['result']['version']}"))
 
 
-def version_values(client: Client, dataset: str) -> list[dict[str, Any]]:
+def fetch_versions(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``versions`` has them."""
     items = client.get(f"datasets/{quote_address_part(dataset)}/versions")["items"]
     return [_version_values(item) for item in items]
@@ -188,10 +188,10 @@ def version_values(client: Client, dataset: str) -> list[dict[str, Any]]:
 
 def _version_values(item: Mapping[str, Any]) -> dict[str, Any]:
     policy = {"policy": item["policy"]["name"], "policy_hash": item["policy"]["hash"]}
-    return select_values({**item, **policy, "created": time_text(item["created"])}, *VERSION)
+    return select_values({**item, **policy, "created": format_time(item["created"])}, *VERSION)
 
 
-def batch_values(client: Client, dataset: str) -> list[dict[str, Any]]:
+def fetch_batches(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``batch list`` has them."""
     items = client.get(f"datasets/{quote_address_part(dataset)}/batches")["items"]
     return [_batch_values(item) for item in items]
@@ -223,8 +223,8 @@ def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str
 
 
 def _batch_values(item: Mapping[str, Any]) -> dict[str, Any]:
-    last = None if item["last"] is None else time_text(item["last"])
-    own = {"query": item["q"], "created": time_text(item["created"]), "last": last}
+    last = None if item["last"] is None else format_time(item["last"])
+    own = {"query": item["q"], "created": format_time(item["created"]), "last": last}
     return select_values({**item, **own}, *BATCH)
 
 
@@ -247,7 +247,7 @@ def follow_job(client: Client, job: Mapping[str, Any], progress: ReportProgress)
         raise typer.Exit(INTERRUPTED) from None
 
 
-def time_text(text: str) -> str:
+def format_time(text: str) -> str:
     """A time as commands print it; REST writes Z for UTC."""
     return text.replace("Z", "+00:00")
 
@@ -354,7 +354,7 @@ def _export_report_values(found: Mapping[str, Any]) -> dict[str, Any]:
     return select_values(found, "counts", "left_out", "missing_images")
 
 
-def evaluate(
+def evaluate_on_server(
     client: Client,
     dataset: str,
     request: SourcesRequest,
@@ -383,7 +383,7 @@ def evaluate(
         "version": "version_id",
     }
     values = {names.get(name, name): found[name] for name in found if name != "headline"}
-    created = time_text(found["created"])
+    created = format_time(found["created"])
     return {**values, "dataset_id": dataset_id, "created": created}, list(sets.values())
 
 

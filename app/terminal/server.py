@@ -83,14 +83,14 @@ def work_against_server(url: str | None, token_file: Path | None, command: str |
     _SERVER.set(ServerPlace(url.rstrip("/"), token_file))
 
 
-def current_server() -> ServerPlace | None:
+def get_current_server() -> ServerPlace | None:
     """The server that this command works against; None: it works in a home."""
     return _SERVER.get()
 
 
 def require_home() -> None:
     """Raise InputError in what cannot be asked of the server that was named."""
-    if current_server() is not None:
+    if get_current_server() is not None:
         raise InputError(
             "this works in a home on this machine, not against a server",
             hint="Leave out --server (TOUCHLINE_SERVER).",
@@ -193,7 +193,7 @@ def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
 
 
 @contextmanager
-def opened_store(settings: Settings | None = None) -> Iterator[Store]:
+def open_store(settings: Settings | None = None) -> Iterator[Store]:
     """The database of a home; by default the one that the environment names."""
     require_home()
     from app.db.store import Store
@@ -203,16 +203,16 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
 
 
 @contextmanager
-def opened_to_solve(
+def open_store_to_solve(
     what: str, workers: int | None, cluster: str | None = None
 ) -> Iterator[tuple[Store, Executor | None, ReportProgress]]:
     """The database, where its datasets are solved, and a bar that says what is done."""
-    from app.workers.executors import executor_of
+    from app.workers.executors import open_executor
 
     settings = read_settings(cluster=cluster)
     with (
-        opened_store(settings) as store,
-        executor_of(settings, workers) as executor,
+        open_store(settings) as store,
+        open_executor(settings, workers) as executor,
         show_progress(what) as progress,
     ):
         yield store, executor, progress

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any, TypeVar
 
-from app.json_text import finite, json_text
+from app.json_text import json_text, replace_non_finite
 from app.progress import ReportProgress
 
 Row = TypeVar("Row")
@@ -87,7 +87,7 @@ def _print_progress_lines(what: str) -> ReportProgress:
 
 
 @contextmanager
-def held_interrupts() -> Iterator[Callable[[], bool]]:
+def hold_interrupts() -> Iterator[Callable[[], bool]]:
     """Ctrl+C as something that is asked for, so that what is done can be kept.
 
     Processes that are started meanwhile never hear of it.
@@ -200,4 +200,4 @@ def _value_text(value: Any) -> str:
         return ", ".join(f"{name} {_value_text(item)}" for name, item in value.items()) or "none"
     if isinstance(value, (list, tuple)):
         return str(len(value))
-    return "none" if finite(value) is None else str(value)
+    return "none" if replace_non_finite(value) is None else str(value)

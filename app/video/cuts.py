@@ -31,7 +31,7 @@ def change_of(rows: Measured) -> FloatArray:
     return np.asarray(rows["residual"] * rows["histogram"], np.float64)
 
 
-def hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
+def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     """First frames behind hard cuts, and which frames are lit by a flash.
 
     Args:

@@ -136,7 +136,7 @@ class RecordingIndex:
         return np.asarray(np.abs(steps - self.step) > slack + 1e-9)
 
 
-def time_base_of(times: FloatArray) -> tuple[tuple[int, int], IntArray]:
+def find_time_base(times: FloatArray) -> tuple[tuple[int, int], IntArray]:
     """The coarsest time base in which times are whole numbers of ticks, and those numbers.
 
     The decoder gives times as floating point numbers; as fractions of few ticks a second they are

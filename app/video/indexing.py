@@ -17,9 +17,9 @@ from app.config import Settings
 from app.errors import ImageError, TooLargeError
 from app.geometry.arrays import FloatArray, IntArray
 from app.media.images import ImageHeader, check_size
-from app.media.video import MAX_FRAMES, FrameReader, open_video, skipped_to_next
-from app.video.index import RecordingFacts, RecordingIndex, time_base_of
-from app.video.measures import COMB_EVERY, COMB_SHARE, COMBED, FrameMeasurer, Rows, comb
+from app.media.video import MAX_FRAMES, FrameReader, grab_next_frame, open_video
+from app.video.index import RecordingFacts, RecordingIndex, find_time_base
+from app.video.measures import COMB_EVERY, COMB_SHARE, COMBED, FrameMeasurer, Rows, measure_combing
 
 _A_WORD = 100
 """Frames between two words of how far the decoding is."""
@@ -81,10 +81,10 @@ def _index(
         if settings is not None:
             check_size(ImageHeader("video", *coded), settings, path.name)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
-        aspect = pixel_aspect(video, rotation)
+        aspect = read_pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
-        while (skipped := skipped_to_next(video)) is not None:
+        while (skipped := grab_next_frame(video)) is not None:
             damaged += skipped
             row, before = rows.add()
             if settings is not None:
@@ -94,7 +94,7 @@ def _index(
                 _require_size(picture, coded, len(times), path)
                 measurer.measure(np.asarray(picture, np.uint8), row, before)
                 if len(times) % COMB_EVERY == COMB_EVERY - 1 and row["change"] > _MOVING:
-                    combs.append(comb(np.asarray(picture, np.uint8)))
+                    combs.append(measure_combing(np.asarray(picture, np.uint8)))
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             intra.append(video.get(cv2.CAP_PROP_FRAME_TYPE) == ord("I"))
             if len(times) > MAX_FRAMES:
@@ -105,7 +105,7 @@ def _index(
         raise ImageError(f"{path.name} has no frame that can be decoded")
     shown = _repaired(np.array(times))
     _require_same_behind_jump(path, shown)
-    base, pts = time_base_of(shown)
+    base, pts = find_time_base(shown)
     width, height = _square(coded, aspect)
     facts = RecordingFacts(
         sha256=sha256,
@@ -148,7 +148,7 @@ def _require_size(picture: Any, coded: tuple[int, int], number: int, path: Path)
         )
 
 
-def pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]:
+def read_pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]:
     """Width of a pixel by its height, as decoded and turned upright."""
     over, under = (int(video.get(name)) for name in (cv2.CAP_PROP_SAR_NUM, cv2.CAP_PROP_SAR_DEN))
     if over <= 0 or under <= 0 or not 1 / _MOST_ASPECT <= over / under <= _MOST_ASPECT:

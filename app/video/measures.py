@@ -76,7 +76,7 @@ class FrameMeasurer:
 
     def __init__(self, fps: float) -> None:
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-        self._lags = lags_of(fps)
+        self._lags = convert_lags_to_frames(fps)
         self._past: deque[tuple[Picture, Any]] = deque(maxlen=max(self._lags))
 
     def measure(self, picture: Picture, row: Any, row_before: Any) -> None:
@@ -89,7 +89,7 @@ class FrameMeasurer:
         """
         small = cv2.resize(picture, SMALL, interpolation=cv2.INTER_AREA)
         grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), np.uint8)
-        row["hash"] = perceptual_hash(grey)
+        row["hash"] = compute_perceptual_hash(grey)
         row["cells"] = cv2.resize(small, CELLS, interpolation=cv2.INTER_AREA)
         row["detail"] = np.abs(cv2.Laplacian(grey, cv2.CV_16S)).mean()
         colours = cv2.calcHist([small], [0, 1, 2], None, [BINS] * 3, [0, 256] * 3)
@@ -134,7 +134,7 @@ class FrameMeasurer:
         return float(left.mean()) / max(contrast, 1.0), flow, left
 
 
-def lags_of(fps: float) -> list[int]:
+def convert_lags_to_frames(fps: float) -> list[int]:
     """``LAGS`` in frames."""
     return [max(round(lag * min(max(fps, 10.0), 120.0)), 2) for lag in LAGS]
 
@@ -160,7 +160,7 @@ _PLACES = np.stack(np.meshgrid(np.arange(SMALL[0]), np.arange(SMALL[1])), axis=-
 _WINDOW = cv2.createHanningWindow(SMALL, cv2.CV_32F)
 
 
-def perceptual_hash(grey: Picture) -> int:
+def compute_perceptual_hash(grey: Picture) -> int:
     """64 bits: which of the lowest frequencies of a picture are above their median.
 
     Args:
@@ -194,7 +194,7 @@ that are so from which on a recording counts as interlaced."""
 _COMB_COLUMNS = 240
 
 
-def comb(picture: Picture) -> float:
+def measure_combing(picture: Picture) -> float:
     """How much more neighbouring lines differ than lines two apart; above 1 lie two fields.
 
     Args:

@@ -27,7 +27,7 @@ LEAST_ALIKE = 2
 """Frames that two wipes of one logo share."""
 
 
-def logo_clusters(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[int | None]:
+def cluster_logos(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[int | None]:
     """Which logo each soft transition flies: a number of a cluster, or None.
 
     Args:
@@ -75,7 +75,7 @@ def _foreign(rows: Measured, interval: tuple[int, int]) -> BoolArray:
     return np.asarray(left > LEAST_FOREIGN)
 
 
-def between_logos(
+def find_shots_between_logos(
     clusters: Sequence[int | None],
     seconds: Sequence[tuple[float, float]],
     main: Sequence[bool],

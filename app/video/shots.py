@@ -17,13 +17,13 @@ from app.errors import GeometryError
 from app.paint.grass import find_field_of_play
 from app.paint.propose import propose_camera
 from app.progress import ReportProgress
-from app.video.cuts import hard_cuts
+from app.video.cuts import find_hard_cuts
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
 from app.video.repeats import Freeze, blended, freezes, repeated
-from app.video.replays import between_logos, logo_clusters
-from app.video.transitions import Transition, soft_transitions
+from app.video.replays import cluster_logos, find_shots_between_logos
+from app.video.transitions import Transition, find_soft_transitions
 
 ShotKind = Literal["main", "replay", "closeup", "other"]
 EnteredBy = Literal["start", "cut", "dissolve", "wipe", "fade"]
@@ -101,22 +101,22 @@ def find_shots(
         progress: Called with how many shots were looked at.
     """
     rows = index.measured
-    cuts, flashed = hard_cuts(rows, index.step)
-    transitions = soft_transitions(rows, index.step, cuts, flashed)
+    cuts, flashed = find_hard_cuts(rows, index.step)
+    transitions = find_soft_transitions(rows, index.step, cuts, flashed)
     shots = _divided(index, cuts.tolist(), transitions)
     wipes = [one for one in transitions if one.kind == "wipe"]
-    clusters = logo_clusters(rows, [(one.first, one.last) for one in wipes])
+    clusters = cluster_logos(rows, [(one.first, one.last) for one in wipes])
     logos = {one.last + 1: cluster for one, cluster in zip(wipes, clusters, strict=True)}
     kinds: list[ShotKind] = []
     for done, shot in enumerate(shots):
-        numbers = frames_that_tell_kind(shot.first, shot.last, shot.end_s - shot.start_s)
-        kinds.append("other" if look is None else kind_of(look(numbers)))
+        numbers = choose_frames_for_kind(shot.first, shot.last, shot.end_s - shot.start_s)
+        kinds.append("other" if look is None else classify_shot(look(numbers)))
         if progress is not None:
             progress(done + 1, len(shots), "Looking at shots.")
     before = [logos.get(shot.first) for shot in shots]
     still, mixed = repeated(rows), blended(rows)
     slow = [(still | mixed)[shot.first : shot.last + 1].mean() > SLOW_SHARE for shot in shots]
-    replays = between_logos(
+    replays = find_shots_between_logos(
         before[1:],
         [(shot.start_s, shot.end_s) for shot in shots],
         [kind == "main" and not is_slow for kind, is_slow in zip(kinds, slow, strict=True)],
@@ -177,7 +177,7 @@ def _divided(
     return shots
 
 
-def shots_of_recording(
+def index_and_find_shots(
     path: Path, settings: Settings, tell: Callable[[Any], Any]
 ) -> RecordingShots:
     """Index a recording and find its shots, in this process.
@@ -199,10 +199,10 @@ def shots_of_recording(
     def progress(done: int, total: int | None = None, sentence: str = "") -> None:
         tell((done, total, sentence))
 
-    return shots_of_indexed(path, index, progress)
+    return find_shots_of_indexed(path, index, progress)
 
 
-def shots_of_indexed(
+def find_shots_of_indexed(
     path: Path, index: RecordingIndex, progress: ReportProgress | None = None
 ) -> RecordingShots:
     """Find the shots of a recording that is indexed, in this process.
@@ -218,7 +218,7 @@ def shots_of_indexed(
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 
         def look(numbers: Sequence[int]) -> list[LookedAt]:
-            return [look_at(_narrowed(reader.read(number))) for number in numbers]
+            return [analyse_frame(_narrowed(reader.read(number))) for number in numbers]
 
         return find_shots(index, look, progress)
 
@@ -244,13 +244,13 @@ class LookedAt:
     proposed: bool
 
 
-def frames_that_tell_kind(first: int, last: int, seconds: float) -> list[int]:
+def choose_frames_for_kind(first: int, last: int, seconds: float) -> list[int]:
     """Numbers of the frames of a shot that tell its kind."""
     places = LOOKED_AT if seconds >= SHORT_SECONDS else (0.5,)
     return sorted({first + round(place * (last - first)) for place in places})
 
 
-def look_at(image: npt.NDArray[np.uint8]) -> LookedAt:
+def analyse_frame(image: npt.NDArray[np.uint8]) -> LookedAt:
     """What a frame shows.
 
     Args:
@@ -265,7 +265,7 @@ def look_at(image: npt.NDArray[np.uint8]) -> LookedAt:
         return LookedAt(grass, False)
 
 
-def kind_of(looks: Sequence[LookedAt]) -> ShotKind:
+def classify_shot(looks: Sequence[LookedAt]) -> ShotKind:
     """Kind of a shot by what its frames show; whether it is a replay is not told by that."""
     proposed = sum(look.proposed for look in looks)
     if proposed >= min(LEAST_MAIN, len(looks)):

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.video.measures import Measured, lags_of
+from app.video.measures import Measured, convert_lags_to_frames
 
 TransitionKind = Literal["dissolve", "wipe", "fade"]
 
@@ -69,7 +69,7 @@ class Transition:
     score: float = 0.0
 
 
-def soft_transitions(
+def find_soft_transitions(
     rows: Measured, step: float, cuts: IntArray, flashed: BoolArray
 ) -> list[Transition]:
     """All soft transitions, in order; none overlap.
@@ -98,7 +98,7 @@ class _Scene:
     """Measures as they are looked at here."""
 
     def __init__(self, rows: Measured, step: float, cuts: IntArray, flashed: BoolArray):
-        self._rows, self._lags, self._flashed = rows, lags_of(1 / step), flashed
+        self._rows, self._lags, self._flashed = rows, convert_lags_to_frames(1 / step), flashed
         self._cells = rows["cells"].reshape(len(rows), -1)
         self._bounds = np.concatenate([[0], cuts, [len(rows)]])
         cut = np.zeros(len(rows), np.int64)

@@ -132,7 +132,7 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
     return SchedulerPlace(f"tls://{parts.netloc}", keys)
 
 
-def software_versions() -> dict[str, str]:
+def read_software_versions() -> dict[str, str]:
     """What a process computes with; two that are equal give the same bits."""
     python = ".".join(platform.python_version_tuple()[:2])
     libraries = {name: version(name) for name in _NUMBERS}
@@ -145,13 +145,15 @@ def software_versions() -> dict[str, str]:
     }
 
 
-def carry_out(wanted: dict[str, str], work: Callable[..., R], arguments: tuple[Any, ...]) -> R:
+def run_task_on_worker(
+    wanted: dict[str, str], work: Callable[..., R], arguments: tuple[Any, ...]
+) -> R:
     """Do a task in a worker, unless it would give other bits than who asks expects.
 
     Raises:
         ClusterError: It is of another version.
     """
-    require_same(wanted, software_versions(), platform.node())
+    require_same(wanted, read_software_versions(), platform.node())
     return work(*arguments)
 
 
@@ -180,7 +182,7 @@ class Cluster(Executor):
     """
 
     def __init__(self, place: SchedulerPlace):
-        self._place, self._build = place, software_versions()
+        self._place, self._build = place, read_software_versions()
         self._under_way: dict[Future[Any], _SentTask] = {}
         self._lock = threading.Lock()
         self._ended, self._lost = threading.Event(), threading.Event()
@@ -214,7 +216,7 @@ class Cluster(Executor):
         """Send a task with the client of now; under the lock."""
         try:
             sent = self._client.submit(
-                carry_out, self._build, task.work, task.arguments, pure=False
+                run_task_on_worker, self._build, task.work, task.arguments, pure=False
             )
         except Exception:
             # The connection has just gone.
@@ -316,7 +318,7 @@ class Cluster(Executor):
         client = _connect_client(self._place)
         try:
             client.wait_for_workers(1, timeout=_WORKERS_S)
-            found = client.run(software_versions)
+            found = client.run(read_software_versions)
             for where, one in found.items():
                 require_same(self._build, one, where)
         except ClusterError:

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from app.config import Settings
 from app.errors import InputError
-from app.worker_process import spawned_pool
+from app.worker_process import open_spawned_pool
 from app.workers.cluster import Cluster, read_place
 
 AHEAD = 8
@@ -34,7 +34,7 @@ def _never_stop() -> bool:
     return False
 
 
-def fan_out(
+def run_tasks(
     work: Callable[[T], R],
     tasks: Iterable[T],
     executor: Executor | None,
@@ -73,7 +73,7 @@ def fan_out(
 
 
 @contextmanager
-def executor_of(settings: Settings, workers: int | None = None) -> Iterator[Executor | None]:
+def open_executor(settings: Settings, workers: int | None = None) -> Iterator[Executor | None]:
     """Where a command solves: on a cluster where one is named; None: in its own process.
 
     Args:
@@ -91,20 +91,20 @@ def executor_of(settings: Settings, workers: int | None = None) -> Iterator[Exec
     elif count == 1:
         yield None
     else:
-        with process_pool(count) as pool:
+        with open_process_pool(count) as pool:
             yield pool
 
 
-def server_pool(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
-    """Where large jobs of a server are solved, opened when there is one; raises as ``executor_of``."""
+def make_server_pool_opener(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
+    """Where large jobs of a server are solved, opened when there is one; raises as ``open_executor``."""
     if settings.cluster is not None:
         return lambda: _cluster_of(settings)
     # One processor is left for the requests.
-    return lambda: process_pool(max(1, settings.workers - 1))
+    return lambda: open_process_pool(max(1, settings.workers - 1))
 
 
 @contextmanager
-def process_pool(workers: int) -> Iterator[Executor]:
+def open_process_pool(workers: int) -> Iterator[Executor]:
     """Processes that solve; what is not done when the work fails is found again by the next run.
 
     Raises:
@@ -116,7 +116,7 @@ def process_pool(workers: int) -> Iterator[Executor]:
             " would start",
             hint="Change to another folder first (cd /), or solve with --workers 1.",
         )
-    with spawned_pool(workers) as pool:
+    with open_spawned_pool(workers) as pool:
         yield pool
 
 

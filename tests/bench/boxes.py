@@ -9,7 +9,7 @@ import numpy as np
 
 from app.evaluation.frame import iou, size_error_percent
 from app.sample.scene import SceneTruth
-from app.soccer.ball_boxes import ball_boxes
+from app.soccer.ball_boxes import collect_ball_boxes
 from app.soccer.frames import Box
 from app.soccer.group import Group
 from app.soccer.solution import Solution
@@ -62,7 +62,7 @@ def paper_table_1(
 def _boxes(group: Group, solution: Solution, truth: SceneTruth) -> Iterable[tuple[Box, Box, Box]]:
     """Annotated, optimised and true box of every view that has them."""
     for view in group.views:
-        boxes, true = ball_boxes(solution, view), truth.view(view.key)
+        boxes, true = collect_ball_boxes(solution, view), truth.view(view.key)
         if true is not None and "annotated" in boxes and "optimized" in boxes:
             yield boxes["annotated"], boxes["optimized"], true.ball_box
 

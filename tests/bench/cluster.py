@@ -15,7 +15,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.solutions.service import solve_dataset
 from app.workers.cluster import Cluster, SchedulerPlace
-from app.workers.executors import process_pool
+from app.workers.executors import open_process_pool
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 from tests.torture.cluster import members
@@ -44,7 +44,7 @@ def bench_cluster() -> None:
                     what = f"{count} worker{'s' * (count > 1)} of a cluster"
                     taken = _seconds(fresh, folder / "home", pool)
                     seconds.setdefault(what, []).append(taken)
-            taken = _seconds(fresh, folder / "home", partial(process_pool, 2))
+            taken = _seconds(fresh, folder / "home", partial(open_process_pool, 2))
             seconds.setdefault("a pool of 2 processes", []).append(taken)
         best = {what: min(values) for what, values in seconds.items()}
         one = best["1 worker of a cluster"]

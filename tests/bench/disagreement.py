@@ -17,7 +17,7 @@ from app.geometry.camera import Camera
 from app.sample.cameras import find_camera, parallax_angle_at_ball
 from app.sample.faults import FaultPlan, plant_annotation_fault
 from app.sample.scene import Scene, ViewTruth
-from app.sample.scenes import click_lines, loose_box, true_ball_box
+from app.sample.scenes import compute_true_ball_box, simulate_line_clicks, simulate_loose_box
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration, Solution
@@ -123,9 +123,9 @@ def _from_anywhere(
         camera = _camera_anywhere(rng, main, ball, degrees)
         if camera is None:
             return None
-        box = true_ball_box(camera, ball)
-        station = replace(view.station, lines=click_lines(rng, camera))
-        views.append(replace(view, station=station, balls=(loose_box(rng, box),)))
+        box = compute_true_ball_box(camera, ball)
+        station = replace(view.station, lines=simulate_line_clicks(rng, camera))
+        views.append(replace(view, station=station, balls=(simulate_loose_box(rng, box),)))
         truths.append(ViewTruth(view.key, camera, scene.truth.ball, box))
     return replace(
         scene,
@@ -360,7 +360,9 @@ def _later(rng: np.random.Generator, scene: Scene, seconds: float) -> Case:
 def _seen(rng: np.random.Generator, scene: Scene, view: View, ball: FloatArray) -> View:
     truth = scene.truth.view(view.key)
     assert truth is not None
-    return replace(view, balls=(loose_box(rng, true_ball_box(truth.camera, ball)),))
+    return replace(
+        view, balls=(simulate_loose_box(rng, compute_true_ball_box(truth.camera, ball)),)
+    )
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import sys
 import cv2
 import numpy as np
 
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate
 from app.solving.jaccard import project_markings
@@ -23,7 +23,7 @@ def main(out: str) -> None:
     scene = make_scenes(3, SEED, faults=False)[2]
     view = scene.group.views[0]
     calibration = calibrate(view.station.lines, scene.group.pitch, view.size, PAPER.calibration)
-    image = render(scene, view.key).copy()
+    image = render_view(scene, view.key).copy()
     for polyline in project_markings(calibration.camera, scene.group.pitch, view.size).values():
         _polyline(image, polyline, BLUE)
     for fit in calibration.markings:

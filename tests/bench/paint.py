@@ -31,7 +31,7 @@ from app.paint.grass import find_field_of_play
 from app.paint.ridges import find_line_like
 from app.paint.snap import SnappedCamera, snap_camera
 from app.paint.view_paint import read_paint_of_image
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
@@ -124,7 +124,7 @@ def _with_pictures(scene: Scene, folder: Path, number: int) -> Group:
     views = []
     for view in scene.group.views:
         file = folder / f"{number}_{view.key}.jpg"
-        cv2.imwrite(str(file), render(scene, view.key), JPEG)
+        cv2.imwrite(str(file), render_view(scene, view.key), JPEG)
         views.append(replace(view, media=Media(str(file))))
     return replace(scene.group, key=f"{number:03}", match="bench", views=tuple(views))
 
@@ -141,7 +141,7 @@ def shots_of(scene: Scene) -> Iterator[tuple[str, Shot]]:
         found = calibrate(view.station.lines, PITCH, view.size, PAPER.calibration)
         if truth is None or found.camera is None:
             continue
-        done, data = cv2.imencode(".jpg", render(scene, view.key), JPEG)
+        done, data = cv2.imencode(".jpg", render_view(scene, view.key), JPEG)
         assert done
         image = np.ascontiguousarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[:, :, ::-1])
         field, snapped, spent = _snap(image, found)

@@ -10,7 +10,7 @@ import numpy as np
 from app.paint.evidence import find_paint, read_picture, trace_visible_markings
 from app.paint.grass import find_field_of_play
 from app.paint.ridges import find_line_like
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.pitch import Pitch
 from tests.scenes import make_scenes
 
@@ -22,7 +22,7 @@ def main(out: str) -> None:
     """Draw line-like paint, and the evidence at the true camera, on a rendered frame."""
     scene = make_scenes(3, SEED, faults=False)[0]
     key = scene.group.views[0].key
-    image = render(scene, key).copy()
+    image = render_view(scene, key).copy()
     picture = np.ascontiguousarray(image[:, :, ::-1])
     field = find_field_of_play(picture)
     truth = scene.truth.view(key)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from app.geometry.camera import Camera
 from app.geometry.polyline import distance_to_polyline
 from app.paint.propose import FrameProposal, propose_camera
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch, opposite_marking
@@ -120,7 +120,7 @@ def _shots() -> list[tuple[str, str, Image, Camera]]:
 def _drawn(groups: int = GROUPS, seed: int = SEED) -> Iterator[tuple[str, str, Image, Camera]]:
     for scene in make_scenes(groups, seed, faults=False):
         for index, view in enumerate(scene.truth.views):
-            done, data = cv2.imencode(".jpg", render(scene, view.view), JPEG)
+            done, data = cv2.imencode(".jpg", render_view(scene, view.view), JPEG)
             assert done
             image = np.ascontiguousarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[:, :, ::-1])
             yield str(scene.group.match), "replays" if index else "main", image, view.camera

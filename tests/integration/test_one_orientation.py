@@ -19,7 +19,7 @@ from app.features.exports.source import ExportImages
 from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _read_frame
 from app.formats.report import Report
-from app.media.files import decode_frame, picture_header, read_frame, read_pixels
+from app.media.files import decode_frame, read_frame, read_picture_header, read_pixels
 from app.media.frames import Frames, make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -123,7 +123,7 @@ class TestOneOrientation:
     def test_the_header_has_the_size_that_is_seen(self, suffix: str, tmp_path: Path) -> None:
         sizes = []
         for orientation in ORIENTATIONS:
-            header = picture_header(Media(str(write(tmp_path / f"7{suffix}", orientation))))
+            header = read_picture_header(Media(str(write(tmp_path / f"7{suffix}", orientation))))
             assert header is not None and header.orientation == orientation
             sizes.append((header.width, header.height))
         assert sizes == [(80, 48)] * 4 + [(48, 80)] * 4
@@ -140,7 +140,7 @@ class TestOneOrientation:
     def test_an_orientation_that_does_not_exist_turns_nothing(
         self, orientation: int, tmp_path: Path
     ) -> None:
-        header = picture_header(Media(str(write(tmp_path / "7.jpg", orientation))))
+        header = read_picture_header(Media(str(write(tmp_path / "7.jpg", orientation))))
         assert header is not None and (header.width, header.orientation) == (80, 1)
 
     @pytest.mark.filterwarnings("ignore:Corrupt EXIF data")

@@ -15,7 +15,7 @@ import structlog
 from limits import parse
 
 from app.config import Settings
-from app.db.log import Entry, append, read_log
+from app.db.log import Entry, append_entries, read_log
 from app.db.session import now
 from app.db.store import Store
 from app.features.imports.ingest import ensure_dataset
@@ -456,7 +456,7 @@ class TestStreams:
         def say(who: str) -> None:
             with team.store.write() as session:
                 for key in ids[::-1]:
-                    append(session, [Entry("policy", who, now(), {}, dataset_id=key)])
+                    append_entries(session, [Entry("policy", who, now(), {}, dataset_id=key)])
 
         def heard(answer: http.client.HTTPResponse) -> bytes:
             line = b":"

@@ -26,10 +26,15 @@ from sqlalchemy import MetaData, func, select, text
 from app.config import Settings
 from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
-from app.db.json_columns import pack
-from app.db.log import Entry, append
-from app.db.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
-from app.db.restore import restore
+from app.db.json_columns import compress_json
+from app.db.log import Entry, append_entries
+from app.db.migrate import (
+    KNOWN_REVISIONS,
+    find_migrations_folder,
+    migrate_database,
+    read_schema_revision,
+)
+from app.db.restore import restore_database
 from app.db.session import Session, now
 from tests.e2e.service import ROOT
 from tests.torture import populated
@@ -42,9 +47,9 @@ MIGRATE = (
 STEP = "an operation\n"
 """What a migration says after each operation, before it waits to be told to go on."""
 SAYS = {
-    ("solution", "body"): pack({"ball": None}),
+    ("solution", "body"): compress_json({"ball": None}),
     ("solution", "calibrations"): "[]",
-    ("calibration", "body"): pack({"camera": None}),
+    ("calibration", "body"): compress_json({"camera": None}),
     ("view", "balls"): "[]",
 }
 """What a migration reads must be there."""
@@ -58,7 +63,7 @@ def make_old(settings: Settings, revision: str) -> None:
     """A home as an earlier version left it: its schema, and one row in each table."""
     make_home(settings)
     config = Config()
-    config.set_main_option("script_location", str(migrations_folder()))
+    config.set_main_option("script_location", str(find_migrations_folder()))
     engine = make_engine(settings).execution_options(**WRITE)
     with Session(engine) as session:
         config.attributes["connection"] = session
@@ -72,7 +77,7 @@ def _fill(connection: Session) -> None:
     """One row in each table, whose references lead to each other's."""
     schema = MetaData()
     schema.reflect(connection)
-    append(connection, [Entry("dataset", "ann", now(), {}, 1)])
+    append_entries(connection, [Entry("dataset", "ann", now(), {}, 1)])
     # What belongs to a version is filled before that is there, and not later.
     connection.execute(text("PRAGMA defer_foreign_keys = ON"))
     for table in sorted(schema.sorted_tables, key=lambda table: table.name != "version_group"):
@@ -85,7 +90,7 @@ def _fill(connection: Session) -> None:
             texts = {
                 "VARCHAR": "{}",
                 "TEXT": "{}",
-                "BLOB": pack({}),
+                "BLOB": compress_json({}),
                 "FLOAT": 1.0,
                 "BOOLEAN": False,
             }
@@ -131,7 +136,7 @@ def lost(before: Rows, after: Rows) -> list[str]:
 def revision_of(settings: Settings) -> str | None:
     """The schema's revision of a home."""
     engine = make_engine(settings)
-    found = schema_revision(engine)
+    found = read_schema_revision(engine)
     engine.dispose()
     return found
 
@@ -145,7 +150,7 @@ def migrate_by_steps(home: str) -> None:
         sys.stdin.readline()
 
     with _after_each_operation(wait):
-        migrate(Settings(home=Path(home)))
+        migrate_database(Settings(home=Path(home)))
 
 
 @contextmanager
@@ -170,7 +175,7 @@ def rehearse(home: Path) -> tuple[int, Rows]:
     with tempfile.TemporaryDirectory(prefix="touchline-copy-") as name:
         copy = Settings(home=shutil.copytree(home, Path(name, "home")))
         with _after_each_operation(lambda: steps.append(None)):
-            migrate(copy)
+            migrate_database(copy)
         return len(steps), rows(copy)
 
 
@@ -207,7 +212,7 @@ def _upgrade(settings: Settings, revision: str, kills: int, chance: random.Rando
             fault = "something had happened"
         if fault:
             return [f"killed at operation {step} of {steps}: {fault}"]
-    migrated = migrate(settings)
+    migrated = migrate_database(settings)
     after = rows(settings)
     faults = [f"killed and migrated again, {name} differs" for name in differences(wanted, after)]
     faults += [f"values are gone of {name}" for name in lost(before, after)]
@@ -215,7 +220,7 @@ def _upgrade(settings: Settings, revision: str, kills: int, chance: random.Rando
         faults.append(f"it is migrated to {revision_of(settings)}")
     if migrated.copy is None:
         return [*faults, "it is migrated without a backup"]
-    restore(settings, migrated.copy)
+    restore_database(settings, migrated.copy)
     if (revision_of(settings), rows(settings)) != (revision, before):
         faults.append("its backup is not what it was")
     return faults
@@ -234,7 +239,7 @@ def carry(home: Path, folder: Path, revision: str = KNOWN_REVISIONS[-2]) -> list
     wanted = populated.said(settings)
     make_old(old, revision)
     populated.carry_back(home, old)
-    migrate(old)
+    migrate_database(old)
     found = populated.said(old)
     return [
         f"carried from schema {revision}: {name} are not what was said"

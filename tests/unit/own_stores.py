@@ -15,7 +15,7 @@ from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import NewRows
 from app.features.queue.refresh_queries import refresh_queue
 from app.geometry.camera import Camera
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.codec import policy_to_json
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -82,7 +82,7 @@ def full_group(full_camera: Camera) -> Group:
 def filled(own_store: Store, full_group: Group) -> Store:
     """A store with the dataset 1, and in it the group 1 with the views 1 to 3."""
     with own_store.write() as session:
-        policy = canonical(policy_to_json(PAPER))
+        policy = canonical_json_text(policy_to_json(PAPER))
         values = {"id": 1, "name": "demo", "created": "t", "policy": policy, "policy_hash": "p"}
         session.execute(insert(DatasetModel), [values])
         rows = NewRows(session, 1)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.config import Settings, is_local, memory_bytes
+from app.config import Settings, find_memory_limit, is_local
 from app.errors import InputError
 
 MB = 2**20
@@ -34,13 +34,13 @@ def test_memory_is_what_the_control_group_leaves(
         file = tmp_path / "groups" / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f"{limit * MB}\n")
-    assert memory_bytes(own, tmp_path / "groups") == expected * MB
+    assert find_memory_limit(own, tmp_path / "groups") == expected * MB
 
 
 def test_without_a_limit_it_is_the_machines(tmp_path: Path) -> None:
     (own := tmp_path / "cgroup").write_text("0::/\n")
     (tmp_path / "memory.max").write_text("max\n")
-    assert memory_bytes(own, tmp_path) == memory_bytes(tmp_path / "none") > 256 * MB
+    assert find_memory_limit(own, tmp_path) == find_memory_limit(tmp_path / "none") > 256 * MB
 
 
 class TestDatabaseUrlFile:

@@ -33,8 +33,8 @@ from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.parquet import import_pyarrow
 from app.geometry.camera import Camera
-from app.json_text import canonical, finite, json_text
-from app.log import only_finite
+from app.json_text import canonical_json_text, json_text, replace_non_finite
+from app.log import replace_non_finite_numbers
 from app.soccer.finding import Finding, Fix
 from app.soccer.solution import BestBall, Gate, MarkingFit, Solution, Suspect
 from app.terminal.terminal import print_json, print_values
@@ -131,7 +131,12 @@ def bad(request: pytest.FixtureRequest) -> float:
 class TestFinite:
     def test_replaces_infinite_numbers_at_any_depth_and_nothing_else(self, bad: float) -> None:
         value = {"a": [1.5, (bad, "inf")], "b": {"c": bad}, "d": True, "e": 3}
-        assert finite(value) == {"a": [1.5, [None, "inf"]], "b": {"c": None}, "d": True, "e": 3}
+        assert replace_non_finite(value) == {
+            "a": [1.5, [None, "inf"]],
+            "b": {"c": None},
+            "d": True,
+            "e": 3,
+        }
 
     def test_text_is_json_by_the_letter(self, bad: float) -> None:
         assert json_text({"a": bad, "ä": 1.5}) == '{"a": null, "ä": 1.5}'
@@ -156,7 +161,9 @@ class TestFinite:
     )
     def test_what_the_fast_encoder_has_no_place_for_is_text_all_the_same(self, value: Any) -> None:
         for form in ({}, {"indent": 1}, {"ascii_": True}, {"compact": True}):
-            assert json.loads(json_text(value, **form)) == json.loads(json.dumps(finite(value)))
+            assert json.loads(json_text(value, **form)) == json.loads(
+                json.dumps(replace_non_finite(value))
+            )
 
     @given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
     def test_numbers_come_back_as_the_same_bits(self, number: float) -> None:
@@ -281,7 +288,9 @@ class TestCommandLine:
         assert not NOT_A_NUMBER.search(capsys.readouterr().out)
 
     def test_the_log_says_none(self, bad: float) -> None:
-        event = only_finite(None, "info", {"event": "solved", "sigma": bad, "all": [bad]})
+        event = replace_non_finite_numbers(
+            None, "info", {"event": "solved", "sigma": bad, "all": [bad]}
+        )
         line = structlog.processors.KeyValueRenderer()(None, "info", dict(event))
         assert not NOT_A_NUMBER.search(str(line))
 
@@ -318,11 +327,11 @@ def static_record(
 
 class TestCanonical:
     def test_keys_are_sorted_and_no_space_stands_between_them(self) -> None:
-        assert canonical({"b": 1, "a": [1.5, None]}) == '{"a":[1.5,null],"b":1}'
+        assert canonical_json_text({"b": 1, "a": [1.5, None]}) == '{"a":[1.5,null],"b":1}'
 
     def test_letters_stand_as_they_are(self) -> None:
-        assert canonical("Müller") == '"Müller"'
+        assert canonical_json_text("Müller") == '"Müller"'
 
     def test_a_number_that_is_not_finite_is_refused(self) -> None:
         with pytest.raises(ValueError, match="JSON"):
-            canonical(float("inf"))
+            canonical_json_text(float("inf"))

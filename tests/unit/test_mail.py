@@ -11,7 +11,7 @@ from structlog.testing import capture_logs
 from app import mail
 from app.config import Settings
 from app.errors import InputError
-from app.mail import Letter, MailServer, checked_address, read_mail_server
+from app.mail import Letter, MailServer, parse_mail_address, read_mail_server
 from tests.certificates import write_keys
 from tests.smtp import MailBox, serving
 
@@ -216,7 +216,7 @@ class TestCheckedAddress:
         "said", ["anna@example.org", " a.b+c@x-y.example ", "o'neil@localhost"]
     )
     def test_takes_one_mailbox(self, said: str) -> None:
-        assert checked_address(said) == said.strip()
+        assert parse_mail_address(said) == said.strip()
 
     @pytest.mark.parametrize(
         "said",
@@ -239,7 +239,7 @@ class TestCheckedAddress:
     )
     def test_refuses_everything_else(self, said: str) -> None:
         if said.strip() == "anna@example.org":
-            assert checked_address(said) == "anna@example.org"
+            assert parse_mail_address(said) == "anna@example.org"
         else:
             with pytest.raises(InputError, match="is not an email address"):
-                checked_address(said)
+                parse_mail_address(said)

@@ -16,7 +16,7 @@ import pytest
 
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
-from app.db.locks import server_lock
+from app.db.locks import hold_server_lock
 from app.db.store import Store
 from tests.unit.db.homes import say
 
@@ -113,7 +113,7 @@ class TestServe:
 
 class TestMigrate:
     def test_is_refused_beside_a_server_which_it_names(self, run: Run, home: Path) -> None:
-        with server_lock(Settings(home=home)):
+        with hold_server_lock(Settings(home=home)):
             code, _, err = run("migrate")
         assert code == 1
         assert f"already uses this home folder (process {os.getpid()})" in err

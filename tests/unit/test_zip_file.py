@@ -11,7 +11,7 @@ import pytest
 from app import zip_file as module
 from app.formats.report import Report
 from app.formats.trees import open_tree
-from app.zip_file import count_truncated, first_member_names
+from app.zip_file import count_truncated, list_first_member_names
 
 
 def entry(name: str, comment: bytes = b"") -> bytes:
@@ -38,19 +38,19 @@ class TestFirstNames:
             for number in range(9):
                 archive.writestr(zipfile.ZipInfo(f"träume/{number}.json"), "x" * number)
             archive.comment = b"of some length"
-        assert first_member_names(path, 100) == zipfile.ZipFile(path).namelist()
-        assert first_member_names(path, 3) == [f"träume/{number}.json" for number in range(3)]
+        assert list_first_member_names(path, 100) == zipfile.ZipFile(path).namelist()
+        assert list_first_member_names(path, 3) == [f"träume/{number}.json" for number in range(3)]
 
     def test_of_a_wide_zip_are_where_its_own_record_says(self, tmp_path: Path) -> None:
         records = b"".join(entry(f"{number}.json") for number in range(50))
         path = wide_zip(tmp_path / "a.zip", records, 50)
-        assert first_member_names(path, 100) == [f"{number}.json" for number in range(50)]
-        assert zipfile.ZipFile(path).namelist() == first_member_names(path, 100)
+        assert list_first_member_names(path, 100) == [f"{number}.json" for number in range(50)]
+        assert zipfile.ZipFile(path).namelist() == list_first_member_names(path, 100)
 
     def test_a_name_that_is_no_text_is_one_all_the_same(self, tmp_path: Path) -> None:
         spoiled = entry("abc.json").replace(b"abc", b"a\xffc")
         path = wide_zip(tmp_path / "a.zip", spoiled + entry("b.json"), 2)
-        assert first_member_names(path, 100) == ["a\ufffdc.json", "b.json"]
+        assert list_first_member_names(path, 100) == ["a\ufffdc.json", "b.json"]
 
     def test_no_more_of_the_list_is_read_than_its_limit(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -58,25 +58,25 @@ class TestFirstNames:
         records = b"".join(entry(f"{number}.json", b"c" * 1000) for number in range(9))
         path = wide_zip(tmp_path / "a.zip", records, 9)
         monkeypatch.setattr(module, "MAX_LIST", 2500)
-        assert first_member_names(path, 100) == ["0.json", "1.json", "2.json"]
+        assert list_first_member_names(path, 100) == ["0.json", "1.json", "2.json"]
 
     @pytest.mark.parametrize("said", [2**40, 1, 0])
     def test_a_list_that_is_not_where_it_is_said_to_be_has_none(
         self, tmp_path: Path, said: int
     ) -> None:
         path = wide_zip(tmp_path / "a.zip", entry("a.json"), 1, said=said)
-        assert first_member_names(path, 100) == []
+        assert list_first_member_names(path, 100) == []
 
     def test_a_locator_that_points_at_nothing_is_not_passed_over(self, tmp_path: Path) -> None:
         path = wide_zip(tmp_path / "a.zip", entry("a.json"), 1)
         path.write_bytes(path.read_bytes().replace(b"PK\x06\x06", b"PK\x00\x00"))
-        assert first_member_names(path, 100) == []
+        assert list_first_member_names(path, 100) == []
 
     @pytest.mark.parametrize("content", [b"", b"PK\x05\x06", b"PK\x03\x04" + bytes(40)])
     def test_a_file_that_is_no_zip_has_none(self, tmp_path: Path, content: bytes) -> None:
         path = tmp_path / "a.zip"
         path.write_bytes(content)
-        assert first_member_names(path, 100) == []
+        assert list_first_member_names(path, 100) == []
 
 
 class TestCountTruncated:

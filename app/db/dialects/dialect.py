@@ -328,14 +328,14 @@ def insert_or_replace(model: Any) -> Insert:
     return statement.on_conflict_do_update(index_elements=keys, set_=changed)
 
 
-def numbers_in(ids: Iterable[int]) -> Select[Any]:
+def select_numbers(ids: Iterable[int]) -> Select[Any]:
     """Some numbers as a question: one parameter, however many there are, for a statement takes a
     limited number of them."""
     return _numbers_in(json_text(list(ids)))
 
 
-def numbers_given(name: str) -> Select[Any]:
-    """As ``numbers_in``, in a statement that is made once: a parameter that is a JSON array."""
+def select_bound_numbers(name: str) -> Select[Any]:
+    """As ``select_numbers``, in a statement that is made once: a parameter that is a JSON array."""
     return _numbers_in(bindparam(name, type_=String()))
 
 
@@ -344,18 +344,18 @@ def _numbers_in(array: Any) -> Select[Any]:
     return select(listed.c.value)
 
 
-def texts_in(values: Iterable[str]) -> Select[Any]:
+def select_texts(values: Iterable[str]) -> Select[Any]:
     """Some texts as a question."""
-    listed = items_of(json_text(list(values)))
+    listed = select_json_array_items(json_text(list(values)))
     return select(listed.c.value)
 
 
-def items_of(array: Any) -> TableValuedAlias:
+def select_json_array_items(array: Any) -> TableValuedAlias:
     """Rows (key, value) of a JSON array of texts in a text; keys count from 0."""
     return _Items(array).table_valued("key", "value")
 
 
-def values_of(mapping: Any) -> TableValuedAlias:
+def select_json_object_values(mapping: Any) -> TableValuedAlias:
     """Rows (value) of a JSON object whose values are texts, in a text."""
     return _Values(mapping).table_valued("value")
 

@@ -22,7 +22,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
-from app.durable import replace_file, sync
+from app.durable import replace_file, sync_to_disk
 from app.errors import DamagedError
 from app.json_text import json_text
 
@@ -111,10 +111,10 @@ def move_anchor(database: Path, anchor: Anchor) -> None:
 def sync_anchor(database: Path) -> None:
     """Wait until the anchor is on the disk."""
     with suppress(FileNotFoundError):
-        sync(anchor_file(database))
+        sync_to_disk(anchor_file(database))
 
 
-def anchor_of(connection: Connection) -> Anchor | None:
+def read_anchor_of_database(connection: Connection) -> Anchor | None:
     """The anchor that a database should have; None before it had an installation id."""
     tables = inspect(connection).get_table_names()
     if "installation" not in tables:
@@ -155,7 +155,7 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
     Beside others (not ``alone``) the length of the log is left to whoever writes it.
     """
     with engine.connect() as connection:
-        anchor = anchor_of(connection)
+        anchor = read_anchor_of_database(connection)
     stored = read_anchor(settings.database_file)
     if anchor is None or anchor == stored:
         return

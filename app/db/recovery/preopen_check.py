@@ -289,7 +289,7 @@ def _require_no_foreign_tables(database: Path) -> None:
 def _require_unused_home(settings: Settings) -> None:
     """Raise DamagedError where a home without a database has had one."""
     database = settings.database_file
-    if signs := signs_of_use(settings):
+    if signs := list_signs_of_use(settings):
         state = "is empty" if database.exists() else "is missing"
         raise DamagedError(
             f"{database} {state}, but this home has been used: {', '.join(signs)}",
@@ -298,7 +298,7 @@ def _require_unused_home(settings: Settings) -> None:
         )
 
 
-def signs_of_use(settings: Settings) -> list[str]:
+def list_signs_of_use(settings: Settings) -> list[str]:
     """What a home without a database holds that only a database explains."""
     database = settings.database_file
     anchor = read_anchor(database)

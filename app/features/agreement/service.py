@@ -9,8 +9,8 @@ from typing import Any
 
 import structlog
 
-from app.db.json_columns import pack
-from app.db.log import Entry, append
+from app.db.json_columns import compress_json
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, ReviewError, StorageError
@@ -154,7 +154,9 @@ def set_limits(
     number, at = dataset_id(store, dataset), now()
     with store.write() as session:
         put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})
-        append(session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)])
+        append_entries(
+            session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)]
+        )
         session.respond(limits)
     return limits
 
@@ -326,7 +328,7 @@ def adopt_and_decide(
         complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
             complete_group_in_batch(session, batch_id, group_id, actor=actor, at=at)
-        append(session, [Entry(KIND, actor, at, body, dataset, group_id)])
+        append_entries(session, [Entry(KIND, actor, at, body, dataset, group_id)])
         if judge:
             note = f"as {taken.person} judged it"
             copy_verdict_to_original(session, taken, actor=actor, note=note)
@@ -400,7 +402,7 @@ def _agreement_columns(
         "dataset_id": original.dataset_id,
         "state": OPEN,
         "takes": " ".join(str(annotation.id) for annotation in annotations),
-        "pairs": pack(to_json(StoredComparison(pairs))),
+        "pairs": compress_json(to_json(StoredComparison(pairs))),
         "worst": max((item.weight for item in disagreements), default=0.0),
         "disagreements": len(disagreements),
         "found": now(),

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from app.db.json_columns import unpack
+from app.db.json_columns import decompress_json
 from app.db.store import Store
 from app.evaluation.rater_agreement import (
     MEASURES,
@@ -119,7 +119,8 @@ def summarize_agreement(store: Store, dataset: str | int, batch: int | None = No
         rows = list_agreements(session, number, batch_id=batch)
         limits = read_limits(session, number)
     read = [
-        _ComparedGroup(row, from_json(StoredComparison, unpack(row.pairs)).pairs) for row in rows
+        _ComparedGroup(row, from_json(StoredComparison, decompress_json(row.pairs)).pairs)
+        for row in rows
     ]
     states = [row.state for row in rows]
     people = sorted({name for one in read for name in one.verdicts})

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, literal, or_, select
 
-from app.db.json_columns import unpack
+from app.db.json_columns import decompress_json
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -87,7 +87,7 @@ def list_audit_rows(
 def _audit_row(row: Any) -> AuditRow:
     values = dict(row._mapping)
     key = values.pop("key")
-    return AuditRow(**{**values, "label": row.label or key, "body": unpack(row.body)})
+    return AuditRow(**{**values, "label": row.label or key, "body": decompress_json(row.body)})
 
 
 def _query_conditions(

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import GoldStart
-from app.terminal.options import Json, current_actor
+from app.terminal.options import Json, get_current_actor
 from app.terminal.remote import BATCH
-from app.terminal.server import connect_to_server, current_server, opened_store
+from app.terminal.server import connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_rows, print_values
 
 commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)
@@ -22,16 +22,16 @@ Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
 @commands.command("list")
 def list_(dataset: Dataset, json_: Json = False) -> None:
     """List the batches of a dataset: open ones and those that are due first come first."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
-        from app.terminal.remote import batch_values
+        from app.terminal.remote import fetch_batches
 
         with connect_to_server(server) as client:
-            found = batch_values(client, dataset)
+            found = fetch_batches(client, dataset)
     else:
         from app.features.batches.service import list_batches
 
-        with opened_store() as store:
+        with open_store() as store:
             found = [_batch_values(batch) for batch in list_batches(store, dataset)]
     print_rows(found, json_, lambda value: value, _format_value)
 
@@ -71,7 +71,7 @@ def give(
         "gold_every": gold_every,
         "skip_given": not again,
     }
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal.remote import assign_batch
 
@@ -81,15 +81,17 @@ def give(
         return
     from app.features.batches.service import NewBatch, make_batch
 
-    with opened_store() as store:
+    with open_store() as store:
         new = NewBatch(query=query, due=day, **fields)
-        print_values(_batch_values(make_batch(store, dataset, new, actor=current_actor())), json_)
+        print_values(
+            _batch_values(make_batch(store, dataset, new, actor=get_current_actor())), json_
+        )
 
 
 @commands.command()
 def show(batch: Number, json_: Json = False) -> None:
     """Show how far a batch is."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal.remote import read_batch
 
@@ -98,7 +100,7 @@ def show(batch: Number, json_: Json = False) -> None:
         return
     from app.features.batches.service import get_batch
 
-    with opened_store() as store:
+    with open_store() as store:
         print_values(_batch_values(get_batch(store, batch)), json_)
 
 
@@ -121,7 +123,7 @@ def gold(
 
     if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
         raise typer.BadParameter("say sample or version", param_hint="--from")
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal.remote import choose_gold
 
@@ -135,8 +137,8 @@ def gold(
     )
 
     choice = GoldChoice(TruthSource(source), version, query, size, start)
-    with opened_store() as store:
-        found = mark_groups_with_known_truth(store, dataset, choice, actor=current_actor())
+    with open_store() as store:
+        found = mark_groups_with_known_truth(store, dataset, choice, actor=get_current_actor())
     print_values({"groups": [*found.groups], "left_out": found.left_out}, json_)
 
 
@@ -150,7 +152,7 @@ def change(
     """Change how many gold groups a batch mixes in, also while people work on it."""
     if (gold_every is None) != no_gold:
         raise typer.BadParameter("say how many, or --no-gold", param_hint="--gold-every")
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal.remote import change_gold
 
@@ -159,9 +161,9 @@ def change(
         return
     from app.features.batches.service import change_batch
 
-    with opened_store() as store:
+    with open_store() as store:
         found = change_batch(
-            store, batch, actor=current_actor(), gold_every=gold_every, no_gold=no_gold
+            store, batch, actor=get_current_actor(), gold_every=gold_every, no_gold=no_gold
         )
     print_values(_batch_values(found), json_)
 
@@ -169,7 +171,7 @@ def change(
 @commands.command()
 def close(batch: Number, json_: Json = False) -> None:
     """Give nothing more out of a batch; what was said of its groups stays."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal.remote import close_batch
 
@@ -179,9 +181,10 @@ def close(batch: Number, json_: Json = False) -> None:
     from app.features.batches.queries import CLOSED
     from app.features.batches.service import change_batch
 
-    with opened_store() as store:
+    with open_store() as store:
         print_values(
-            _batch_values(change_batch(store, batch, actor=current_actor(), state=CLOSED)), json_
+            _batch_values(change_batch(store, batch, actor=get_current_actor(), state=CLOSED)),
+            json_,
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 
 from sqlalchemy import bindparam, delete, exists, select, update
 
-from app.db.dialects.dialect import numbers_given
+from app.db.dialects.dialect import select_bound_numbers
 from app.db.session import Session
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
@@ -19,7 +19,7 @@ _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
 _TELLS = exists().where(WebhookModel.dataset_id == _BATCH.c.dataset_id, WebhookModel.off.is_(None))
 """Somebody wants to know what becomes of a batch."""
 # What every verdict asks is put together once: that takes longer than to answer it.
-_GIVEN = BatchGroupModel.group_id.in_(numbers_given("ids"))
+_GIVEN = BatchGroupModel.group_id.in_(select_bound_numbers("ids"))
 _IN_BATCH = exists().where(BatchGroupModel.batch_id == _BATCH.c.id, _GIVEN)
 _TOUCHED = select(
     _BATCH.c.id, (_TELLS & _IN_BATCH.where(BatchGroupModel.settled.is_(None))).label("is_near")
@@ -33,7 +33,7 @@ _SETTLE = (
     .values(settled=bindparam("over"))
 )
 _CLOSE = delete(LeaseModel).where(
-    LeaseModel.group_id.in_(numbers_given("ids")), LeaseModel.batch_id.in_(_SINGLE)
+    LeaseModel.group_id.in_(select_bound_numbers("ids")), LeaseModel.batch_id.in_(_SINGLE)
 )
 
 

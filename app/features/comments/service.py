@@ -11,8 +11,8 @@ from typing import Any
 
 from app.db.check import Check, compare_records
 from app.db.dialects.dialect import dialect_in
-from app.db.json_columns import as_written
-from app.db.log import Entry, LogEntry, append, entries_of_kinds
+from app.db.json_columns import report_damaged_values
+from app.db.log import Entry, LogEntry, append_entries, iterate_entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, StorageError
@@ -275,7 +275,7 @@ def _log_comment(
     session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any
 ) -> None:
     body = {name: value for name, value in fields.items() if value is not None}
-    append(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
+    append_entries(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
 
 
 def _checked_comment(text: str) -> str:
@@ -331,8 +331,10 @@ def examine_threads(store: Store) -> Check:
 
 def _compare_with_log(session: Session, restore: str) -> Check:
     try:
-        with as_written():
-            logged = threads_from_log(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
+        with report_damaged_values():
+            logged = threads_from_log(
+                iterate_entries_of_kinds(session, (COMMENT, "dataset_deleted"))
+            )
     except StorageError as error:
         return Check("threads", False, error.message, error.hint or restore)
     present = read_all_threads(session)

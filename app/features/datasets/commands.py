@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from app.terminal.options import Json, current_actor
+from app.terminal.options import Json, get_current_actor
 from app.terminal.remote import DATASET
-from app.terminal.server import ServerPlace, connect_to_server, current_server, opened_store
+from app.terminal.server import ServerPlace, connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -17,7 +17,7 @@ commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
 @commands.command("list")
 def list_(json_: Json = False) -> None:
     """List every dataset with its progress."""
-    server = current_server()
+    server = get_current_server()
     values = _read_local_datasets() if server is None else _read_remote_datasets(server)
     if json_:
         print_json(values)
@@ -32,7 +32,7 @@ def list_(json_: Json = False) -> None:
 def _read_local_datasets() -> list[dict[str, Any]]:
     from app.features.datasets.service import list_datasets
 
-    with opened_store() as store:
+    with open_store() as store:
         datasets = list_datasets(store)
     return [
         {**{name: getattr(item, name) for name in DATASET}, "policy": item.policy.name}
@@ -41,10 +41,10 @@ def _read_local_datasets() -> list[dict[str, Any]]:
 
 
 def _read_remote_datasets(server: ServerPlace) -> list[dict[str, Any]]:
-    from app.terminal.remote import dataset_values
+    from app.terminal.remote import fetch_datasets
 
     with connect_to_server(server) as client:
-        return dataset_values(client)
+        return fetch_datasets(client)
 
 
 @commands.command()
@@ -60,10 +60,10 @@ def delete(
     """
     from app.features.datasets.service import delete_dataset, read_contents
 
-    with opened_store() as store:
+    with open_store() as store:
         contents = read_contents(store, name)
         typed = contents.name if yes else _ask_for_name(contents.name, contents.counts)
-        contents = delete_dataset(store, contents.id, confirm=typed, actor=current_actor())
+        contents = delete_dataset(store, contents.id, confirm=typed, actor=get_current_actor())
     print_values({"deleted": contents.name, **contents.counts}, json_)
 
 

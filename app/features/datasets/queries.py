@@ -29,9 +29,14 @@ from sqlalchemy import (
 )
 
 from app.config import Settings
-from app.db.dialects.dialect import DeferReferences, insert_or_replace, items_of, texts_in
-from app.db.home import DAY, last_written
-from app.db.json_columns import as_written, parse
+from app.db.dialects.dialect import (
+    DeferReferences,
+    insert_or_replace,
+    select_json_array_items,
+    select_texts,
+)
+from app.db.home import DAY, find_last_write_time
+from app.db.json_columns import parse_json_column, report_damaged_values
 from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
@@ -48,7 +53,7 @@ from app.features.tables import Base
 from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.features.versions.queries import VersionModel
-from app.json_text import MAX_ID, canonical
+from app.json_text import MAX_ID, canonical_json_text
 from app.object_store.path import is_address
 from app.soccer.codec import policy_from_json, policy_to_json
 from app.soccer.policy import Policy
@@ -91,7 +96,7 @@ _COUNTED = {
 _ACCESS = ("dataset_role", "access_token", "webhook")
 """Who may, or hears, what in a dataset; nothing that was said of its groups."""
 _KEY = CalibrationModel.key
-_items = items_of(SolutionModel.calibrations)
+_items = select_json_array_items(SolutionModel.calibrations)
 _NAMED = select(_items.c.value).select_from(SolutionModel).join(_items, true())
 _UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
 
@@ -99,8 +104,8 @@ _UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
 @lru_cache(maxsize=64)
 def policy_from_row(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
-    with as_written():
-        return policy_from_json(parse(text))
+    with report_damaged_values():
+        return policy_from_json(parse_json_column(text))
 
 
 def list_dataset_rows(session: Session) -> Sequence[DatasetModel]:
@@ -185,7 +190,7 @@ def read_dataset_names(session: Session) -> dict[int, str]:
 
 
 def _policy_columns(policy: Policy) -> dict[str, str]:
-    return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
+    return {"policy": canonical_json_text(policy_to_json(policy)), "policy_hash": policy.hash}
 
 
 def find_owning_dataset(session: Session, kind: str, identity: int) -> int | None:
@@ -339,8 +344,8 @@ def delete_unused_calibrations_among(session: Session, keys: Sequence[str]) -> i
     """
     if _has_unsolved(session):
         return 0
-    named = _NAMED.where(_items.c.value.in_(texts_in(keys)))
-    unused = (_KEY.in_(texts_in(keys)), _KEY.not_in(named))
+    named = _NAMED.where(_items.c.value.in_(select_texts(keys)))
+    unused = (_KEY.in_(select_texts(keys)), _KEY.not_in(named))
     gone = delete(CalibrationModel).where(*unused).returning(_KEY)
     return len(session.scalars(gone).all())
 
@@ -390,7 +395,7 @@ def delete_expired_cache_entries(settings: Settings) -> int:
     gone = 0
     for folder, _, names in os.walk(settings.cache):
         for path in (Path(folder, name) for name in names):
-            written = last_written(path)
+            written = find_last_write_time(path)
             if written is not None and written < oldest:
                 path.unlink(missing_ok=True)
                 gone += 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.object_store.path import StoredPath, find_path, is_address, target_path
+from app.object_store.path import StoredPath, find_path, is_address, resolve_target_path
 from app.soccer.choices import (
     BoxKind,
     CalibrationChoice,
@@ -23,14 +23,14 @@ from app.terminal.options import (
     POLICY_OR_FILE,
     Dataset,
     Json,
-    current_actor,
+    get_current_actor,
     parse_cameras,
     parse_frame_offset,
     parse_place,
     parse_size,
     read_settings,
 )
-from app.terminal.server import connect_to_server, current_server, opened_store
+from app.terminal.server import connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_error, print_export, print_import, say, show_progress
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def import_(
     if len(paths) > 1:
         raise typer.BadParameter(f"{format_} is read from one place: name one PATH")
     path = paths[0]
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
@@ -174,10 +174,10 @@ def import_(
     )
     source.check(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
-    with opened_store(settings) as store, show_progress("Importing") as progress:
+    with open_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
-            actor=current_actor(), dry_run=dry_run, policy=chosen,
+            actor=get_current_actor(), dry_run=dry_run, policy=chosen,
         )  # fmt: skip
     print_import(imported.values(), json_)
     if not imported.imported_anything:
@@ -196,7 +196,7 @@ def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     from app.features.jobs.runner import describe_result
     from app.features.paint.proposals import propose_views
 
-    with opened_store(settings) as store, show_progress("Proposing cameras") as progress:
+    with open_store(settings) as store, show_progress("Proposing cameras") as progress:
         run = propose_views(store, dataset, progress=progress)
     if not silent:
         say(describe_result("proposals", asdict(run)) or "")
@@ -243,7 +243,7 @@ def export(
         "views": views,
         "version": version,
     }
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
@@ -258,9 +258,9 @@ def export(
     from app.features.exports.service import export_dataset as run_export
     from app.features.exports.service import require_possible
 
-    with opened_store() as store, show_progress("Exporting") as progress:
+    with open_store() as store, show_progress("Exporting") as progress:
         require_possible(store, dataset, format_, everything=everything, **options)
-        target = target_path(store.settings, out) if is_address(out) else Path(out)
+        target = resolve_target_path(store.settings, out) if is_address(out) else Path(out)
         report = run_export(
             store, dataset, format_, target, everything=everything, **options, progress=progress
         )

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from app.db.database_worker import CallingServer
-from app.db.home import DAY, delete_path, last_written
+from app.db.home import DAY, delete_path, find_last_write_time
 from app.db.json_columns import Json
 from app.db.session import now
 from app.db.store import Store
@@ -32,7 +32,7 @@ from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
 from app.json_text import json_text
 from app.media.frames import Frames, SentPicture
-from app.object_store.path import StoredPath, target_path
+from app.object_store.path import StoredPath, resolve_target_path
 from app.object_store.store import SCHEME
 from app.soccer.group import Media
 from app.wording import plural
@@ -180,7 +180,7 @@ class ExportFolder:
         """
         gone = 0
         for path in self.folder.glob("*.zip"):
-            name, written = path.name.removesuffix(".zip"), last_written(path)
+            name, written = path.name.removesuffix(".zip"), find_last_write_time(path)
             known = not _ID.fullmatch(name) or self._record_path(name).exists()
             if not known and written is not None and written < time.time() - DAY:
                 path.unlink(missing_ok=True)
@@ -332,6 +332,6 @@ def _target_in_store(store: Store, address: str) -> StoredPath:
     """
     try:
         require_safe_path(address.removeprefix(SCHEME))
-        return target_path(store.settings, address)
+        return resolve_target_path(store.settings, address)
     except (InputError, NotFoundError) as error:
         raise type(error)(error.message, hint=error.hint, pointer="/to") from error

@@ -36,7 +36,7 @@ from app.formats.frame_names import (
     with_export_key,
 )
 from app.formats.safe_path import resolve_inside
-from app.media.files import media_facts, picture_header
+from app.media.files import read_media_facts, read_picture_header
 from app.media.frames import SentPicture
 from app.object_store.path import is_address, unseal_address
 from app.soccer.frames import ImageSize
@@ -338,7 +338,7 @@ class ExportImages:
     def _add_view(
         self, group: Group, view: View, media: Media, frozen: Mapping[str, int] | None
     ) -> None:
-        facts = media_facts(media) if frozen is None else frozen
+        facts = read_media_facts(media) if frozen is None else frozen
         if facts:
             self.media.append({"group": group.key, "view": view.key, **facts})
         elif is_address(media.path):
@@ -348,7 +348,7 @@ class ExportImages:
             )
         if self._images == "none":
             return
-        if frozen and frozen != media_facts(media):
+        if frozen and frozen != read_media_facts(media):
             self._note_missing(group, view, "not the file that was frozen")
             return
         try:
@@ -383,7 +383,7 @@ class ExportImages:
     def _is_upright(self, view: View, media: Media) -> bool:
         """Whether a link to its file shows a frame as it was annotated: a mirrored picture is
         turned right, and one that EXIF turns would lie on its side where EXIF is not read."""
-        header = picture_header(media)
+        header = read_picture_header(media)
         return not view.station.flipped and (header is None or header.orientation == 1)
 
     def _picture_path(self, group: Group, view: View, suffix: str) -> Path | None:

@@ -85,10 +85,10 @@ def calibrate(
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
     from app.features.file_tools.calibrate import calibrate_files
-    from app.workers.executors import process_pool
+    from app.workers.executors import open_process_pool
 
     named, shape = _file_of_option(matches, "--matches"), _file_of_option(picture, "--picture")
-    pool = process_pool(workers or read_settings().workers)
+    pool = open_process_pool(workers or read_settings().workers)
     with pool as executor, show_progress("Calibrating") as progress:
         result = calibrate_files(
             source,

@@ -26,7 +26,7 @@ from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, ball_rays
 from app.tracking.link import find_time_map
 from app.tracking.time_map import TimeMap
-from app.video.shots import RecordingShots, Shot, shots_of_recording
+from app.video.shots import RecordingShots, Shot, index_and_find_shots
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
 RESULT = "shots.json"
@@ -70,7 +70,7 @@ def find_shots_in_file(
     with closing(WorkerProcess(LIMITS)) as worker:
         try:
             found: RecordingShots = worker.run(
-                shots_of_recording, recording, settings, on_message=hear
+                index_and_find_shots, recording, settings, on_message=hear
             )
         except WorkerEnded as error:
             kind = ImageError if error.reason == "crash" else TooLargeError

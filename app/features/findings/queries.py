@@ -24,13 +24,13 @@ from sqlalchemy import (
 from sqlalchemy import cast as cast_to
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.json_columns import as_written, parse
-from app.db.log import Entry, append
+from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.log import Entry, append_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import shown_actor_column
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.finding import (
     PICTURE_GEOMETRY,
     PITCH_SIZE,
@@ -86,8 +86,8 @@ def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
 def _finding_from_row(row: Any) -> Finding:
     if row.kind != TRACK_DISAGREES:
         return Finding(row.kind, row.sentence, view=row.view)
-    with as_written():
-        place = None if row.place is None else tuple(parse(row.place))
+    with report_damaged_values():
+        place = None if row.place is None else tuple(parse_json_column(row.place))
     fix = Fix("move_ball" if place else "exclude_view", row.view)
     return PlacedFinding(
         row.kind, row.sentence, view=row.view, number=row.number, fix=fix, place=place
@@ -248,7 +248,7 @@ def replace_track_findings(
     wanted: set[tuple[Any, ...]] = {
         (
             *(item.group_id, item.view, item.sentence, item.number),
-            *(None if item.place is None else canonical(item.place), item.of_inputs),
+            *(None if item.place is None else canonical_json_text(item.place), item.of_inputs),
         )
         for item in found
         if item.group_id in there
@@ -358,7 +358,7 @@ def insert_dismissal(
     actor, at = brought or (dismissal.actor, dismissal.at)
     if brought is not None:
         body |= {"actor": dismissal.actor, "at": dismissal.at}
-    append(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
+    append_entries(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
     return identity
 
 

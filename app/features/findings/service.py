@@ -25,7 +25,7 @@ from app.features.queue.queries import (
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import is_solved
 from app.soccer.finding import Dismissal, Finding
-from app.soccer.group import Group, checked_note
+from app.soccer.group import Group, strip_and_check_note
 
 BATCH = 100
 
@@ -157,7 +157,7 @@ def set_dismissal(
         InputError: The group has no such finding.
         StaleRevisionError: The group is not what the person saw.
     """
-    note = checked_note(note)
+    note = strip_and_check_note(note)
     while True:
         record, solution = read_solved(store, group_id)
         stored, what = record.stored, f"group {record.stored.group.key}"

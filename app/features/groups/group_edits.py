@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append, read_entries_of, single_edits
+from app.db.log import Entry, append_entries, iterate_single_edits, read_entries_of
 from app.db.session import Session, now
 from app.features.datasets.queries import group_ids
 from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, need_view
@@ -67,7 +67,7 @@ def edit_groups(
             step = edit_and_inverse_to_json(edit, edit.inverse(stored.group))
             entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, number))
             changed.append(number)
-        append(session, entries)
+        append_entries(session, entries)
         refresh_queue(session, changed)
         count += len(changed)
     return count
@@ -80,7 +80,7 @@ def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, 
     """
     placed: dict[int, dict[str, str]] = {}
     for entry in read_entries_of(session, groups, GROUP_KINDS):
-        for edit in single_edits(entry.body.get("edit") or {}):
+        for edit in iterate_single_edits(entry.body.get("edit") or {}):
             if edit.get("edit") == "set_balls" and entry.group_id is not None:
                 of_group = placed.setdefault(entry.group_id, {})
                 of_group.pop(edit["view"], None)
@@ -97,7 +97,7 @@ def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, act
     before = read_factors(session, dataset_id)
     write_factors(session, dataset_id, factors)
     body = {"factors": factors_to_json(factors), "before": factors_to_json(before)}
-    append(session, [Entry(NOISE, actor, now(), body, dataset_id)])
+    append_entries(session, [Entry(NOISE, actor, now(), body, dataset_id)])
     ids = group_ids(session, dataset_id)
 
     def noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:

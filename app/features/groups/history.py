@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Unpack
 
 from app.db.log import LogEntry as LogEntry
-from app.db.log import group_entries, station_entries
+from app.db.log import group_entries, list_station_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
@@ -113,7 +113,7 @@ def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
 
 def _merged_entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
     shared = [
-        station_entries(session, item.id)
+        list_station_entries(session, item.id)
         for item in stored.stations.values()
         if item.station.shared
     ]

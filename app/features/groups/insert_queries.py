@@ -10,10 +10,10 @@ from typing import Any
 from sqlalchemy import Select, func, insert, select
 
 from app.db.dialects.dialect import larger_of
-from app.db.json_columns import pack
+from app.db.json_columns import compress_json
 from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer import codec
 from app.soccer.codec import group_inputs_hash, station_digest, view_digest
 from app.soccer.group import Group, Station, View
@@ -29,12 +29,12 @@ def station_to_columns(station: Station) -> dict[str, Any]:
         "height": station.size.height,
         "flipped": station.flipped,
         "calibration": station.calibration,
-        "lines": canonical(codec.lines_to_json(station.annotated_lines)),
-        "given": None if given is None else canonical(given),
+        "lines": canonical_json_text(codec.lines_to_json(station.annotated_lines)),
+        "given": None if given is None else canonical_json_text(given),
         "picture": None
         if station.picture is None
-        else canonical(codec.picture_to_json(station.picture)),
-        "proposed": canonical([*station.proposed]) if station.proposed else None,
+        else canonical_json_text(codec.picture_to_json(station.picture)),
+        "proposed": canonical_json_text([*station.proposed]) if station.proposed else None,
         "digest": station_digest(station),
     }
 
@@ -47,26 +47,26 @@ def view_to_columns(view: View, position: int) -> dict[str, Any]:
         "key": view.key,
         "position": position,
         "included": view.included,
-        "left_out": None if why is None else canonical(why),
+        "left_out": None if why is None else canonical_json_text(why),
         "noise": None if view.noise == 1 else view.noise,
-        "balls": canonical([codec.ball_to_json(ball) for ball in view.balls]),
+        "balls": canonical_json_text([codec.ball_to_json(ball) for ball in view.balls]),
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,
         "media_frame": None if media is None else media.frame,
-        "extras": None if extras is None else pack(extras),
+        "extras": None if extras is None else compress_json(extras),
         "digest": view_digest(view),
     }
 
 
 def paint_to_column(paint: Mapping[str, str]) -> str | None:
     """The column of what was read of a group's pictures, by digest; None where nothing was."""
-    return canonical(dict(paint)) if paint else None
+    return canonical_json_text(dict(paint)) if paint else None
 
 
 def positions_to_column(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codec.positions_to_json(group.positions)
-    return canonical(shared) if shared else None
+    return canonical_json_text(shared) if shared else None
 
 
 def group_to_columns(

@@ -19,7 +19,7 @@ from app.errors import (
 from app.features.paint.proposal_queries import Proposal
 from app.geometry.camera import Camera
 from app.media.files import read_pixels
-from app.media.frames import refused_picture
+from app.media.frames import picture_error_of_ended_process
 from app.paint.evidence import Image
 from app.paint.view_paint import (
     choose_hiding_boxes,
@@ -283,4 +283,4 @@ class PictureTask:
 
 
 def _picture_error(error: WorkerEnded) -> ReviewError:
-    return refused_picture("the picture", error)
+    return picture_error_of_ended_process("the picture", error)

@@ -33,7 +33,7 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.solve import solve, warm_up_solver
-from app.worker_pool import ReadyWorker, least_busy
+from app.worker_pool import ReadyWorker, choose_least_busy_worker
 from app.worker_process import WorkerEnded, WorkerLimits
 
 Solved = TypeVar("Solved")
@@ -112,7 +112,7 @@ class LargeGroupSolver:
         Raises:
             OverloadedError: The process ended.
         """
-        worker = least_busy(self.workers)
+        worker = choose_least_busy_worker(self.workers)
         if worker is None:
             return work(group, policy, known)
         task = worker.submit(work, group, policy, known)
@@ -205,7 +205,7 @@ class PreviewSolver:
             OverloadedError: The process ended.
         """
         large = is_large(request.scope)
-        worker = least_busy(self._large.workers if large else self.workers)
+        worker = choose_least_busy_worker(self._large.workers if large else self.workers)
         if worker is not None:
             task = worker.submit(solve_preview_in_process, self._settings, group_id, changes)
             found: bytes | None = await task.result_unless_client_gone(request.is_disconnected)

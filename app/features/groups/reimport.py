@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from app.db.log import Entry, append, station_entries
+from app.db.log import Entry, append_entries, list_station_entries
 from app.db.session import Session, now
 from app.features.findings.queries import find_station_finding, replace_station_finding
 from app.features.groups.insert_queries import NewRows
@@ -206,7 +206,7 @@ class SharedStations:
         if not stored.edited:
             return stored.station
         found = station = None
-        for entry in station_entries(self._session, stored.id):
+        for entry in list_station_entries(self._session, stored.id):
             if entry.kind == "station":
                 station = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and station is not None:
@@ -249,4 +249,4 @@ class SharedStations:
             "kept": kept,
         }
         entry = Entry("station", self._actor, now(), body, self._dataset_id, station_id=station_id)
-        append(self._session, [entry])
+        append_entries(self._session, [entry])

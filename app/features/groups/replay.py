@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from app.db.json_columns import pack
+from app.db.json_columns import compress_json
 from app.db.log import LogEntry, read_log, verify_chain
 from app.db.session import Session
 from app.db.store import Store
@@ -299,7 +299,12 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
         for group, station, view, sentence in sorted(snapshot.noticed, key=repr)
     ]
     unassigned = [
-        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": pack(extras.values())}
+        {
+            "dataset_id": key[0],
+            "camera": key[1],
+            "frame": key[2],
+            "extras": compress_json(extras.values()),
+        }
         for key, extras in snapshot.unassigned.items()
     ]
     groups = [_group_row(snapshot, key) for key in snapshot.groups]

@@ -47,7 +47,7 @@ from app.http.problem import Responses, responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.json_text import MAX_ID
-from app.soccer.group import View, view_letter
+from app.soccer.group import View, make_view_letter
 
 router = APIRouter(prefix="/groups", tags=["groups"], route_class=Route)
 
@@ -95,7 +95,7 @@ class ChangedViewDocument(Document):
         shown = changed.id is not None and there.media is not None
         return cls(
             key=changed.key,
-            letter=view_letter(changed.index),
+            letter=make_view_letter(changed.index),
             width=there.size.width,
             height=there.size.height,
             image=url_of_image(changed.id) if shown and changed.id is not None else None,

@@ -33,7 +33,7 @@ from app.soccer.group import (
     Reason,
     View,
     is_numbered_in_time,
-    view_letter,
+    make_view_letter,
 )
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.pitch import MARKINGS, canonical_marking
@@ -422,7 +422,7 @@ def _view_document(state: GroupState, view: View, index: int, label: str) -> Vie
     return ViewDocument.model_construct(
         id=view_id,
         key=view.key,
-        letter=view_letter(index),
+        letter=make_view_letter(index),
         label=label,
         width=view.size.width,
         height=view.size.height,

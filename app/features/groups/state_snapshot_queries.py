@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select, text
 
 from app.db.dialects.dialect import DeferReferences
-from app.db.json_columns import unpack
+from app.db.json_columns import decompress_json
 from app.db.session import Session
 from app.features.datasets.queries import list_dataset_rows, policy_from_row
 from app.features.datasets.tables import (
@@ -232,7 +232,7 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
         snapshot.dismissals.setdefault(values.pop("group_id"), []).append(values)
     for unassigned in list_all_unassigned_frames(session):
         place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
-        snapshot.unassigned[place] = extras_from_json(unpack(unassigned.extras))
+        snapshot.unassigned[place] = extras_from_json(decompress_json(unassigned.extras))
     for noticed in list_all_import_findings(session):
         snapshot.noticed.add((noticed.group_id, noticed.station_id, noticed.view, noticed.sentence))
     return snapshot

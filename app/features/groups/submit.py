@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import NotFoundError, SharedStationError
@@ -376,7 +376,7 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     if outcome.painted is not change.group:
         insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
         entries.append(Entry(PAINT, actor, stored.changed, _paint_entry_body(outcome), *where))
-    append(session, entries)
+    append_entries(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
     if after.dismissals.last:
         refresh_queue(session, [stored.id])

@@ -13,7 +13,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, lines_without
 from app.soccer.finding import Finding, Fix, PlacedFinding
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, Station, View, view_letter
+from app.soccer.group import Group, Station, View, make_view_letter
 from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import CalibrationPolicy
@@ -123,7 +123,7 @@ def rank_of_fix(fix: Fix) -> int:
 
 def describe_condition(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
-    letter = view_letter([view.key for view in group.views].index(fix.view or ""))
+    letter = make_view_letter([view.key for view in group.views].index(fix.view or ""))
     return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 

@@ -22,7 +22,7 @@ from app.features.groups.suggested_edits import (
 from app.geometry.arrays import FloatArray
 from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Group, View, view_letter
+from app.soccer.group import Group, View, make_view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
@@ -221,7 +221,7 @@ def _candidates_of_undrawn_markings(
             yield _Candidate(describe_condition(group, hide, max(fit.length_px, 1.0)), hide)
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
-    letter = view_letter(group.views.index(view))
+    letter = make_view_letter(group.views.index(view))
     names = [
         f"{fit.marking} (visible over {format_pixels(max(fit.length_px, 1))})" for fit in undrawn
     ]

@@ -9,13 +9,13 @@ from typing import Any
 from app.db.json_columns import Json
 from app.db.log import (
     LogEntry,
+    filter_groups_with_history,
     group_entries,
     group_steps,
-    groups_with_past,
-    newest_steps,
+    list_newest_steps,
+    list_station_entries,
+    list_station_steps,
     read_entry,
-    station_entries,
-    station_steps,
 )
 from app.db.session import Session
 from app.errors import ConflictError
@@ -105,7 +105,7 @@ def _read_newest(session: Session, group_id: int) -> UndoStacks:
     """The stacks of one group from as little of its history as tells them."""
     most = _FIRST_LOOK
     while True:
-        rows = newest_steps(session, group_id, GROUP_KINDS, most)
+        rows = list_newest_steps(session, group_id, GROUP_KINDS, most)
         steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
         stacks = _stacks_after(steps) if len(rows) < most else _stacks_of_newest(steps)
         if stacks is not None:
@@ -129,7 +129,7 @@ def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
 
 def read_station_stacks(session: Session, station_id: int) -> UndoStacks:
     """The stacks of a shared station."""
-    rows = station_steps(session, station_id, STATION_KINDS)
+    rows = list_station_steps(session, station_id, STATION_KINDS)
     return _stacks_after((STATION_KINDS[row.kind], row.id) for row in rows)
 
 
@@ -252,7 +252,7 @@ class RevisionChains:
     def of(self, groups: Iterable[StoredGroup]) -> dict[int, RevisionChain]:
         """Lineages by group id; what nobody touched since its import costs no look at it."""
         found = list(groups)
-        touched = groups_with_past(self._session, [item.id for item in found])
+        touched = filter_groups_with_history(self._session, [item.id for item in found])
         return {
             item.id: self._chain_from_log(item)
             if item.id in touched
@@ -298,7 +298,7 @@ def _chain_of_unedited_group(stored: StoredGroup) -> RevisionChain:
 def read_station_revision_chain(session: Session, stored: StoredStation) -> StationRevisionChain:
     """The revision chain of a static camera."""
     snapshot, base, states = StateSnapshot(), stored.station, list[str]()
-    for entry in station_entries(session, stored.id):
+    for entry in list_station_entries(session, stored.id):
         known = snapshot.stations.get(stored.id)
         unedited = known is None or station_digest(known.station) == known.source_digest
         apply_entry(snapshot, entry)

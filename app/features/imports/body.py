@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.features.findings.queries import (
     add_group_findings,
@@ -99,7 +99,7 @@ def save_gone_findings(
         body = _gone_entry_body(item, base, source, list_group_findings(session, number))
         entries.append(Entry("import", actor, at, body, dataset_id, number))
     if entries:
-        append(session, entries)
+        append_entries(session, entries)
         add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
         refresh_queue(session, list(stored))
     return len(entries)

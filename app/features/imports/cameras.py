@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
@@ -217,6 +217,6 @@ def attach_cameras(
             bump_group_revisions(session, [place.group], at)
         touched.update(list_groups_of_station(session, place.station))
         report.changed += 1
-    append(session, entries)
+    append_entries(session, entries)
     refresh_inputs_hashes(session, sorted(touched))
     refresh_queue(session, sorted(touched))

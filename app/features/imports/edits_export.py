@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from app.db.json_columns import Json, unpack
-from app.db.log import LogEntry, group_entries, station_entries
+from app.db.json_columns import Json, decompress_json
+from app.db.log import LogEntry, group_entries, list_station_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead, join_licences, read_dataset_head
@@ -33,7 +33,7 @@ from app.features.imports.queries import (
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import open_output
-from app.json_text import canonical, json_text
+from app.json_text import canonical_json_text, json_text
 from app.progress import ReportProgress
 from app.soccer.codec import (
     group_without_views_to_json,
@@ -105,7 +105,7 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
     count = 0
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for item in items:
-            file.write(canonical(item) + "\n")
+            file.write(canonical_json_text(item) + "\n")
             count += 1
     return count
 
@@ -119,7 +119,7 @@ def _exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
             "station": station,
             "base": None if base == station else base,
             "states": list(chain.states),
-            "log": _edit_entries_to_json(station_entries(session, stored.id)),
+            "log": _edit_entries_to_json(list_station_entries(session, stored.id)),
         }
 
 
@@ -176,7 +176,7 @@ def _edit_entries_to_json(logged: Iterable[LogEntry]) -> list[Json]:
 
 def _unassigned_values(session: Session, dataset_id: int) -> Iterator[Json]:
     for row in iterate_sorted_unassigned_frames(session, dataset_id):
-        yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
+        yield {"camera": row.camera, "frame": row.frame, "extras": decompress_json(row.extras)}
 
 
 def _make_manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
-from app.db.json_columns import pack, unpack
-from app.db.log import Entry, append
+from app.db.json_columns import compress_json, decompress_json
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
@@ -54,7 +54,7 @@ from app.formats.report import Report
 from app.object_store.path import is_address
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
-from app.soccer.codec import extras_from_json, source_hash
+from app.soccer.codec import extras_from_json, hash_imported_group
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
@@ -261,7 +261,7 @@ def import_group_batch(
     gone = filter_groups_with_finding(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
     for group in batch:
-        digest = source_hash(group)
+        digest = hash_imported_group(group)
         if group.key not in known:
             fresh.append((group, digest))
         elif known[group.key].source_hash == digest and known[group.key].id not in gone:
@@ -294,7 +294,7 @@ def insert_new_groups(
         entries.append(Entry("import", origin.actor, at, body, origin.dataset_id, identity))
         ids.append(identity)
     rows.insert()
-    append(session, entries)
+    append_entries(session, entries)
     pitches = read_edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
     for identity, (group, _) in zip(ids, fresh, strict=True):
         if (pitch := pitches.get(group.match)) is not None:
@@ -339,7 +339,7 @@ def _update_group(
         followed.group, followed.base, origin.source, digest, collect_view_and_station_ids(after)
     )
     body["kept"] = [[item.view, item.sentence] for item in kept]
-    append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
+    append_entries(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
     refresh_queue(session, [group_id])
     report.changed += 1
     report.findings += len(followed.kept)
@@ -409,7 +409,7 @@ def import_unassigned_frames(
 def read_unassigned_frames(session: Session, dataset_id: int) -> Iterator[UnassignedFrame]:
     """The unassigned frames of a dataset, by camera and frame as texts."""
     for row in iterate_unassigned_frames(session, dataset_id):
-        yield UnassignedFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
+        yield UnassignedFrame(row.camera, row.frame, extras_from_json(decompress_json(row.extras)))
 
 
 def read_unassigned_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
@@ -430,7 +430,7 @@ def _save_batch(
     known = read_unassigned_extras(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
-        place, body = (item.camera, item.frame), pack(item.extras.values())
+        place, body = (item.camera, item.frame), compress_json(item.extras.values())
         if known.get(place) == body:
             report.unchanged += 1
         else:
@@ -450,6 +450,6 @@ def _write_unassigned(
     if not fresh:
         return
     upsert_unassigned_frames(session, dataset_id, fresh)
-    frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
+    frames = [[camera, frame, decompress_json(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
-    append(session, [Entry("spare", actor, now(), body, dataset_id)])
+    append_entries(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TypeVar
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import DatasetFormatError, InputError
@@ -179,7 +179,7 @@ def _log_station(
         "carried": exported,
     }
     entry = Entry("station", origin.actor, now(), body, origin.dataset_id, station_id=stored.id)
-    append(session, [entry])
+    append_entries(session, [entry])
 
 
 def _find_stored_station(session: Session, dataset_id: int, key: str) -> StoredStation | None:

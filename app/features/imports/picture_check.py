@@ -13,7 +13,7 @@ from app.features.datasets.queries import find_dataset
 from app.features.findings.queries import replace_shape_findings
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
-from app.media.files import picture_header, video_length, video_times
+from app.media.files import read_picture_header, read_video_length, read_video_times
 from app.media.images import SIDEWAYS, ImageHeader
 from app.paint.view_paint import SHAPES_APART
 from app.progress import ReportProgress
@@ -134,7 +134,7 @@ class PictureCheck:
 
     def _read_picture_header(self, place: str, media: Media) -> ImageHeader | None:
         if media.frame is None:
-            return picture_header(media)
+            return read_picture_header(media)
         if media.path not in self._videos:
             self._videos[media.path] = self._read_video_header(media)
         video = self._videos[media.path]
@@ -147,9 +147,9 @@ class PictureCheck:
 
     def _read_video_header(self, media: Media) -> _VideoHeader:
         """What a video is; its frames are counted here unless that takes too long."""
-        header = picture_header(media)
+        header = read_picture_header(media)
         try:
-            if video_length(media) > LONGEST:
+            if read_video_length(media) > LONGEST:
                 return _VideoHeader(header, None)
             return _VideoHeader(header, self._count_frames(media))
         except (NotFoundError, ImageError, StorageError, TooLargeError) as error:
@@ -163,7 +163,7 @@ class PictureCheck:
             self._report_progress(f"Counting the frames of {name}: {frames:,} so far.")
 
         tell(0)
-        count = len(video_times(media, self.settings, tell))
+        count = len(read_video_times(media, self.settings, tell))
         self._report_progress("Reading the groups.")
         return count
 

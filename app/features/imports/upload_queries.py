@@ -25,7 +25,7 @@ from app.config import Settings
 from app.db.home import PART, delete_path
 from app.db.locks import require_lock
 from app.db.session import now
-from app.durable import replace_file, sync
+from app.durable import replace_file, sync_to_disk
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
 from app.features.imports.upload_quota import (
     count_used_bytes,
@@ -98,7 +98,7 @@ def make_upload_folder(uploads: Path) -> None:
     """Make the folder of all uploads, if need be, so that it is there after a power cut."""
     if not uploads.is_dir():
         uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
-        sync(uploads.parent)
+        sync_to_disk(uploads.parent)
 
 
 def upload_path(settings: Settings, upload_id: str) -> Path:
@@ -173,7 +173,7 @@ def delete_upload(
         if not others:
             _remove_folder(settings.uploads / upload_id)
             with _storage_errors():
-                sync(settings.uploads)
+                sync_to_disk(settings.uploads)
             return
         with _storage_errors():
             write_upload_record(settings.uploads / upload_id, replace(upload, by=others))
@@ -378,7 +378,7 @@ class UploadWriter:
             return shared
         upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
         with _storage_errors():
-            sync(self._folder / CONTENT)
+            sync_to_disk(self._folder / CONTENT)
             write_upload_record(self._folder, upload)
             return self._publish(upload)
 
@@ -392,7 +392,7 @@ class UploadWriter:
                 if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
                     raise
             else:
-                sync(place.parent)
+                sync_to_disk(place.parent)
                 return upload
             shared = _add_sender(self._settings, upload.id, *upload.by)
             if shared is not None:

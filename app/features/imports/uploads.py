@@ -21,7 +21,7 @@ from app.db.idempotency import has_key, read_progress, save_progress
 from app.db.json_columns import Json
 from app.db.session import now
 from app.db.store import Store
-from app.durable import sync
+from app.durable import sync_to_disk
 from app.errors import ConflictError, InputError, NotFoundError, StorageError
 from app.features.imports.upload_queries import (
     CONTENT,
@@ -46,7 +46,7 @@ from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
 from app.formats.guess_format import guess_format, guess_format_of_names
 from app.formats.safe_path import MAX_PART, require_safe_path, resolve_inside
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.object_store.path import StoredPath, find_path, is_address
 from app.object_store.store import SCHEME
 
@@ -287,7 +287,7 @@ def begin_upload_in_parts(
     name = make_safe_file_name(name)
     if not size:
         raise InputError(f"{name} is empty")
-    said = canonical([by, name, size, mark]).encode()
+    said = canonical_json_text([by, name, size, mark]).encode()
     folder = settings.uploads / hashlib.sha256(said).hexdigest()[:32]
     with lock_upload_records(settings):
         upload = read_upload(folder)
@@ -307,9 +307,9 @@ def _make_upload_folder(folder: Path, upload: Upload) -> None:
     (folder / CONTENT).mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     (folder / CONTENT / upload.name).write_bytes(b"")
-    sync(folder / CONTENT)
+    sync_to_disk(folder / CONTENT)
     write_upload_record(folder, upload)
-    sync(folder.parent)
+    sync_to_disk(folder.parent)
 
 
 def _require_disk(settings: Settings, upload: Upload) -> None:

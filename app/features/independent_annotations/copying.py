@@ -25,7 +25,7 @@ from app.features.independent_annotations.queries import (
     read_gold_start,
 )
 from app.features.paint.queries import PAINT, insert_readings, read_readings
-from app.soccer.codec import source_hash, view_from_json
+from app.soccer.codec import hash_imported_group, view_from_json
 from app.soccer.group import Group, Station, View
 
 SOURCE = "copy"
@@ -66,7 +66,9 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
     shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
     origin = ImportOrigin(dataset_id, SOURCE, order.person)
-    (copy_id,) = insert_new_groups(session, origin, [(group, source_hash(group))], shared.ids)
+    (copy_id,) = insert_new_groups(
+        session, origin, [(group, hash_imported_group(group))], shared.ids
+    )
     return copy_id
 
 

@@ -10,7 +10,7 @@ from sqlalchemy import Select, bindparam, delete, exists, func, insert, or_, sel
 from sqlalchemy.orm import aliased
 
 from app.db.dialects.dialect import insert as insert_or_update
-from app.db.json_columns import Json, pack, unpack
+from app.db.json_columns import Json, compress_json, decompress_json
 from app.db.session import Session, now
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -372,7 +372,7 @@ def insert_gold(
     session: Session, group_id: int, dataset_id: int, start: str, truth: Json, by: str
 ) -> None:
     """Keep what is true of a group, in the place of what was kept before."""
-    values = {"dataset_id": dataset_id, "start": start, "truth": pack(truth)}
+    values = {"dataset_id": dataset_id, "start": start, "truth": compress_json(truth)}
     values |= {"marked": now(), "marked_by": by}
     statement = insert_or_update(GoldModel).values(group_id=group_id, **values)
     session.execute(statement.on_conflict_do_update(index_elements=["group_id"], set_=values))
@@ -417,7 +417,7 @@ def find_gold_head(session: Session, group_id: int) -> GoldHead | None:
 def read_gold_truth(session: Session, group_id: int) -> Json | None:
     """What is true of a gold group."""
     packed = session.scalar(select(GoldModel.truth).where(GoldModel.group_id == group_id))
-    return None if packed is None else unpack(packed)
+    return None if packed is None else decompress_json(packed)
 
 
 def list_gold_without_copy(session: Session, dataset_id: int, person: str) -> list[int]:

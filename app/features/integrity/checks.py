@@ -20,7 +20,12 @@ from app.db.check import Check, compare_records, compare_with_log
 from app.db.dialects.dialect import dialect_in
 from app.db.dialects.sqlite import MIN_SQLITE
 from app.db.home import find_leftovers, make_home, open_to_others
-from app.db.log import entries_after, entries_of_kinds, last_time, newest_entry
+from app.db.log import (
+    count_entries_after,
+    find_last_entry_time,
+    find_newest_entry_id,
+    iterate_entries_of_kinds,
+)
 from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, text_of
 from app.db.store import Store
@@ -80,7 +85,7 @@ def _guideline_name(key: tuple[int, int]) -> str:
 
 def _logged_guidelines(session: Session) -> dict[tuple[int, int], str]:
     digests: dict[tuple[int, int], str] = {}
-    for entry in entries_of_kinds(session, [GUIDELINE, DELETED]):
+    for entry in iterate_entries_of_kinds(session, [GUIDELINE, DELETED]):
         assert entry.dataset_id is not None
         if entry.kind == DELETED:
             digests = {key: digest for key, digest in digests.items() if key[0] != entry.dataset_id}
@@ -114,7 +119,7 @@ def examine_database(store: Store) -> list[Check]:
     with store.read() as session:
         restore = dialect_in(session).restoring
         checks = [_check_file(session, restore)]
-        entries = newest_entry(session)
+        entries = find_newest_entry_id(session)
         try:
             logged = replay_log(session)
         except StorageError as error:
@@ -406,11 +411,11 @@ def _check_anchor(settings: Settings) -> Check:
 def _check_clock(session: Session) -> Check:
     now = datetime.now(UTC)
     # Two machines that edit in turn may differ by a little.
-    count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
+    count, latest = count_entries_after(session, text_of(now + timedelta(minutes=5)))
     if count == 0:
         return Check("clock", True, "not behind the log")
     sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
-    last = last_time(session)
+    last = find_last_entry_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
         return Check("clock", False, sentence, "Set the clock of this machine.")
     # Written while the clock was ahead: entries are in order all the same, and nothing can change them.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from app.terminal.options import Json, read_settings
-from app.terminal.server import opened_store, require_home
+from app.terminal.server import open_store, require_home
 from app.terminal.terminal import print_json, say
 from app.wording import plural
 
@@ -24,13 +24,13 @@ def doctor(
     json_: Json = False,
 ) -> None:
     """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
-    from app.db.locks import server_lock
+    from app.db.locks import hold_server_lock
     from app.features.groups.replay import rebuild_tables
     from app.features.integrity.checks import examine_everything
 
     settings = read_settings()
     if rebuild:
-        with server_lock(settings), opened_store(settings) as store:
+        with hold_server_lock(settings), open_store(settings) as store:
             rebuild_tables(store)
     require_home()
     checks = examine_everything(settings)
@@ -140,7 +140,7 @@ def restore(
 
     The backup is verified first. No server may run.
     """
-    from app.db.restore import restore as run_restore
+    from app.db.restore import restore_database as run_restore
 
     restored = run_restore(read_settings(home=home), source)
     if json_:

@@ -9,8 +9,8 @@ from typing import Any
 
 from app.db.check import Check, compare_records, compare_with_log
 from app.db.dialects.dialect import dialect_in
-from app.db.json_columns import as_written, parse, unpack
-from app.db.log import LogEntry, entries_of_kinds
+from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
+from app.db.log import LogEntry, iterate_entries_of_kinds
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
@@ -108,7 +108,7 @@ def _present_people(session: Session) -> KnownPeople:
 
 def _logged_people(session: Session) -> KnownPeople:
     people, deleted = KnownPeople(), None
-    for entry in entries_of_kinds(session, [PERSON, DELETED, DATASET]):
+    for entry in iterate_entries_of_kinds(session, [PERSON, DELETED, DATASET]):
         if entry.kind == DELETED:
             _replay_dataset_deletion(people, entry)
         elif entry.kind == DATASET:
@@ -303,7 +303,7 @@ def examine_versions(store: Store) -> list[Check]:
 def _differing_versions(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
-        with as_written():
+        with report_damaged_values():
             logged = _logged_freezes(session)
     except StorageError:
         # Nothing follows from a log that cannot be read, which is named by itself.
@@ -323,7 +323,7 @@ def _differing_versions(session: Session, versions: Any) -> Iterator[str]:
 def _logged_freezes(session: Session) -> dict[int, LogEntry]:
     """What the log says of each version by its id, but for datasets that were deleted."""
     found: dict[int, LogEntry] = {}
-    entries = entries_of_kinds(session, ("freeze", "dataset_deleted"))
+    entries = iterate_entries_of_kinds(session, ("freeze", "dataset_deleted"))
     for entry in show_entries_under_aliases(session, entries):
         if entry.kind == "freeze":
             found[entry.body["version"]] = entry
@@ -349,11 +349,14 @@ def _fault_of_version(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
     rows = [item._asdict() for item in iterate_annotation_rows(session, row.id)]
     try:
-        with as_written():
-            counts, policy = parse(row.counts), policy_from_json(parse(row.policy))
+        with report_damaged_values():
+            counts, policy = (
+                parse_json_column(row.counts),
+                policy_from_json(parse_json_column(row.policy)),
+            )
             members = sum(item["member"] for item in rows)
             left_out = sum(counts["left_out"].values())
-            tracks = parse(row.tracks) if row.tracks else {}
+            tracks = parse_json_column(row.tracks) if row.tracks else {}
             found = hash_version(policy, row.solver_version, rows, tracks)
     except StorageError:
         return "it cannot be read"
@@ -394,9 +397,9 @@ def _referenced_keys(key: str, body: bytes | None) -> set[str]:
     """
     if body is None:
         return set()
-    with as_written():
+    with report_damaged_values():
         if not key.startswith((SAID, SOLUTION)):
-            unpack(body)
+            decompress_json(body)
         if compute_content_key(key, body) != key:
             raise ValueError(f"the key {key} does not match the content stored under it")
         if key.startswith(SAID):

@@ -37,10 +37,10 @@ from app.db.dialects.dialect import (
     report_storage_errors,
 )
 from app.db.home import make_file
-from app.db.locks import database_alone, server_lock
+from app.db.locks import hold_database_alone, hold_server_lock
 from app.db.log import verify_chain
-from app.db.migrate import UNFINISHED, make_schema, schema_revision
-from app.db.recovery.anchor import anchor_of
+from app.db.migrate import UNFINISHED, make_schema, read_schema_revision
+from app.db.recovery.anchor import read_anchor_of_database
 from app.db.session import Session
 from app.db.store import Store
 from app.durable import read_private
@@ -206,12 +206,12 @@ def transfer_database(
         )
     dialect = dialect_of(target)
     with ExitStack() as held:
-        held.enter_context(server_lock(source))
+        held.enter_context(hold_server_lock(source))
         if target.home != source.home:
-            held.enter_context(server_lock(target))
+            held.enter_context(hold_server_lock(target))
         store = held.enter_context(closing(Store.open(source)))
         if dialect.is_file:
-            held.enter_context(database_alone(target, "nothing can be copied into it"))
+            held.enter_context(hold_database_alone(target, "nothing can be copied into it"))
             make_file(target.database_file)
         engine = make_engine(target)
         held.callback(engine.dispose)
@@ -241,7 +241,7 @@ def _copy_all_tables(
     yields: Path,
     tell: Callable[[str, int], None],
 ) -> TransferResult:
-    anchor = anchor_of(session)
+    anchor = read_anchor_of_database(session)
     if anchor is None:
         raise InputError(
             "the source database has no complete Touchline schema",
@@ -269,7 +269,7 @@ def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None
     Raises:
         InputError: The target is in use.
     """
-    revision = schema_revision(target)
+    revision = read_schema_revision(target)
     if revision is None:
         with target.connect() as connection:
             if inspect(connection).get_table_names():

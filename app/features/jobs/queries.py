@@ -11,7 +11,7 @@ from sqlalchemy import Index, case, delete, false, func, insert, select, update
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import json_member
-from app.db.json_columns import Json, parse
+from app.db.json_columns import Json, parse_json_column
 from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
@@ -20,7 +20,7 @@ from app.features.people.visibility_queries import (
     Visibility,
     list_columns_with_shown_actor,
 )
-from app.json_text import canonical, finite
+from app.json_text import canonical_json_text, replace_non_finite
 from app.soccer.choices import JobState
 
 WAITING: JobState = "waiting"
@@ -254,13 +254,13 @@ def forget_jobs(session: Session, days: int) -> int:
 
 
 def _json_column(value: Json) -> str | None:
-    return None if value is None else canonical(finite(value))
+    return None if value is None else canonical_json_text(replace_non_finite(value))
 
 
 def _job_from_row(row: Any) -> Job:
     values = dict(row._mapping)
     for name in ("request", "result", "problem"):
-        values[name] = None if values[name] is None else parse(values[name])
+        values[name] = None if values[name] is None else parse_json_column(values[name])
     return Job(**values)
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import structlog
 
-from app.db.database_worker import no_answer, run_in_this_thread, run_in_worker, with_grace
+from app.db.database_worker import refuse_question, run_in_this_thread, run_in_worker, with_grace
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
@@ -239,7 +239,7 @@ def run_job_in_worker(
     dataset_id: int | None,
     progress: JobProgress,
     report: ReportProgress | None = None,
-    answer: Callable[[Any], Any] = no_answer,
+    answer: Callable[[Any], Any] = refuse_question,
 ) -> Result:
     """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from app.terminal.options import Json, current_actor
-from app.terminal.server import opened_store
+from app.terminal.options import Json, get_current_actor
+from app.terminal.server import open_store
 from app.terminal.terminal import print_values
 
 commands = typer.Typer()
@@ -38,11 +38,11 @@ def maintenance(
     if text is None and (starts or until):
         raise typer.BadParameter("--starts and --until belong to a text")
     begin, end = _parse_time(starts, "--starts"), _parse_time(until, "--until")
-    with opened_store() as store:
+    with open_store() as store:
         if clear:
-            clear_banner(store, actor=current_actor())
+            clear_banner(store, actor=get_current_actor())
         elif text is not None:
-            set_banner(store, text, starts=begin, until=end, actor=current_actor())
+            set_banner(store, text, starts=begin, until=end, actor=get_current_actor())
         banner = read_banner(store)
     print_values(vars(banner) if banner else {"text": None}, json_)
 

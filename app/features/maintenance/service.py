@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from urllib.parse import urlsplit
 
 from app.config import Settings, is_local
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
@@ -39,7 +39,7 @@ def read_banner(store: Store) -> Banner | None:
     """The notice that is or will be shown; None: there is none, or its time is over."""
     with store.read() as session:
         found = read_team_setting(session, _BANNER)
-    banner = None if found is None else Banner(**parse(found))
+    banner = None if found is None else Banner(**parse_json_column(found))
     return None if banner is None or (banner.until or "~") <= now() else banner
 
 

@@ -15,7 +15,7 @@ import structlog
 from app.config import Settings
 from app.db.home import delete_leftovers
 from app.db.idempotency import delete_old_responses, shorten_responses
-from app.db.log import newest_entry
+from app.db.log import find_newest_entry_id
 from app.db.recovery.anchor import sync_anchor
 from app.db.recovery.preopen_check import log_file
 from app.db.session import text_of
@@ -204,7 +204,7 @@ def read_home(store: Store) -> HomeReport:
     """
     with store.read() as session:
         groups, unsolved, oldest = count_unsolved(session)
-        entries, jobs = newest_entry(session), count_jobs(session)
+        entries, jobs = find_newest_entry_id(session), count_jobs(session)
     settings = store.settings
     free = shutil.disk_usage(settings.home).free
     return HomeReport(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.options import Dataset, Json, Size, Workers, current_actor
-from app.terminal.server import opened_store, opened_to_solve
+from app.terminal.options import Dataset, Json, Size, Workers, get_current_actor
+from app.terminal.server import open_store, open_store_to_solve
 from app.terminal.terminal import print_json, print_rows, print_values, say
 from app.wording import plural
 
@@ -92,14 +92,14 @@ def _estimate_pitches_of_dataset(
         estimate_pitches,
     )
 
-    with opened_to_solve("Estimating", workers) as (store, executor, progress):
+    with open_store_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
         wanted = choose_requested_sizes(found, match, accept=accept, size=size)
         if not wanted:
             return found
         with store.write() as session:
             return change_pitches(
-                session, dataset, wanted, if_match=found.etag, actor=current_actor()
+                session, dataset, wanted, if_match=found.etag, actor=get_current_actor()
             )
 
 
@@ -195,14 +195,14 @@ def _pictures_of_dataset(
         estimate_pictures,
     )
 
-    with opened_to_solve("Estimating", workers) as (store, executor, progress):
+    with open_store_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pictures(store, dataset, executor, progress)
         chosen = need_match(found, match, dataset)
         wanted = choose_requested_pictures(chosen, accept=accept, as_taken=as_taken)
         changed = 0
         if wanted:
             with store.write() as session:
-                changed = change_pictures(session, dataset, wanted, actor=current_actor())
+                changed = change_pictures(session, dataset, wanted, actor=get_current_actor())
     if json_:
         print_json([{**_picture_values(item), "changed": item.match in wanted} for item in chosen])
         return
@@ -269,15 +269,20 @@ def positions(
         raise typer.BadParameter("--undo needs --match")
     if share:
         chosen = None if match is None else [match]
-        with opened_to_solve("Estimating", workers) as (store, executor, progress):
+        with open_store_to_solve("Estimating", workers) as (store, executor, progress):
             found = share_positions(
-                store, dataset, chosen, actor=current_actor(), executor=executor, progress=progress
+                store,
+                dataset,
+                chosen,
+                actor=get_current_actor(),
+                executor=executor,
+                progress=progress,
             )
     else:
-        with opened_store() as store:
+        with open_store() as store:
             if undo:
                 with store.write() as session:
-                    take_back_positions(session, dataset, match, actor=current_actor())
+                    take_back_positions(session, dataset, match, actor=get_current_actor())
             found = get_positions(store, dataset)
     print_sentences(filter_by_match(found.items, match), json_)
 
@@ -303,12 +308,12 @@ def noise(
 
     if apply and alike:
         raise typer.BadParameter("--apply and --alike contradict each other")
-    with opened_store() as store:
+    with open_store() as store:
         if alike:
             with store.write() as session:
-                take_noise_back(session, dataset, actor=current_actor())
+                take_noise_back(session, dataset, actor=get_current_actor())
         found = read_noise(store, dataset)
-        policy = apply_noise(store, found, actor=current_actor()).policy if apply else None
+        policy = apply_noise(store, found, actor=get_current_actor()).policy if apply else None
     if json_:
         applied = None if policy is None else {"name": policy.name, "hash": policy.hash}
         advice = [{**asdict(item), "agrees": item.agrees} for item in found.advice]
@@ -386,13 +391,15 @@ def rig(
 
     if undo and accept is not None:
         raise typer.BadParameter("accept a rig or take it back, one at a time")
-    with opened_store() as store:
+    with open_store() as store:
         if undo:
-            print_values({"taken_back": take_back(store, dataset, actor=current_actor())}, json_)
+            print_values(
+                {"taken_back": take_back(store, dataset, actor=get_current_actor())}, json_
+            )
             return
         proposed = propose_adjustment(store, dataset, lines)
         if accept is not None:
-            accept_rig(store, proposed, accept.value, actor=current_actor())
+            accept_rig(store, proposed, accept.value, actor=get_current_actor())
     values = {**rig_proposal_to_json(proposed), "accepted": accept and accept.value}
     if json_:
         print_json(values)

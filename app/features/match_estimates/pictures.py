@@ -26,7 +26,7 @@ from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 
 _BATCH = 100
 
@@ -111,7 +111,7 @@ def estimate_pictures(
         matches = [match for match in names if only is None or match in only]
     tasks = (_make_task(store, found.id, match, found.policy.calibration) for match in matches)
     states = []
-    for state in fan_out(_estimate_match, tasks, executor):
+    for state in run_tasks(_estimate_match, tasks, executor):
         states.append(state)
         if progress is not None:
             progress(len(states), len(matches))

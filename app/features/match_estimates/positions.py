@@ -39,7 +39,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, compute_calibration_key
 from app.solving.match_position import FramePlace, Places, find_camera_place, find_pan
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 
 _BATCH = 100
 _DIGITS = 4
@@ -144,7 +144,7 @@ def share_positions(
     with store.read() as session:
         chosen = _matches_with_inputs(session, found, matches)
     tasks = (_make_task(store, item, policy) for item in chosen)
-    for done, (task, positions) in enumerate(fan_out(_estimate_match, tasks, executor), start=1):
+    for done, (task, positions) in enumerate(run_tasks(_estimate_match, tasks, executor), start=1):
         edits = {group: SetPositions(at) for group, at in positions.items()}
         with store.write() as session:
             if require_wanted is not None:

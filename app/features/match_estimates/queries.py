@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import func, select, update
 
-from app.db.json_columns import Json, as_written, parse
+from app.db.json_columns import Json, parse_json_column, report_damaged_values
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.codec import digest, picture_from_json, positions_from_json
 from app.soccer.group import SharedPosition
 from app.soccer.picture import PictureGeometry
@@ -50,13 +50,13 @@ def factors_from_text(text: str | None) -> Factors:
     """The factors that a dataset's row holds."""
     if text is None:
         return ()
-    with as_written():
-        return tuple(Factor(*row) for row in parse(text))
+    with report_damaged_values():
+        return tuple(Factor(*row) for row in parse_json_column(text))
 
 
 def write_factors(session: Session, dataset_id: int, factors: Factors) -> None:
     """Accept factors for a dataset; its groups are the caller's to change."""
-    text = canonical(factors_to_json(factors)) if factors else None
+    text = canonical_json_text(factors_to_json(factors)) if factors else None
     mine = DatasetModel.id == dataset_id
     session.execute(update(DatasetModel).where(mine).values(noise=text))
 
@@ -122,8 +122,8 @@ def match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
 def _picture_from_text(text: str | None) -> PictureGeometry | None:
     if text is None:
         return None
-    with as_written():
-        return picture_from_json(parse(text))
+    with report_damaged_values():
+        return picture_from_json(parse_json_column(text))
 
 
 POSITION = "position"
@@ -184,8 +184,8 @@ def match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
 
 def read_positions(text: str) -> Mapping[str, SharedPosition]:
     """The positions of a group from their column."""
-    with as_written():
-        return positions_from_json(parse(text))
+    with report_damaged_values():
+        return positions_from_json(parse_json_column(text))
 
 
 def read_position_inputs(

@@ -12,8 +12,8 @@ import typer
 
 from app.features.match_estimates.commands import print_sentences
 from app.soccer.choices import ProposalOutcome
-from app.terminal.options import Json, Workers, current_actor, parse_size, read_settings
-from app.terminal.server import opened_store
+from app.terminal.options import Json, Workers, get_current_actor, parse_size, read_settings
+from app.terminal.server import open_store
 from app.terminal.terminal import print_json, print_values, say, show_progress
 from app.wording import plural
 
@@ -66,10 +66,10 @@ def paint(
 
     if show and undo:
         raise typer.BadParameter("show what was read or take it back, one at a time")
-    with opened_store() as store:
+    with open_store() as store:
         if undo:
             with store.write() as session:
-                take_back_paint(session, dataset, actor=current_actor())
+                take_back_paint(session, dataset, actor=get_current_actor())
         if undo or show:
             found = get_paint(store, dataset)
         else:
@@ -78,7 +78,7 @@ def paint(
                     store,
                     dataset,
                     None if match is None else [match],
-                    actor=current_actor(),
+                    actor=get_current_actor(),
                     workers=workers,
                     progress=progress,
                 )
@@ -207,7 +207,7 @@ def _propose_for_views(
     from app.features.paint.proposals import forget_proposals, get_proposals, propose_views
 
     matches = None if match is None else [match]
-    with opened_store() as store:
+    with open_store() as store:
         if undo:
             if match is not None:
                 raise typer.BadParameter("all of a dataset is forgotten, or nothing")

@@ -13,14 +13,14 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
 from sqlalchemy.orm import aliased
 
-from app.db.dialects.dialect import insert, items_of, numbers_in
-from app.db.json_columns import as_written, parse
+from app.db.dialects.dialect import insert, select_json_array_items, select_numbers
+from app.db.json_columns import parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.paint.queries import ProposalModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import SolutionModel, is_current, list_undetermined_calibrations
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.annotation import Lines
 from app.soccer.codec import lines_from_json, lines_to_json
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
@@ -114,7 +114,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     )
     alone = or_(StationModel.shared.is_(False), ViewModel.id.in_(first))
     bare = and_(_has_no_lines_or_camera(), ViewModel.media_path.is_not(None), alone)
-    return or_(bare, ViewModel.id.in_(numbers_in(sorted(lost))))
+    return or_(bare, ViewModel.id.in_(select_numbers(sorted(lost))))
 
 
 def list_views_without_camera_from_lines(
@@ -124,7 +124,7 @@ def list_views_without_camera_from_lines(
 
     Of a static camera the first one. Groups that wait to be solved have none.
     """
-    named = items_of(SolutionModel.calibrations)
+    named = select_json_array_items(SolutionModel.calibrations)
     statement = (
         select(ViewModel.id, ViewModel.station_id, named.c.value.label("calibration"))
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
@@ -249,7 +249,7 @@ def save_proposals(session: Session, proposals: Sequence[Proposal]) -> None:
     ids = select(ViewModel.id).where(ViewModel.id.in_([item.view_id for item in proposals]))
     present = set(session.scalars(ids))
     rows = [
-        {**asdict(item), "lines": canonical(lines_to_json(item.lines))}
+        {**asdict(item), "lines": canonical_json_text(lines_to_json(item.lines))}
         for item in proposals
         if item.view_id in present
     ]
@@ -274,5 +274,5 @@ def delete_proposals(session: Session, dataset_id: int) -> int:
 
 def _proposal_from_row(row: Any) -> Proposal:
     values = {item.name: getattr(row, item.name) for item in fields(Proposal)}
-    with as_written():
-        return Proposal(**{**values, "lines": lines_from_json(parse(row.lines))})
+    with report_damaged_values():
+        return Proposal(**{**values, "lines": lines_from_json(parse_json_column(row.lines))})

@@ -11,8 +11,8 @@ from sqlalchemy import BindParameter, ForeignKey, Index, Table, bindparam, func,
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.dialect import any_of, insert, values_of
-from app.db.json_columns import as_written, decompress, parse
+from app.db.dialects.dialect import any_of, insert, select_json_object_values
+from app.db.json_columns import decompress, parse_json_column, report_damaged_values
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, PaintEvidenceModel, StationModel, ViewModel
@@ -95,7 +95,7 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
 
 @lru_cache(maxsize=64)
 def reading_from_row(digest: str, body: bytes) -> PaintReading:
-    with as_written():
+    with report_damaged_values():
         reading = reading_from_text(decompress(body).decode())
         if reading.digest != digest:
             raise ValueError(f"the paint measurement stored under {digest} has another digest")
@@ -106,8 +106,8 @@ def read_paint_digests(text: str | None) -> dict[str, str]:
     """Digest of what was read by view, from the column of a group."""
     if text is None:
         return {}
-    with as_written():
-        return dict(parse(text))
+    with report_damaged_values():
+        return dict(parse_json_column(text))
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
 def _readings_by_reason(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
     """How many readings each match has by their reason; nothing of them is decoded."""
     group = GroupModel
-    named = values_of(group.paint)
+    named = select_json_object_values(group.paint)
     statement = (
         select(group.match, _EVIDENCE.c.reason, func.count())
         .select_from(group)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.options import Json, current_actor, read_settings
-from app.terminal.server import opened_store
+from app.terminal.options import Json, get_current_actor, read_settings
+from app.terminal.server import open_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def add(
     from app.features.people.invitations import invite_one
 
     wanted, post = _parse_role(role), _make_mailer()
-    with opened_store() as store:
-        _, row = invite_one(store, name, wanted, email, post, actor=current_actor())
+    with open_store() as store:
+        _, row = invite_one(store, name, wanted, email, post, actor=get_current_actor())
     _print_link(row, json_)
 
 
@@ -68,8 +68,8 @@ def invite_many(
     from app.features.people.invitations import read_list
 
     rows, post = read_list(file.read()), _make_mailer()
-    with opened_store() as store:
-        report = invite(store, rows, post, actor=current_actor(), dry_run=dry_run)
+    with open_store() as store:
+        report = invite(store, rows, post, actor=get_current_actor(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)
     if json_:
         print_json([vars(row) for row in report])
@@ -97,7 +97,7 @@ def list_(json_: Json = False) -> None:
     """List everybody with an account."""
     from app.features.people.service import list_people
 
-    with opened_store() as store:
+    with open_store() as store:
         found = [_person_values(person) for person in list_people(store)]
     if json_:
         print_json(found)
@@ -156,8 +156,8 @@ def adopt(name: Name, json_: Json = False) -> None:
     from app.features.audit.service import assign_local_work as give
     from app.features.people.service import find_person
 
-    with opened_store() as store:
-        found = give(store, find_person(store, name).id, actor=current_actor())
+    with open_store() as store:
+        found = give(store, find_person(store, name).id, actor=get_current_actor())
     print_values({"name": found, "shown as theirs": "what was done until now as local"}, json_)
 
 
@@ -176,11 +176,11 @@ def reset(
     from app.features.people.service import find_person
 
     post = _make_mailer()
-    with opened_store() as store:
+    with open_store() as store:
         found = find_person(store, name)
         if second_factor:
-            SecondFactors(store).clear(found.id, actor=current_actor())
-        _, row = renew_one(store, found.id, email, post, actor=current_actor())
+            SecondFactors(store).clear(found.id, actor=get_current_actor())
+        _, row = renew_one(store, found.id, email, post, actor=get_current_actor())
     _print_link(row, json_)
 
 
@@ -190,9 +190,9 @@ def unlink(name: Name, json_: Json = False) -> None:
     from app.features.people.service import find_person
     from app.features.people.sign_on_rules import unlink_person
 
-    with opened_store() as store:
+    with open_store() as store:
         found = find_person(store, name)
-        unlink_person(store, found.id, actor=current_actor())
+        unlink_person(store, found.id, actor=get_current_actor())
         person = find_person(store, name)
     print_values(_person_values(person), json_)
 
@@ -200,9 +200,9 @@ def unlink(name: Name, json_: Json = False) -> None:
 def _give_role(name: str, dataset: str, role: Role | None, json_: bool) -> None:
     from app.features.people.service import find_person, give_role
 
-    with opened_store() as store:
+    with open_store() as store:
         found = find_person(store, name)
-        one = give_role(store, dataset, found.id, role, actor=current_actor())
+        one = give_role(store, dataset, found.id, role, actor=get_current_actor())
     print_values({"name": one.name, "dataset": dataset, "role": str(one.role)}, json_)
 
 
@@ -220,8 +220,8 @@ def require_second_factor(
     """Let everybody need a second factor: whoever has none makes one before anything else."""
     from app.features.people.second_factor import SecondFactors
 
-    with opened_store() as store:
-        SecondFactors(store).require(switch is Switch.ON, actor=current_actor())
+    with open_store() as store:
+        SecondFactors(store).require(switch is Switch.ON, actor=get_current_actor())
     print_values({"second_factor_required": switch is Switch.ON}, json_)
 
 
@@ -237,13 +237,13 @@ def tokens(
     from app.features.people.access_tokens import AccessTokens
     from app.features.people.service import find_person
 
-    with opened_store() as store:
+    with open_store() as store:
         access_tokens = AccessTokens(store)
         person = None if name is None else find_person(store, name).id
         found = (
             access_tokens.of_person(person)
             if end is None
-            else [access_tokens.end(end, person, actor=current_actor())]
+            else [access_tokens.end(end, person, actor=get_current_actor())]
         )
     _print_tokens(found, json_, ended=end is not None)
 
@@ -264,9 +264,9 @@ def _print_tokens(found: list[AccessToken], json_: bool, *, ended: bool) -> None
 def _change_person(name: str, json_: bool, **change: Any) -> None:
     from app.features.people.service import change_person, find_person
 
-    with opened_store() as store:
+    with open_store() as store:
         found = find_person(store, name)
-        person = change_person(store, found.id, actor=current_actor(), **change)
+        person = change_person(store, found.id, actor=get_current_actor(), **change)
     print_values(_person_values(person), json_)
 
 

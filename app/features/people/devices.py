@@ -19,7 +19,7 @@ from typing import Protocol
 import pyotp
 from cryptography.fernet import Fernet
 
-from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
+from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, get_installation_key
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.features.people.links import hash_token
@@ -76,7 +76,7 @@ class Devices:
         return hashlib.sha256(_folded_name(name)).hexdigest()[:12]
 
     def _signature(self, name: str, issued: str, nonce: str) -> str:
-        key = installation_key(self._store.settings, DEVICES)
+        key = get_installation_key(self._store.settings, DEVICES)
         with self._store.read_one() as session:
             person = find_person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
@@ -200,7 +200,7 @@ class StoredPending:
         return hash_token(f"{self._kind}/{asker}")
 
     def _encryption_key(self) -> Fernet:
-        return Fernet(urlsafe_b64encode(installation_key(self._store.settings, BEGUN)))
+        return Fernet(urlsafe_b64encode(get_installation_key(self._store.settings, BEGUN)))
 
 
 def make_pending_actions(store: Store, clock: Clock, lasts: timedelta, kind: str) -> PendingActions:
@@ -266,7 +266,7 @@ def make_totp(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
     """The secret of a person, of what the database and of what the home alone knows."""
     text = f"{person_id} {salt}".encode()
     digest = hmac.new(
-        installation_key(store.settings, SECOND_FACTOR), text, hashlib.sha256
+        get_installation_key(store.settings, SECOND_FACTOR), text, hashlib.sha256
     ).digest()
     return pyotp.TOTP(base64.b32encode(digest[:20]).decode(), interval=SECONDS)
 

@@ -17,7 +17,7 @@ from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role, normalize_user_name, require_no_token
 from app.features.people.service import Person, insert_invited, invite, renew_link
 from app.json_text import Moment, quoted
-from app.mail import Letter, MailServer, checked_address
+from app.mail import Letter, MailServer, parse_mail_address
 
 MOST = 500
 """People in one list."""
@@ -115,7 +115,7 @@ def invite_one(
         InputError: The name or the address cannot be one.
         ConflictError: The name is taken.
     """
-    address = checked_address(email, pointer="/email") if email else None
+    address = parse_mail_address(email, pointer="/email") if email else None
     person, link = invite(store, name, role, actor=actor)
     row = Invitation(1, person.name, person.role, "invited", expires=link.expires)
     return person, post.hand_over([(row, link, address)], actor)[0]
@@ -132,7 +132,7 @@ def renew_one(
         InputError: The address cannot be one.
         ConflictError: They are disabled.
     """
-    address = checked_address(email, pointer="/email") if email else None
+    address = parse_mail_address(email, pointer="/email") if email else None
     person, link = renew_link(store, person_id, actor=actor)
     state: Literal["reset", "invited"] = "reset" if person.joined else "invited"
     row = Invitation(1, person.name, person.role, state, expires=link.expires)
@@ -242,7 +242,7 @@ def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, 
         known = ", ".join(Role)
         problem = f"{quoted(one.role)} is not a role" if one.role.strip() else "the role is missing"
         raise InputError(f"{problem}; the roles are {known}") from None
-    return name, role, checked_address(one.email) if one.email else None
+    return name, role, parse_mail_address(one.email) if one.email else None
 
 
 def _refused_invitation(one: InvitationRow, problem: str) -> Invitation:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.errors import ForbiddenError, InputError
 from app.features.people.visibility_queries import COPIES
@@ -232,4 +232,4 @@ def log_account_event(
     body = {"person": name, "did": did, "role": str(role), **more}
     dataset = more.get("dataset_id")
     where = dataset if isinstance(dataset, int) else None
-    append(session, [Entry(PERSON, actor, now(), body, where)])
+    append_entries(session, [Entry(PERSON, actor, now(), body, where)])

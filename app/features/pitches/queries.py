@@ -10,7 +10,7 @@ from sqlalchemy import ForeignKey, delete, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import insert_or_replace
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
@@ -121,8 +121,8 @@ def read_lines_of_match(
 
 def _lines_as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
     """What a camera's lines are without what was done to its picture; None where nobody knows that."""
-    lines, size = lines_from_json(parse(row.lines)), ImageSize(row.width, row.height)
-    picture = None if row.picture is None else picture_from_json(parse(row.picture))
+    lines, size = lines_from_json(parse_json_column(row.lines)), ImageSize(row.width, row.height)
+    picture = None if row.picture is None else picture_from_json(parse_json_column(row.picture))
     if picture is None:
         return lines, size
     return (picture.lines_as_taken(lines, size), size) if picture.is_known else None

@@ -40,7 +40,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def estimate_pitches(
         stale = _stale_matches_with_inputs(session, found.id, policy)
     tasks = (_make_task(store, found.id, match, inputs, policy) for match, inputs in stale)
     for done, (match, values) in enumerate(
-        fan_out(_estimate_match, tasks, executor, stop), start=1
+        run_tasks(_estimate_match, tasks, executor, stop), start=1
     ):
         with store.write() as session:
             save_estimate(session, found.id, match, **values)

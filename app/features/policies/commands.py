@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.options import POLICY_OR_FILE, Dataset, Json, current_actor, read_text
-from app.terminal.server import connect_to_server, current_server, opened_store
+from app.terminal.options import POLICY_OR_FILE, Dataset, Json, get_current_actor, read_text
+from app.terminal.server import connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -26,12 +26,12 @@ def show(
     json_: Json = False,
 ) -> None:
     """Print the policy of a dataset as YAML, ready for `policy set`."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
         with connect_to_server(server) as client:
-            text, values = remote.policy_values(client, dataset)
+            text, values = remote.fetch_policy(client, dataset)
     else:
         text, values = _read_local_policy(dataset)
     if file is not None:
@@ -58,16 +58,16 @@ def set_(
     from app.features.solutions.service import list_stale_groups
 
     chosen = read_policy_option(policy)
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
         with connect_to_server(server) as client:
             job = remote.set_policy(client, dataset, chosen)
-        print_values(remote.policy_change(job), json_)
+        print_values(remote.describe_policy_change(job), json_)
         return
-    with opened_store() as store:
-        state = change_policy(store, dataset, chosen, if_match=None, actor=current_actor())
+    with open_store() as store:
+        state = change_policy(store, dataset, chosen, if_match=None, actor=get_current_actor())
         stale = len(list_stale_groups(store, state.dataset_id))
     values = {
         **_policy_header(state.dataset, state.policy),
@@ -81,7 +81,7 @@ def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset in a home, as YAML and as values."""
     from app.features.policies.service import policy_to_values, policy_to_yaml, read_policy
 
-    with opened_store() as store:
+    with open_store() as store:
         state = read_policy(store, dataset)
     history = [
         {"version": item.version, "name": item.policy.name, "hash": item.policy.hash}

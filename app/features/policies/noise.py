@@ -12,7 +12,7 @@ from threading import Lock
 
 import numpy as np
 
-from app.db.log import newest_entry
+from app.db.log import find_newest_entry_id
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
@@ -401,7 +401,7 @@ class NoiseStore:
         """
         # The mark is older than what is read: at worst a new answer is computed once too often.
         with self._store.read() as session:
-            entry, solution = newest_entry(session), find_newest_solution_id(session)
+            entry, solution = find_newest_entry_id(session), find_newest_solution_id(session)
         state = read_policy(self._store, dataset)
         mark = entry, solution, state.policy.hash, state.dataset
         with self._lock:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import select, text
 
-from app.db.json_columns import unpack
+from app.db.json_columns import decompress_json
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.people.visibility_queries import shown_actor_column
@@ -40,7 +40,9 @@ def read_policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersio
         .order_by(LogModel.id)
     )
     return tuple(
-        PolicyVersion(number, row.at, row.actor, policy_from_json(unpack(row.body)["policy"]))
+        PolicyVersion(
+            number, row.at, row.actor, policy_from_json(decompress_json(row.body)["policy"])
+        )
         for number, row in enumerate(session.execute(statement), 1)
     )
 

@@ -14,7 +14,7 @@ from app.features.policies.service import (
     policy_to_yaml,
 )
 from app.http.documents import Document, ListDocument
-from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
+from app.soccer.policy import Asks, CalibrationPolicy, Policy, list_thresholds
 
 
 class _PolicyIdentity(Document):
@@ -24,7 +24,7 @@ class _PolicyIdentity(Document):
 
 
 _thresholds: dict[str, Any] = {
-    item.name: (item.hint, Field(description=item.text)) for item in thresholds_of(Policy)
+    item.name: (item.hint, Field(description=item.text)) for item in list_thresholds(Policy)
 }
 _PolicyFields: Any = create_model("_PolicyFields", __base__=_PolicyIdentity, **_thresholds)
 

@@ -10,8 +10,8 @@ import typer
 
 from app.durable import keep_private
 from app.sample import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
-from app.terminal.options import Json, Workers, current_actor, read_settings
-from app.terminal.server import opened_store
+from app.terminal.options import Json, Workers, get_current_actor, read_settings
+from app.terminal.server import open_store
 from app.terminal.terminal import print_values, show_progress
 
 commands = typer.Typer()
@@ -37,7 +37,7 @@ def sample(
 ) -> None:
     """Write a synthetic dataset with known truth in SoccerNet-v3 layout."""
     from app.features.practice.service import SAMPLE, make_sample_dataset
-    from app.workers.executors import executor_of
+    from app.workers.executors import open_executor
 
     if out is None and dataset is None:
         raise typer.BadParameter("name a folder to write to, or a dataset to fill")
@@ -53,10 +53,17 @@ def sample(
     if out is None:
         keep_private()
     settings = read_settings()
-    folder, pool = out or settings.home / SAMPLE, partial(executor_of, settings, workers)
-    with opened_store(settings) as store, show_progress("Making the sample") as progress:
+    folder, pool = out or settings.home / SAMPLE, partial(open_executor, settings, workers)
+    with open_store(settings) as store, show_progress("Making the sample") as progress:
         made = make_sample_dataset(
-            store, dataset, folder, order, pool, progress, workers=workers, actor=current_actor()
+            store,
+            dataset,
+            folder,
+            order,
+            pool,
+            progress,
+            workers=workers,
+            actor=get_current_actor(),
         )
     written = vars(made.written) if made.written else {}
     values = {"dataset": made.dataset, "groups": made.groups, "solved": made.solved}
@@ -92,6 +99,8 @@ def practice(
 
     keep_private()
     settings = read_settings()
-    with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
-        made = make_practice_dataset(store, settings, progress, again=again, actor=current_actor())
+    with open_store(settings) as store, show_progress("Making the practice groups") as progress:
+        made = make_practice_dataset(
+            store, settings, progress, again=again, actor=get_current_actor()
+        )
     print_values(made, json_)

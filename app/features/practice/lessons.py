@@ -21,7 +21,7 @@ from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample.faults import FaultPlan
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import (
     TRUTH,
     PlantedFault,
@@ -33,7 +33,7 @@ from app.sample.scene import (
 )
 from app.sample.scenes import MatchStage, make_scene, make_stage
 from app.sample.write import JPEG_QUALITY, ZIP_DATE
-from app.soccer.group import Group, View, view_letter
+from app.soccer.group import Group, View, make_view_letter
 
 SEED = 20_260_808
 MATCH_GROUPS = 800
@@ -119,7 +119,7 @@ def _write_frames(archive: Path, scenes: list[Scene], progress: ReportProgress |
     with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as members:
         for done, (scene, key) in enumerate(frames, start=1):
             quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
-            _, content = cv2.imencode(".jpg", render(scene, key), quality)
+            _, content = cv2.imencode(".jpg", render_view(scene, key), quality)
             members.writestr(zipfile.ZipInfo(key, ZIP_DATE), content.tobytes())
             if progress is not None:
                 progress(done, len(frames))
@@ -268,7 +268,7 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
     if _is_corrected(truth, group):
         return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
     if _views_turned(truth, group):
-        letter = view_letter(_view_index(group, _views_turned(truth, group)[0]))
+        letter = make_view_letter(_view_index(group, _views_turned(truth, group)[0]))
         return Feedback(
             OPEN,
             f"Look again: view {letter} was labelled correctly, and now its sides are swapped. "
@@ -340,7 +340,7 @@ def _fault_values(faults: Sequence[PlantedFault], group: Group) -> dict[str, obj
         return {}
     first = faults[0]
     return {
-        "view": view_letter(_view_index(group, first.view)),
+        "view": make_view_letter(_view_index(group, first.view)),
         "marking": first.marking,
         "true_marking": first.true_marking,
         "amount": first.amount or 0.0,

@@ -11,7 +11,7 @@ from typing import Any
 
 from app.config import Settings
 from app.db.json_columns import Json
-from app.db.locks import practice_lock
+from app.db.locks import hold_practice_lock
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
@@ -35,7 +35,7 @@ from app.features.recordings.index import Send, in_worker, index_now
 from app.features.recordings.links import list_links
 from app.features.recordings.service import Recording, add_recording, list_recordings
 from app.features.recordings.shots import Shot, get_shots, put_shots
-from app.progress import ReportProgress, partial_progress
+from app.progress import ReportProgress, make_partial_progress
 from app.sample import SEED
 from app.soccer.policy import TOUCHLINE
 
@@ -108,20 +108,20 @@ def make_recording_practice(
     """
     settings, name = store.settings, make_recording_practice_name(person)
     film = settings.home / FILM
-    with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
+    with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
         require_own_recording(store, person)
         there = _find_recording(store, person)
         if there is not None and not again and _read_truth(settings) and there.problem is None:
             return {"dataset": name, "recording": there.id, "made": False}
         if _read_truth(settings) is None or not film.is_file():
             film.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            drawing = partial_progress(progress, "Drawing the film.")
+            drawing = make_partial_progress(progress, "Drawing the film.")
             in_worker(film, draw_film, PARTS, progress=drawing, stop=stop)
         if there is not None:
             delete_dataset(store, name, confirm=name, actor=actor)
         _open_dataset(store, person, actor)
         recording = add_recording(store, name, film.absolute(), actor=actor)
-        reading = partial_progress(progress, "Finding its shots.")
+        reading = make_partial_progress(progress, "Finding its shots.")
         recording = index_now(store, recording.id, progress=reading, stop=stop)
         truth = _read_truth(settings)
         assert truth is not None
@@ -155,7 +155,7 @@ def _plant_faults(
     """Track live shot and replay, and put faults into shots and cameras."""
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
     for shot, what in ((live, "the live shot"), (replay, "the replay")):
-        telling = partial_progress(progress, f"Following the camera of {what}.")
+        telling = make_partial_progress(progress, f"Following the camera of {what}.")
         track_now(
             store, recording.id, shot.first, shot.last, actor=actor, progress=telling, stop=stop
         )

@@ -10,7 +10,7 @@ from typing import Any
 
 from app.config import Settings
 from app.db.json_columns import Json
-from app.db.locks import practice_lock
+from app.db.locks import hold_practice_lock
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import find_dataset
@@ -35,7 +35,7 @@ from app.features.practice.lessons import (
 from app.features.practice.recording import recording_practice_work, require_own_recording
 from app.features.solutions.service import solve_dataset
 from app.formats.soccernet_v3 import ARCHIVE
-from app.progress import ReportProgress, partial_progress
+from app.progress import ReportProgress, make_partial_progress
 from app.sample import SampleOrder
 from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.sample.write import SampleReport, write_sample
@@ -169,7 +169,7 @@ def make_practice_dataset(
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
     """
-    with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
+    with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
         name = make_practice_name(person)
         _require_own(store, settings, person)
         ids = _group_ids(store, name)
@@ -190,7 +190,7 @@ def _make_lessons(
     """Ids of the lessons, once they are drawn, imported and solved."""
     folder, name = settings.home / DATASET, make_practice_name(person)
     if not _is_drawn(settings):
-        write_practice(folder, partial_progress(progress, "Drawing the pictures."))
+        write_practice(folder, make_partial_progress(progress, "Drawing the pictures."))
     if again:
         afresh = PAPER if person is None else None
         delete_dataset(store, name, confirm=name, actor=actor, afresh=afresh)
@@ -199,7 +199,7 @@ def _make_lessons(
     progress(0, 1, "Reading the groups.")
     source = ImportSource("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, name, source, settings, None, actor=actor)
-    solve_dataset(store, name, None, partial_progress(progress, "Solving the groups."))
+    solve_dataset(store, name, None, make_partial_progress(progress, "Solving the groups."))
     return _group_ids(store, name)
 
 
@@ -374,13 +374,13 @@ def make_sample_dataset(
     found = _find_sample_dataset(store, name)
     if found.is_complete:
         return found
-    drawing = partial_progress(progress, "Drawing the pictures.")
+    drawing = make_partial_progress(progress, "Drawing the pictures.")
     written = write_sample(folder, **vars(order), progress=drawing, workers=workers)
     source = ImportSource("soccernet-v3", folder.resolve())
-    reading = partial_progress(progress, "Reading the groups.")
+    reading = make_partial_progress(progress, "Reading the groups.")
     import_source(store, name, source, store.settings, reading, actor=actor)
     with pool() as executor:
-        solve_dataset(store, name, executor, partial_progress(progress, "Solving the groups."))
+        solve_dataset(store, name, executor, make_partial_progress(progress, "Solving the groups."))
     found = _find_sample_dataset(store, name)
     return SampleDataset(found.dataset, found.groups, found.solved, written)
 

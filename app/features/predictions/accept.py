@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from app.db.log import LogEntry, group_entries, single_edits
+from app.db.log import LogEntry, group_entries, iterate_single_edits
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
@@ -419,5 +419,5 @@ def _places_ball(entry: LogEntry, view: str, ball: BallAnnotation) -> bool:
     return any(
         (edit["edit"], edit.get("view")) == ("set_balls", view)
         and ball in [ball_from_json(value) for value in edit["balls"]]
-        for edit in single_edits(entry.body["edit"])
+        for edit in iterate_single_edits(entry.body["edit"])
     )

@@ -12,8 +12,15 @@ import typer
 from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
-from app.terminal.options import Dataset, Json, Workers, current_actor, parse_size, read_settings
-from app.terminal.server import ServerPlace, connect_to_server, current_server, opened_store
+from app.terminal.options import (
+    Dataset,
+    Json,
+    Workers,
+    get_current_actor,
+    parse_size,
+    read_settings,
+)
+from app.terminal.server import ServerPlace, connect_to_server, get_current_server, open_store
 from app.terminal.terminal import (
     print_error,
     print_json,
@@ -125,7 +132,7 @@ def list_(dataset: Dataset, json_: Json = False) -> None:
     """List the sets of predictions of a dataset, newest first."""
     from app.features.predictions.service import list_predictions
 
-    with opened_store() as store:
+    with open_store() as store:
         found = list_predictions(store, dataset)
     print_rows(
         found,
@@ -160,14 +167,16 @@ def accept(
     from app.features.predictions.accept import accept_predicted_balls as run_accept
     from app.features.predictions.service import find_predictions
 
-    with opened_store() as store, show_progress("Accepting") as progress:
+    with open_store() as store, show_progress("Accepting") as progress:
         chosen = find_predictions(store, dataset, predictions)
         request = AcceptRequest(chosen.id, query, None, min_score, replace)
         if dry_run:
             plan = plan_accept(store, dataset, request)
             values = {"views": len(plan.changes), "groups": plan.groups, "refused": plan.refused}
         else:
-            report = run_accept(store, dataset, request, actor=current_actor(), progress=progress)
+            report = run_accept(
+                store, dataset, request, actor=get_current_actor(), progress=progress
+            )
             values = vars(report)
     print_values(values, json_)
 
@@ -241,10 +250,10 @@ def detect(
         place = dataset, recording or "", frames
         _detect_in_recording(place, opened or source, name or source.stem, min_score, json_)
         return
-    with opened_store() as store, show_progress("Detecting") as progress:
+    with open_store() as store, show_progress("Detecting") as progress:
         request = DetectRequest(name or source.stem, query, missing, min_score)
         found = run_detect(
-            store, dataset, opened, request, actor=current_actor(), progress=progress
+            store, dataset, opened, request, actor=get_current_actor(), progress=progress
         )
     if json_:
         print_json(vars(found))
@@ -274,8 +283,8 @@ def _detect_in_recording(
 
     dataset, recording, frames = place
     numbers = None if frames is None else _frames_of(frames)
-    with opened_store() as store, show_progress("Detecting") as progress:
-        found, by = find_recording(store, dataset, recording), current_actor()
+    with open_store() as store, show_progress("Detecting") as progress:
+        found, by = find_recording(store, dataset, recording), get_current_actor()
         if isinstance(source, Path):
             if numbers is not None:
                 raise typer.BadParameter("--frames are those that a --model looks at")
@@ -396,7 +405,7 @@ def evaluate(
         version,
     )
     request.check()
-    server = current_server()
+    server = get_current_server()
     run = _evaluate_here if server is None else partial(_evaluate_at, server)
     with show_progress("Evaluating") as progress:
         values, sets = run(dataset, request, out, progress)
@@ -415,8 +424,10 @@ def _evaluate_here(
     from app.features.predictions.evaluation import evaluation_to_values, write_evaluation
     from app.features.predictions.evaluation_run import evaluate_sources
 
-    with opened_store() as store:
-        done = evaluate_sources(store, dataset, request, actor=current_actor(), progress=progress)
+    with open_store() as store:
+        done = evaluate_sources(
+            store, dataset, request, actor=get_current_actor(), progress=progress
+        )
         if out is not None:
             write_evaluation(store, done.evaluation, out)
     return evaluation_to_values(done.evaluation), [vars(item) for item in done.sets]
@@ -433,7 +444,7 @@ def _evaluate_at(
     from app.terminal import remote
 
     with connect_to_server(server) as client:
-        values, sets = remote.evaluate(client, dataset, request, progress)
+        values, sets = remote.evaluate_on_server(client, dataset, request, progress)
         if out is not None:
             remote.write_evaluation(client, values, out)
     return values, sets

@@ -18,7 +18,7 @@ from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
 from app.formats.manifest import read_software_version
 from app.json_text import quoted
-from app.soccer.ball_boxes import ball_boxes, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, has_ball_3d
 from app.soccer.choices import LiveRule
 from app.soccer.codec import digest, policy_to_json
 from app.soccer.group import Group
@@ -120,7 +120,7 @@ def group_frames(
             match=group.match,
             size=view.size,
             split=(splits or {}).get(view.key, group.split),
-            boxes=ball_boxes(solution, view),
+            boxes=collect_ball_boxes(solution, view),
             absent=view.ball is None and any(ball.out_of_view for ball in view.balls),
             camera=solved.calibration.camera if solved else None,
             point=solution.ball.point if solution.ball and inside else None,

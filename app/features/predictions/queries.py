@@ -9,7 +9,13 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, delete, func, insert, select
 from sqlalchemy.orm import InstrumentedAttribute
 
-from app.db.json_columns import Json, as_written, pack, parse, unpack
+from app.db.json_columns import (
+    Json,
+    compress_json,
+    decompress_json,
+    parse_json_column,
+    report_damaged_values,
+)
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import DatasetModel, ViewModel
@@ -24,7 +30,7 @@ from app.features.predictions.tables import (
     PredictionSetModel,
 )
 from app.geometry.camera import Camera
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.codec import camera_from_json, camera_to_json, digest
 
 _BATCH = 5000
@@ -130,7 +136,7 @@ def insert_prediction_set(
         tracks: By stretch.
     """
     identity = find_next_row_id(session, PredictionSetModel)
-    row = {**values, "id": identity, "report": canonical(values["report"])}
+    row = {**values, "id": identity, "report": canonical_json_text(values["report"])}
     session.execute(insert(PredictionSetModel), [row])
     names = ("x", "y", "width", "height", "score")
     rows = [
@@ -141,13 +147,13 @@ def insert_prediction_set(
     for start in range(0, len(rows), _BATCH):
         session.execute(insert(PredictionModel), rows[start : start + _BATCH])
     seen = [
-        {"set_id": identity, "view_id": view, "camera": canonical(camera_to_json(camera))}
+        {"set_id": identity, "view_id": view, "camera": canonical_json_text(camera_to_json(camera))}
         for view, camera in cameras.items()
     ]
     for start in range(0, len(seen), _BATCH):
         session.execute(insert(PredictedCameraModel), seen[start : start + _BATCH])
     for stretch, track in (tracks or {}).items():
-        body = {"set_id": identity, "stretch": stretch, "body": pack(track.to_json())}
+        body = {"set_id": identity, "stretch": stretch, "body": compress_json(track.to_json())}
         session.execute(insert(PredictedTrackModel), [body])
     return identity
 
@@ -213,16 +219,16 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
     """Every camera of a set, by id of the view."""
     model = PredictedCameraModel
     rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
-    with as_written():
-        return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
+    with report_damaged_values():
+        return {row.view_id: camera_from_json(parse_json_column(row.camera)) for row in rows}
 
 
 def read_predicted_tracks(session: Session, set_id: int) -> dict[str, PredictedTrack]:
     """Every track of a set, by stretch."""
     model = PredictedTrackModel
     rows = session.execute(select(model.stretch, model.body).where(model.set_id == set_id))
-    with as_written():
-        return {row.stretch: PredictedTrack.from_json(unpack(row.body)) for row in rows}
+    with report_damaged_values():
+        return {row.stretch: PredictedTrack.from_json(decompress_json(row.body)) for row in rows}
 
 
 def _read_sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
@@ -232,7 +238,7 @@ def _read_sets(session: Session, where: ColumnElement[bool]) -> list[PredictionS
         .order_by(PredictionSetModel.id.desc())
     )
     return [
-        PredictionSet(**{**row._mapping, "report": parse(row.report)})
+        PredictionSet(**{**row._mapping, "report": parse_json_column(row.report)})
         for row in session.execute(statement)
     ]
 
@@ -276,8 +282,8 @@ def insert_evaluation(
         frames: Dataclasses whose fields are columns of ``EvaluationFrameModel``, in order.
     """
     identity = find_next_row_id(session, EvaluationModel)
-    texts = {name: canonical(values[name]) for name in ("pins", "counts", "tables")}
-    row = {**values, **texts, "id": identity, "figures": pack(dict(figures))}
+    texts = {name: canonical_json_text(values[name]) for name in ("pins", "counts", "tables")}
+    row = {**values, **texts, "id": identity, "figures": compress_json(dict(figures))}
     session.execute(insert(EvaluationModel), [row])
     for start in range(0, len(frames), _FRAME_BATCH):
         rows = [
@@ -313,14 +319,14 @@ def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
     """One figure of a run, or None."""
     statement = select(EvaluationModel.figures).where(EvaluationModel.id == evaluation_id)
     packed = session.execute(statement).scalar_one_or_none()
-    return None if packed is None else unpack(packed).get(name)
+    return None if packed is None else decompress_json(packed).get(name)
 
 
 def _evaluation_from_row(row: Any) -> StoredEvaluation:
     values = {item.name: getattr(row, item.name) for item in fields(StoredEvaluation)}
     for name in ("pins", "counts", "tables"):
-        values[name] = parse(values[name])
-    return StoredEvaluation(**{**values, "figures": tuple(unpack(row.figures))})
+        values[name] = parse_json_column(values[name])
+    return StoredEvaluation(**{**values, "figures": tuple(decompress_json(row.figures))})
 
 
 def is_of_match(match: str) -> FrameCondition:

@@ -38,7 +38,7 @@ from app.features.predictions.reader import PredictionFiles, Read, read_files
 from app.formats.file_tree import Limits
 from app.formats.report import Report
 from app.geometry.camera import Camera
-from app.json_text import canonical, quoted
+from app.json_text import canonical_json_text, quoted
 from app.object_store.path import unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
@@ -272,7 +272,7 @@ def _same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
     """Whether a set has the same boxes and cameras, from the same source with the same report."""
     names = ("digest", "format", "source", "unknown")
     same = all(getattr(known, name) == values[name] for name in names)
-    return same and canonical(known.report) == canonical(values["report"])
+    return same and canonical_json_text(known.report) == canonical_json_text(values["report"])
 
 
 def _free_name(name: str, taken: set[str]) -> str:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from app.db.log import newest_entry
+from app.db.log import find_newest_entry_id
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.queries import read_dataset_names
@@ -71,13 +71,13 @@ class NewChanges:
 def read_position(store: Store) -> int:
     """Id of the log's last entry; 0 for an empty log."""
     with store.read() as session:
-        return newest_entry(session)
+        return find_newest_entry_id(session)
 
 
 def find_newest_entry_and_solution(store: Store) -> tuple[int, int]:
     """Ids of the log's last entry and of the last solution; 0 where there is none."""
     with store.read() as session:
-        return newest_entry(session), find_newest_solution_id(session)
+        return find_newest_entry_id(session), find_newest_solution_id(session)
 
 
 def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
@@ -93,7 +93,7 @@ def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
 def read_news(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
     """What has changed since some entries of the log, and since a solution (None: none is told)."""
     with store.read() as session:
-        entry, newest = newest_entry(session), find_newest_solution_id(session)
+        entry, newest = find_newest_entry_id(session), find_newest_solution_id(session)
         changes = {place: read_changes(session, place) for place in places if place < entry}
         solved: list[LoggedChange] = []
         if solution is not None and newest > solution:
@@ -104,7 +104,7 @@ def read_news(store: Store, places: Collection[int], solution: int | None) -> Ne
 
 def read_changes(session: Session, after: int) -> list[LoggedChange]:
     """What has changed since an entry of the log, each group once, in the order of the log."""
-    newest = newest_entry(session)
+    newest = find_newest_entry_id(session)
     if newest - after > FAR:
         names = read_dataset_names(session)
         return [LoggedChange(newest, key, name, EVERYTHING, None) for key, name in names.items()]

@@ -23,7 +23,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.visitors import iterate
 
-from app.db.dialects.dialect import numbers_in
+from app.db.dialects.dialect import select_numbers
 from app.db.session import Session
 from app.features.agreement.queries import select_groups_in_state
 from app.features.batches.queries import select_groups_in_batches
@@ -101,7 +101,7 @@ def has_all_pictures() -> Condition:
 
 def has_group_id(ids: Iterable[int]) -> Condition:
     """The group's id is one of these."""
-    return QueueModel.group_id.in_(numbers_in(ids))
+    return QueueModel.group_id.in_(select_numbers(ids))
 
 
 def has_open_proposal(outcome: str | None = None) -> Condition:

@@ -335,7 +335,7 @@ class HistogramColumn:
 
     Attributes:
         open_high: The last bin has no upper end.
-        log: Its bins are powers of ten apart (see ``bins.logarithmic_bins``).
+        log: Its bins are powers of ten apart (see ``make_logarithmic_bins``).
     """
 
     edges: tuple[float, ...]

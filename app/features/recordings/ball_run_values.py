@@ -6,7 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from app.db.json_columns import Json, as_written, pack, parse, unpack
+from app.db.json_columns import (
+    Json,
+    compress_json,
+    decompress_json,
+    parse_json_column,
+    report_damaged_values,
+)
 from app.soccer.codec import digest
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
@@ -65,11 +71,11 @@ def run_of_row(row: Any, sha256: str | None) -> StoredRun:
         id=int(row.id),
         dataset_id=int(row.dataset_id),
         recording=int(row.recording_id),
-        run=run_from_json(unpack(row.body)),
-        confirmed=tuple(parse(row.confirmed)),
+        run=run_from_json(decompress_json(row.body)),
+        confirmed=tuple(parse_json_column(row.confirmed)),
         accepted_by=row.accepted_by,
         stale=row.sha256 != sha256,
-        groups=parse(row.groups),
+        groups=parse_json_column(row.groups),
         actor=row.actor,
         created=row.created,
         etag=f'"{digest([row.id, row.revision, row.created])[:16]}"',
@@ -78,7 +84,7 @@ def run_of_row(row: Any, sha256: str | None) -> StoredRun:
 
 def run_columns(run: BallRun) -> dict[str, Any]:
     """The columns of the table that hold a run."""
-    return {"first": run.first, "last": run.last, "body": pack(run_to_json(run))}
+    return {"first": run.first, "last": run.last, "body": compress_json(run_to_json(run))}
 
 
 def run_to_json(run: BallRun) -> Json:
@@ -103,7 +109,7 @@ def run_from_json(value: Mapping[str, Any]) -> BallRun:
     Raises:
         DamagedError: It is not what was written.
     """
-    with as_written():
+    with report_damaged_values():
         rows = zip(
             value["frame"],
             *(value[name] for name in _COLUMNS),

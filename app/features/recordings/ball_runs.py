@@ -30,7 +30,7 @@ from app.features.recordings.queries import (
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.features.recordings.shots import get_shots
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
@@ -148,7 +148,7 @@ def _mend(store: Store, before: StoredRun, new: BallRun, if_match: str, actor: s
         _require_open(before, if_match)
         run = before.run.mended(new)
         kept = [frame for frame in before.confirmed if frame in {ball.frame for ball in run.balls}]
-        values = {**run_columns(run), "confirmed": canonical(kept)}
+        values = {**run_columns(run), "confirmed": canonical_json_text(kept)}
         found = _change(session, before, actor, "ball followed anew", **values)
         session.respond(found)
     return found
@@ -184,7 +184,7 @@ def change_run(
         with store.write() as session, without_response():
             before = _need(session, recording_id, run_id)
             _require_open(before, if_match)
-            text = canonical(_checked(before, change.confirmed))
+            text = canonical_json_text(_checked(before, change.confirmed))
             before = _change(session, before, actor, "ball confirmed", confirmed=text)
     groups: Mapping[str, int] = {}
     if change.accepted is not None:
@@ -201,7 +201,7 @@ def change_run(
         if change.accepted is not None:
             by = actor if change.accepted else None
             did = "ball run accepted" if change.accepted else "ball run taken back"
-            values = {"accepted_by": by, "groups": canonical(groups)}
+            values = {"accepted_by": by, "groups": canonical_json_text(groups)}
             present = _change(session, present, actor, did, **values)
         session.respond(present)
     return present

@@ -37,7 +37,7 @@ from app.features.recordings.queries import (
     insert_cameras,
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
-from app.json_text import canonical, digest_of
+from app.json_text import canonical_json_text, digest_of
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.pitch import Pitch
@@ -348,7 +348,7 @@ def _keep(
         "first": numbers[0],
         "last": numbers[-1],
         "digest": digest,
-        "summary": canonical(vars(summary)),
+        "summary": canonical_json_text(vars(summary)),
     }
 
 

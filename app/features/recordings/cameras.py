@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from app.config import Settings
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -155,8 +155,10 @@ def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
         recording=int(row.recording_id),
         first=row.first,
         last=row.last,
-        summary=CameraSummary(**parse(row.summary)),
-        before=None if row.before_summary is None else CameraSummary(**parse(row.before_summary)),
+        summary=CameraSummary(**parse_json_column(row.summary)),
+        before=None
+        if row.before_summary is None
+        else CameraSummary(**parse_json_column(row.before_summary)),
         revision=row.revision,
         stale=row.sha256 != sha256,
         drawn=tuple(frame for frame in drawn if row.first <= frame <= row.last),

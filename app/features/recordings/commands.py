@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.terminal.options import current_actor
+from app.terminal.options import get_current_actor
 from app.terminal.remote import follow_job, select_values
-from app.terminal.server import connect_to_server, current_server, opened_store
+from app.terminal.server import connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_json, print_values, show_progress
 
 TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", "shots", "sha256")
@@ -16,7 +16,7 @@ TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", 
 
 def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
     """Bring recordings into a dataset, index them and find their shots; print what they are."""
-    server = current_server()
+    server = get_current_server()
     if server is None:
         found = _import_here(paths, dataset)
     else:
@@ -41,9 +41,9 @@ def _import_here(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
 
     files = [require_video(path.resolve()) for path in paths]
     found = []
-    with opened_store() as store, show_progress("Indexing") as progress:
+    with open_store() as store, show_progress("Indexing") as progress:
         for file in files:
-            recording = add_recording(store, dataset, file, actor=current_actor())
+            recording = add_recording(store, dataset, file, actor=get_current_actor())
             indexed = index_now(store, recording.id, progress=progress, stop=lambda: None)
             found.append(vars(indexed))
     return found

@@ -16,7 +16,7 @@ from app.features.recordings.frame_boxes import boxes_in
 from app.features.recordings.index import read_index
 from app.features.recordings.queries import predicted_in, views_of_video
 from app.features.recordings.service import Recording
-from app.media.frames import refused_picture
+from app.media.frames import picture_error_of_ended_process
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowHints
 from app.video.frames import Image, RecordingReader
@@ -75,7 +75,9 @@ class BallFollower:
         sha256 = recording.require_readable()
 
         def explain(error: WorkerEnded) -> Exception:
-            return refused_picture(f"{recording.name} around frame {click.frame}", error)
+            return picture_error_of_ended_process(
+                f"{recording.name} around frame {click.frame}", error
+            )
 
         asked = (recording.path, sha256, click, bounds, hints, self._settings)
         task = self._pool.submit(follow_in_file, *asked, explain=explain)

@@ -19,7 +19,7 @@ from app.features.recordings.index import read_index
 from app.features.recordings.service import Recording
 from app.json_text import digest_of
 from app.media.files import JPEG_QUALITY
-from app.media.frames import refused_picture
+from app.media.frames import picture_error_of_ended_process
 from app.video.frames import Image, RecordingReader
 from app.worker_pool import PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
@@ -65,7 +65,7 @@ class RecordingFrames:
         sha256 = recording.require_readable()
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return refused_picture(f"frame {number} of {recording.name}", error)
+            return picture_error_of_ended_process(f"frame {number} of {recording.name}", error)
 
         asked = (recording.path, sha256, number, width, self._settings)
         return self._pool.submit(read_jpeg, *asked, explain=explain)

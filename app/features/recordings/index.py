@@ -24,12 +24,12 @@ from app.features.recordings.service import (
     recording_of,
 )
 from app.geometry.arrays import FloatArray
-from app.json_text import canonical
-from app.media.frames import refused_picture
+from app.json_text import canonical_json_text
+from app.media.frames import picture_error_of_ended_process
 from app.progress import ReportProgress
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
 from app.video.indexing import index_recording
-from app.video.shots import shots_of_indexed
+from app.video.shots import find_shots_of_indexed
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
 
 LIMITS = WorkerLimits(memory=1536 * 2**20, processor=6 * 3600.0, silence=600.0)
@@ -72,7 +72,7 @@ def index_now(
     with store.write() as session:
         row = need_recording(session, recording_id)
         what: Details
-        found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical(facts)}
+        found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical_json_text(facts)}
         if row.sha256 != facts["sha256"]:
             name = name_of_video(session, row, facts["sha256"])
             if name != row.name:
@@ -80,7 +80,7 @@ def index_now(
                 what = {"recording": recording_id, "name": name, "before": row.name}
                 add_audit_event(session, row.actor, "recording renamed", row.dataset_id, **what)
         if row.sha256 != facts["sha256"] or row.shots == "[]":
-            found |= {"shots": canonical(shots), "revision": row.revision + 1}
+            found |= {"shots": canonical_json_text(shots), "revision": row.revision + 1}
         if row.sha256 != facts["sha256"] and (gone := delete_links(session, recording_id)):
             # Their frames are those of another film.
             what = {"recording": recording_id, "name": row.name, "links": gone}
@@ -107,7 +107,7 @@ def in_worker(
         try:
             found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
         except WorkerEnded as error:
-            raise refused_picture(path.name, error) from error
+            raise picture_error_of_ended_process(path.name, error) from error
     return found
 
 
@@ -138,7 +138,7 @@ def _found_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[str
     def tell(done: int, total: int | None = None, sentence: str = "") -> None:
         send((done, total, sentence))
 
-    found = shots_of_indexed(path, index, tell).shots
+    found = find_shots_of_indexed(path, index, tell).shots
     return [
         {
             "first": one.first,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.formats.csv_text import csv_line
 from app.geometry.arrays import FloatArray
 from app.json_text import digest_of
@@ -247,7 +247,10 @@ def etag_of(row: Any) -> str:
 def link_of(row: Any) -> ShotLink:
     """The link of a row."""
     live, replay = shots_of_link(row)
-    stored, instants = parse(row.map), tuple(Instant(*one) for one in parse(row.instants))
+    stored, instants = (
+        parse_json_column(row.map),
+        tuple(Instant(*one) for one in parse_json_column(row.instants)),
+    )
     # Maps of earlier versions do not say it.
     stored.setdefault("too_close", stored["outcome"] == "offset" and len(instants) > 1)
     parts = {

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -40,7 +40,7 @@ from app.features.recordings.queries import (
 )
 from app.features.recordings.service import need_recording
 from app.geometry.arrays import FloatArray
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.tracking.time_map import map_of_instants
 from app.wording import plural
 
@@ -128,7 +128,7 @@ def add_link(
                 **{f"replay_{name}": value for name, value in zip(_SIDE, replay, strict=True)},
                 instants="[]",
                 assumed_speed=None,
-                map=canonical(asdict(LinkMap("none"))),
+                map=canonical_json_text(asdict(LinkMap("none"))),
             )
             note_link(session, actor, "replay linked", find_link(session, number))
         found = link_of(find_link(session, number))
@@ -155,7 +155,7 @@ def _require_shot(
         raise ConflictError(
             f'"{row.name}" is not indexed yet', hint="Wait for the job that does it."
         )
-    frames = parse(row.facts)["frames"]
+    frames = parse_json_column(row.facts)["frames"]
     if not first <= last < frames:
         raise InputError(
             f'"{row.name}" has {plural(frames, "frame")}, so it has no shot from frame {first}'
@@ -231,7 +231,11 @@ def save_map(
 ) -> bool:
     """Keep the instants of a link and its map; returns whether anything is another."""
     kept = [[*pair, off] for pair, off in zip(pairs, residuals, strict=True)]
-    values = {"instants": canonical(kept), "map": canonical(asdict(made)), **more}
+    values = {
+        "instants": canonical_json_text(kept),
+        "map": canonical_json_text(asdict(made)),
+        **more,
+    }
     if all(getattr(row, name) == value for name, value in values.items()):
         return False
     update_link(session, row.id, **values, revision=row.revision + 1)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from app.db.idempotency import without_response
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -34,7 +34,7 @@ from app.features.recordings.queries import (
     update_recording,
 )
 from app.formats.frame_names import VIDEO_SUFFIXES
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.policy import TOUCHLINE
 
 Details = dict[str, str | int | None]
@@ -177,8 +177,8 @@ def set_clocks(
     """
     with store.write() as session:
         row = need_recording(session, recording_id)
-        found = require_clocks(clocks, parse(row.facts)["frames"] if row.facts else 0)
-        text = canonical([asdict(clock) for clock in found]) if found else None
+        found = require_clocks(clocks, parse_json_column(row.facts)["frames"] if row.facts else 0)
+        text = canonical_json_text([asdict(clock) for clock in found]) if found else None
         if text != row.clocks:
             update_recording(session, recording_id, clocks=text)
             what: Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
@@ -238,7 +238,7 @@ def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
 def recording_of(row: RecordingRow) -> Recording:
     """The recording of a row."""
     path = Path(row.path)
-    facts: Mapping[str, Any] = {} if row.facts is None else parse(row.facts)
+    facts: Mapping[str, Any] = {} if row.facts is None else parse_json_column(row.facts)
     names = ("bytes", "frames", "fps", "variable", "seconds")
     shape = ("width", "height", "rotation", "interlaced", "damaged")
     return Recording(
@@ -250,12 +250,12 @@ def recording_of(row: RecordingRow) -> Recording:
         indexed=row.facts is not None,
         sha256=row.sha256,
         **{name: facts.get(name) for name in (*names, *shape)},
-        shots=len(parse(row.shots)),
+        shots=len(parse_json_column(row.shots)),
         groups=int(row.groups),
         problem=None if row.stamp is None else _problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
-        clocks=tuple(MatchClock(**one) for one in parse(row.clocks or "[]")),
+        clocks=tuple(MatchClock(**one) for one in parse_json_column(row.clocks or "[]")),
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from app.config import Settings
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.service import add_audit_event
@@ -15,7 +15,7 @@ from app.features.recordings.index import frame_seconds, in_worker, shots_of
 from app.features.recordings.queries import RecordingRow, update_recording
 from app.features.recordings.service import Details, Recording, need_recording, recording_of
 from app.formats.csv_text import csv_line
-from app.json_text import canonical, digest_of
+from app.json_text import canonical_json_text, digest_of
 from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
 from app.wording import plural
@@ -115,9 +115,9 @@ def put_shots(
         row = need_recording(session, recording_id)
         if if_match is not None:
             require_etag(_etag(row), if_match, f'the list of shots of "{row.name}"')
-        frames = parse(row.facts)["frames"] if row.facts else 0
+        frames = parse_json_column(row.facts)["frames"] if row.facts else 0
         _require_sound(shots, frames)
-        text = canonical([asdict(shot) for shot in shots])
+        text = canonical_json_text([asdict(shot) for shot in shots])
         if text != row.shots:
             update_recording(session, recording_id, shots=text, revision=row.revision + 1)
             what: Details = {"recording": recording_id, "name": row.name, "shots": len(shots)}
@@ -143,7 +143,7 @@ def _require_sound(shots: Sequence[Shot], frames: int) -> None:
 
 def _shots(settings: Settings, row: RecordingRow) -> RecordingShots:
     recording = recording_of(row)
-    items = tuple(Shot(**shot) for shot in parse(row.shots))
+    items = tuple(Shot(**shot) for shot in parse_json_column(row.shots))
     times: tuple[tuple[float, float], ...] = ()
     if items and recording.sha256 is not None:
         seconds = frame_seconds(settings, recording.sha256)

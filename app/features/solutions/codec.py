@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from app.db.json_columns import as_written
+from app.db.json_columns import report_damaged_values
 from app.geometry.camera import Camera
-from app.json_text import look_through
+from app.json_text import prepare_msgspec_type
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.frames import ImagePoint, height_above_grass
 from app.soccer.group import Group
@@ -48,7 +48,7 @@ def from_json(kind: type[T], value: Any) -> T:
     Raises:
         DamagedError: It is not what ``to_json`` makes.
     """
-    with as_written():
+    with report_damaged_values():
         result: T = _codec_of_type(kind)[1](value)
     return result
 
@@ -129,7 +129,7 @@ def _dataclass_codec(kind: Any) -> Codec:
 
     if not _is_plain_json_type(kind):
         return encode if later else whole, decode
-    look_through(kind)
+    prepare_msgspec_type(kind)
     return encode if later else whole, decode_plain
 
 

@@ -24,7 +24,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import insert
-from app.db.json_columns import as_written, decompress, parse
+from app.db.json_columns import decompress, parse_json_column, report_damaged_values
 from app.db.session import Base, Session
 from app.errors import ConflictError
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -187,7 +187,7 @@ def encode_calibration(calibration: Calibration) -> bytes:
 @lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
     """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
-    return value_codec.from_json(Calibration, parse(decompress(body)))
+    return value_codec.from_json(Calibration, parse_json_column(decompress(body)))
 
 
 @lru_cache(maxsize=256)
@@ -199,7 +199,7 @@ def decode_camera(body: bytes) -> Calibration:
     _, ends, after = rest.partition(b'],"suspects":')
     if begins and ends:
         text = before + b'"markings":[],"suspects":' + after
-    return value_codec.from_json(Calibration, parse(text))
+    return value_codec.from_json(Calibration, parse_json_column(text))
 
 
 def compress_json(value: object) -> bytes:
@@ -278,12 +278,12 @@ def read_solutions(
         if wanted[row.group_id]
         == SolutionKey(row.group_id, row.inputs_hash, row.policy_hash, row.solver_version)
     ]
-    with as_written():
-        names = {name for row in rows for name in parse(row.calibrations)}
+    with report_damaged_values():
+        names = {name for row in rows for name in parse_json_column(row.calibrations)}
     decode = decode_calibration if markings else decode_camera
     bodies = read_calibration_bodies(session, names)
     calibrations = {key: decode(body) for key, body in bodies.items()}
-    with as_written():
+    with report_damaged_values():
         return {
             row.group_id: with_calibrations(_solution_without_calibrations(row.body), calibrations)
             for row in rows
@@ -305,7 +305,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 @lru_cache(maxsize=128)
 def _solution_without_calibrations(body: bytes) -> Solution:
-    return value_codec.from_json(Solution, parse(decompress(body)))
+    return value_codec.from_json(Solution, parse_json_column(decompress(body)))
 
 
 def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:
@@ -321,7 +321,7 @@ def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, 
 
 def read_summary(text: str) -> SolutionSummary:
     """A stored summary."""
-    return value_codec.from_json(SolutionSummary, parse(text))
+    return value_codec.from_json(SolutionSummary, parse_json_column(text))
 
 
 def list_undetermined_calibrations(session: Session, keys: Collection[str]) -> set[str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.db.json_columns import pack, unpack
+from app.db.json_columns import compress_json, decompress_json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import DamagedError
@@ -51,7 +51,7 @@ from app.solving.solve import (
     solve_with_facts,
 )
 from app.wording import plural
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 
 
 def find_contradicted_cameras(
@@ -304,7 +304,7 @@ def solve_dataset(
             progress(report.solved + len(report.failed), report.total)
 
     keep([])
-    for results in fan_out(
+    for results in run_tasks(
         run_rethreshold_task, make_rethreshold_tasks(store, found, ids), executor, stop
     ):
         keep(results)
@@ -314,7 +314,7 @@ def solve_dataset(
     _calibrate_static_cameras(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
     tasks = (_make_task(store, found, chunk) for chunk in _split_into_chunks(ids, largest))
-    for results in fan_out(solve_task, tasks, executor, stop):
+    for results in run_tasks(solve_task, tasks, executor, stop):
         keep(results)
     if report.failing["jac"]:
         with store.read() as session:
@@ -337,7 +337,8 @@ def solve_task(task: SolveTask) -> list[SolveResult]:
     """Solve the groups of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.calibrations.items()}
     return [
-        _solve_one(key, group_from_json(unpack(body)), task, known) for key, body in task.groups
+        _solve_one(key, group_from_json(decompress_json(body)), task, known)
+        for key, body in task.groups
     ]
 
 
@@ -373,7 +374,10 @@ def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> SolveT
         keys = calibration_keys((item.group for item in stored), policy)
         known = read_calibration_bodies(session, keys)
     groups = tuple(
-        (SolutionKey(item.id, item.inputs_hash, policy.hash), pack(group_to_json(item.group)))
+        (
+            SolutionKey(item.id, item.inputs_hash, policy.hash),
+            compress_json(group_to_json(item.group)),
+        )
         for item in stored
     )
     return SolveTask(groups, policy, known)

@@ -9,7 +9,13 @@ from typing import Any
 
 from sqlalchemy import Select, select
 
-from app.db.json_columns import Json, as_written, decompress, parse, unpack
+from app.db.json_columns import (
+    Json,
+    decompress,
+    decompress_json,
+    parse_json_column,
+    report_damaged_values,
+)
 from app.db.session import Session
 from app.errors import StorageError
 from app.features.datasets.tables import DatasetModel, GroupModel, PaintEvidenceModel
@@ -54,7 +60,7 @@ class KeptSolution:
 
     @cached_property
     def _body_json(self) -> Json:
-        return parse(decompress(self.body))
+        return parse_json_column(decompress(self.body))
 
     def encode(self, solution: Solution) -> EncodedSolution:
         """A solution that differs from this one in its gates, findings and policy alone.
@@ -65,7 +71,7 @@ class KeptSolution:
             DamagedError: What is stored beside it is not what was written.
         """
         before = self.solution
-        with as_written():
+        with report_damaged_values():
             value = {
                 **self._body_json,
                 "gates": _json_of_changed(self._body_json["gates"], before.gates, solution.gates),
@@ -74,7 +80,7 @@ class KeptSolution:
                 ),
                 "policy_hash": solution.policy_hash,
             }
-            keys = tuple(parse(self.calibrations))
+            keys = tuple(parse_json_column(self.calibrations))
         summary = summarize_gates(read_summary(self.summary), solution)
         return EncodedSolution({}, keys, summary, compress_json(value), self.facts)
 
@@ -151,8 +157,8 @@ def list_calibration_keys_of_row(row: Any) -> list[str]:
     Raises:
         DamagedError: The row is not what was written.
     """
-    with as_written():
-        return list(map(str, parse(row.calibrations)))
+    with report_damaged_values():
+        return list(map(str, parse_json_column(row.calibrations)))
 
 
 def decode_row(session: Session, row: Any) -> Solution:
@@ -163,8 +169,8 @@ def decode_row(session: Session, row: Any) -> Solution:
     """
     named = list_calibration_keys_of_row(row)
     calibrations = read_calibrations(session, named)
-    with as_written():
-        solution = decode_solution(unpack(row.body), calibrations)
+    with report_damaged_values():
+        solution = decode_solution(decompress_json(row.body), calibrations)
         if named != [view.calibration_key for view in solution.views]:
             raise ValueError("its calibrations differ from those in its row")
         stored = (solution.policy_hash, solution.solver_version)
@@ -177,7 +183,7 @@ def check_stored_calibrations(session: Session) -> Iterator[tuple[str, bool]]:
     """The key of every calibration, and whether it is no longer what was written."""
     statement = select(CalibrationModel.key, CalibrationModel.body)
     for row in _stream_rows(session, statement):
-        yield row.key, not _is_readable(unpack, row.body)
+        yield row.key, not _is_readable(decompress_json, row.body)
 
 
 def check_stored_paint_readings(session: Session) -> Iterator[tuple[str, bool]]:

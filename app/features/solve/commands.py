@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, current_actor
+from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, get_current_actor
 from app.terminal.server import (
     ServerPlace,
     connect_to_server,
-    current_server,
-    opened_store,
-    opened_to_solve,
+    get_current_server,
+    open_store,
+    open_store_to_solve,
 )
 from app.terminal.terminal import (
     INTERRUPTED,
-    held_interrupts,
+    hold_interrupts,
     print_error,
     print_json,
     say,
@@ -50,7 +50,7 @@ def solve(
 
     A server computes by itself: there it waits, and Ctrl+C leaves the job running.
     """
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         if workers is not None or cluster is not None:
             raise typer.BadParameter("a server solves with its own processes; leave out --workers")
@@ -61,12 +61,12 @@ def solve(
     from app.features.solve.jobs import count_yield, describe_pending_work, solve_fully
 
     chosen = None if policy is None else read_policy_option(policy)
-    with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
+    with open_store_to_solve("Solving", workers, cluster) as (store, executor, progress):
         if chosen is not None:
-            change_policy(store, dataset, chosen, if_match=None, actor=current_actor())
-        with held_interrupts() as interrupted:
+            change_policy(store, dataset, chosen, if_match=None, actor=get_current_actor())
+        with hold_interrupts() as interrupted:
             report = solve_fully(
-                store, dataset, executor, progress, interrupted, actor=current_actor()
+                store, dataset, executor, progress, interrupted, actor=get_current_actor()
             )
             left = describe_pending_work(store, dataset) if interrupted() else None
             if left is not None:
@@ -100,16 +100,16 @@ def _print_solved(values: Mapping[str, Any], sentence: str, *, json_: bool) -> N
 @commands.command()
 def findings(dataset: Dataset, json_: Json = False) -> None:
     """List what a person should look at."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
         with connect_to_server(server) as client:
-            values = list(remote.finding_values(client, dataset))
+            values = list(remote.fetch_findings(client, dataset))
     else:
         from app.features.findings.service import iterate_findings_as_json
 
-        with opened_store() as store:
+        with open_store() as store:
             values = list(iterate_findings_as_json(store, dataset))
     if json_:
         print_json(values)

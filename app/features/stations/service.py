@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
@@ -238,7 +238,7 @@ def _save_change(session: Session, state: StationState, change: _StationChange, 
     save_station(session, state.stored, change.station)
     refresh_inputs_hashes(session, state.groups)
     entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
-    append(session, [entry])
+    append_entries(session, [entry])
 
 
 def _read_state(session: Session, station_id: int) -> StationState:

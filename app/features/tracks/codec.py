@@ -11,11 +11,11 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from app.db.json_columns import Json, as_written, parse
+from app.db.json_columns import Json, parse_json_column, report_damaged_values
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.json_text import canonical, digest_of
+from app.json_text import canonical_json_text, digest_of
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.pitch import Pitch
 from app.tracking.ball_correct import TrackPatch, correct_track, patched
@@ -119,7 +119,9 @@ def frozen_track(match: str, inputs: TrackInputs, track: BallTrack) -> Json:
 
 def track_again(frozen: Mapping[str, Any]) -> Json:
     """The track of a frozen one's inputs, computed anew, as ``track_to_json`` has it."""
-    return parse(canonical(track_to_json(make_track(inputs_from_json(frozen["inputs"])))))
+    return parse_json_column(
+        canonical_json_text(track_to_json(make_track(inputs_from_json(frozen["inputs"]))))
+    )
 
 
 def inputs_to_json(inputs: TrackInputs) -> Json:
@@ -132,7 +134,7 @@ def inputs_to_json(inputs: TrackInputs) -> Json:
     for camera in measured.cameras:
         if id(camera) not in cameras:
             value = camera_to_json(camera)
-            number = known.setdefault(canonical(value), len(texts))
+            number = known.setdefault(canonical_json_text(value), len(texts))
             if number == len(texts):
                 texts.append(value)
             cameras[id(camera)] = number
@@ -168,7 +170,7 @@ def corrections_to_json(corrections: Iterable[Correction]) -> Json:
 def corrections_text(corrections: Iterable[Correction]) -> str:
     """Corrections as they are stored, each once."""
     whole = sorted(set(corrections), key=lambda item: (item.frame, item.kind, item.added))
-    return canonical(corrections_to_json(whole))
+    return canonical_json_text(corrections_to_json(whole))
 
 
 def corrections_from_json(value: Sequence[Any]) -> tuple[Correction, ...]:
@@ -178,7 +180,7 @@ def corrections_from_json(value: Sequence[Any]) -> tuple[Correction, ...]:
 
 def inputs_digest(inputs: TrackInputs) -> str:
     """The same digest, the same track."""
-    return digest_of(canonical(inputs_to_json(inputs)).encode())
+    return digest_of(canonical_json_text(inputs_to_json(inputs)).encode())
 
 
 def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
@@ -187,7 +189,7 @@ def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
     Raises:
         DamagedError: It is not what was written.
     """
-    with as_written():
+    with report_damaged_values():
         found, names = value["measurements"], value["views"]
         cameras: list[Camera] = [camera_from_json(item) for item in value["cameras"]]
         times = np.array(value["times"], dtype=float)
@@ -260,7 +262,7 @@ def patches_from_json(value: Iterable[Mapping[str, Any]]) -> tuple[TrackPatch, .
     Raises:
         DamagedError: It is not what was written.
     """
-    with as_written():
+    with report_damaged_values():
         return tuple(
             TrackPatch(
                 corrections_from_json(item["corrections"]),
@@ -277,7 +279,7 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
     Raises:
         DamagedError: It is not what was written.
     """
-    with as_written():
+    with report_damaged_values():
         frames = np.array(value["frames"], dtype=np.int64)
         count, left = len(frames), value["left_out"]
         covariance = np.full((count, 6, 6), np.nan)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.db.json_columns import as_written, parse, unpack
+from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.db.store import Store
 from app.features.findings.queries import BallNotice, replace_track_findings
@@ -140,9 +140,11 @@ def _read_notices(session: Session, dataset_id: int, matches: Collection[str]) -
         if row.verdict == "rejected" or not _contradicted(row):
             continue
         body = read_bodies(session, [row.id])[row.id]
-        inputs = replace(inputs_from_json(unpack(body.inputs)), corrections=corrections_of(row))
-        patches = () if body.patches is None else patches_from_json(unpack(body.patches))
-        ball = corrected(inputs, track_from_json(unpack(body.body)), patches)
+        inputs = replace(
+            inputs_from_json(decompress_json(body.inputs)), corrections=corrections_of(row)
+        )
+        patches = () if body.patches is None else patches_from_json(decompress_json(body.patches))
+        ball = corrected(inputs, track_from_json(decompress_json(body.body)), patches)
         near = groups_by_frame(groups[row.match], row.first, row.last)
         found += _notices(session, contradicting_balls(ball, inputs), near)
     return Notices(groups.keys(), None, found)
@@ -157,8 +159,8 @@ def groups_by_frame(groups: Iterable[TrackGroup], first: int, last: int) -> dict
 
 
 def _contradicted(row: Any) -> int:
-    with as_written():
-        return int(parse(row.summary)["contradicted"])
+    with report_damaged_values():
+        return int(parse_json_column(row.summary)["contradicted"])
 
 
 def _notices(

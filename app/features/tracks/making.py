@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from app.db.json_columns import pack, parse, unpack
+from app.db.json_columns import compress_json, decompress_json, parse_json_column
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead, read_dataset_head
@@ -53,7 +53,7 @@ from app.features.tracks.stretches import (
     require_stretch,
 )
 from app.formats.export_record import ExportRecord
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.progress import ReportProgress
 from app.tracking.ball_track import BallTrack, ViewJump
 from app.wording import plural
@@ -170,7 +170,7 @@ def _make(
             base = make_track(inputs)
             known.update(UNJUDGED | {"actor": actor, "created": now()})
         elif base is None and own is not None and said != own.corrections:
-            base = track_from_json(unpack(read_bodies(session, [own.id])[own.id].body))
+            base = track_from_json(decompress_json(read_bodies(session, [own.id])[own.id].body))
         if base is not None:
             return known | _computed(stretch, inputs, base, said) | {"corrections": said}
         return known | {"corrections": said} | ({} if own is None else {"summary": own.summary})
@@ -183,12 +183,12 @@ def _make(
                 values = columns(session)
             if _save(session, dataset, stretch, row, values):
                 break
-    return is_new, parse(values["summary"])["reason"]
+    return is_new, parse_json_column(values["summary"])["reason"]
 
 
 def _computed(stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str) -> dict[str, Any]:
     """The columns of a track with what was said of its events."""
-    whole = replace(inputs, corrections=corrections_from_json(parse(said)))
+    whole = replace(inputs, corrections=corrections_from_json(parse_json_column(said)))
     patches = correct(whole, base)
     track = corrected(whole, base, patches)
     told = unused_sentence(stretch.unused), jumps_sentence(track.jumps)
@@ -203,10 +203,10 @@ def _computed(stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str)
         ),
     )
     return {
-        "inputs": pack(inputs_to_json(inputs)),
-        "body": pack(track_to_json(base)),
-        "patches": pack(patches_to_json(patches)) if patches else None,
-        "summary": canonical(asdict(summary)),
+        "inputs": compress_json(inputs_to_json(inputs)),
+        "body": compress_json(track_to_json(base)),
+        "patches": compress_json(patches_to_json(patches)) if patches else None,
+        "summary": canonical_json_text(asdict(summary)),
         "match": stretch.match,
         "first": stretch.first,
         "last": stretch.last,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Select, delete, insert, select, update
 
-from app.db.json_columns import as_written, parse
+from app.db.json_columns import parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import find_next_row_id
@@ -65,9 +65,9 @@ def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[i
     statement = select(RecordingModel.name, RecordingModel.shots).where(
         RecordingModel.dataset_id == dataset_id
     )
-    with as_written():
+    with report_damaged_values():
         return {
-            row.name: [(shot["first"], shot["last"]) for shot in parse(row.shots)]
+            row.name: [(shot["first"], shot["last"]) for shot in parse_json_column(row.shots)]
             for row in session.execute(statement)
         }
 

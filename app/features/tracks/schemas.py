@@ -21,7 +21,7 @@ from app.features.tracks.service import (
 from app.formats.tracks_writer import position_sigma
 from app.geometry.arrays import FloatArray
 from app.http.documents import Document, ListDocument
-from app.json_text import MAX_ID, finite
+from app.json_text import MAX_ID, replace_non_finite
 from app.tracking.ball_correct import near_correction
 from app.tracking.ball_track import BallMode, BallState, Correction, EventKind
 
@@ -201,16 +201,16 @@ class TrackFrames(Document):
             etag=detail.etag,
             frame=numbers,
             time_s=ball.times[rows].tolist(),
-            x=finite(position[:, 0].tolist()),
-            y=finite(position[:, 1].tolist()),
-            z=finite(position[:, 2].tolist()),
-            sigma=finite(position_sigma(spread).tolist()),
+            x=replace_non_finite(position[:, 0].tolist()),
+            y=replace_non_finite(position[:, 1].tolist()),
+            z=replace_non_finite(position[:, 2].tolist()),
+            sigma=replace_non_finite(position_sigma(spread).tolist()),
             covariance=_rows(upper),
             velocity=_rows(ball.velocity[rows]),
             state=[ball.state[row] for row in rows],
             mode=[ball.mode[row] for row in rows],
             views=[list(ball.views[row]) for row in rows],
-            left_out_px=finite(left[rows].tolist()),
+            left_out_px=replace_non_finite(left[rows].tolist()),
             raw=[_place(groups[number].place) if number in groups else None for number in numbers],
             group=[groups[number].id if number in groups else None for number in numbers],
             events=[

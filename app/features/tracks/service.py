@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from app.config import Settings
-from app.db.json_columns import Json, pack, parse, unpack
+from app.db.json_columns import Json, compress_json, decompress_json, parse_json_column
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -45,8 +45,8 @@ from app.features.tracks.run_measurements import followed_observations, followed
 from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, summary_of
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
-from app.json_text import canonical
-from app.soccer.group import checked_note
+from app.json_text import canonical_json_text
+from app.soccer.group import strip_and_check_note
 from app.soccer.policy import Policy
 from app.tracking.ball_correct import TrackPatch
 from app.tracking.ball_track import BallTrack, Correction
@@ -164,7 +164,7 @@ def change_track(
             if change.verdict == "none":
                 values |= UNJUDGED
             else:
-                note = checked_note(change.note or "")
+                note = strip_and_check_note(change.note or "")
                 values |= {"verdict": change.verdict, "note": note, "judged_by": actor}
                 values["judged_at"] = now()
         update_track(session, track_id, **values)
@@ -264,12 +264,12 @@ def _read(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
 
 def _ball(body: TrackBody, said: tuple[Correction, ...]) -> tuple[TrackInputs, BallTrack]:
     """A stored track with its corrections, and all that it was computed from."""
-    inputs = replace(inputs_from_json(unpack(body.inputs)), corrections=said)
-    return inputs, corrected(inputs, track_from_json(unpack(body.body)), _patches(body))
+    inputs = replace(inputs_from_json(decompress_json(body.inputs)), corrections=said)
+    return inputs, corrected(inputs, track_from_json(decompress_json(body.body)), _patches(body))
 
 
 def _patches(body: TrackBody) -> tuple[TrackPatch, ...]:
-    return () if body.patches is None else patches_from_json(unpack(body.patches))
+    return () if body.patches is None else patches_from_json(decompress_json(body.patches))
 
 
 def _corrected(
@@ -278,16 +278,17 @@ def _corrected(
     """The columns of a track whose events are corrected, and itself; it is solved anew around what is new."""
     text = _checked(track, corrections)
     inputs = replace(
-        inputs_from_json(unpack(body.inputs)), corrections=corrections_from_json(parse(text))
+        inputs_from_json(decompress_json(body.inputs)),
+        corrections=corrections_from_json(parse_json_column(text)),
     )
-    base = track_from_json(unpack(body.body))
+    base = track_from_json(decompress_json(body.body))
     patches = correct(inputs, base, _patches(body))
     ball = corrected(inputs, base, patches)
     summary = summary_of(ball, track.summary)
     columns = {
         "corrections": text,
-        "patches": pack(patches_to_json(patches)) if patches else None,
-        "summary": canonical(asdict(summary)),
+        "patches": compress_json(patches_to_json(patches)) if patches else None,
+        "summary": canonical_json_text(asdict(summary)),
         # What was accepted is not what it is now.
         **UNJUDGED,
     }

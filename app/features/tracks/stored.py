@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.db.json_columns import as_written, parse
+from app.db.json_columns import parse_json_column, report_damaged_values
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
 from app.features.tracks.queries import GroupState, TrackGroup
 from app.features.tracks.run_measurements import FollowedRun, followed_states
@@ -151,8 +151,8 @@ def stored_track(
 
 def summary_of_row(row: Any) -> TrackSummary:
     """What a list says of a row's track."""
-    with as_written():
-        return TrackSummary(**parse(row.summary))
+    with report_damaged_values():
+        return TrackSummary(**parse_json_column(row.summary))
 
 
 def track_etag(row: Any) -> str:
@@ -162,8 +162,8 @@ def track_etag(row: Any) -> str:
 
 def corrections_of(row: Any) -> tuple[Correction, ...]:
     """What people said of the events of a row's track."""
-    with as_written():
-        return corrections_from_json(parse(row.corrections))
+    with report_damaged_values():
+        return corrections_from_json(parse_json_column(row.corrections))
 
 
 def track_stamp(

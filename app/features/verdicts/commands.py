@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import VerdictState
-from app.terminal.options import Dataset, Json, current_actor
-from app.terminal.server import connect_to_server, current_server, opened_store
+from app.terminal.options import Dataset, Json, get_current_actor
+from app.terminal.server import connect_to_server, get_current_server, open_store
 from app.terminal.terminal import print_error, print_json, print_values, say
 
 commands = typer.Typer()
@@ -47,13 +47,13 @@ def verdict(
     from app.features.verdicts.service import check_verdict
 
     check_verdict(state, reason, note)
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
         body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
         with connect_to_server(server) as client:
-            plan, report = remote.verdict_values(client, dataset, body, dry_run=dry_run)
+            plan, report = remote.plan_or_give_verdicts(client, dataset, body, dry_run=dry_run)
     else:
         arguments = (query, state, reason, note)
         plan, report = _judge_here(dataset, arguments, expected, dry_run=dry_run)
@@ -88,10 +88,10 @@ def _judge_here(
     from app.features.datasets.service import dataset_id
     from app.features.verdicts.bulk import give_verdicts, plan_verdicts
 
-    with opened_store() as store:
+    with open_store() as store:
         found = dataset_id(store, dataset)
         plan = plan_verdicts(store, found, *values)
         if dry_run:
             return asdict(plan), None
-        report = give_verdicts(store, found, *values, actor=current_actor(), expected=expected)
+        report = give_verdicts(store, found, *values, actor=get_current_actor(), expected=expected)
     return asdict(plan), asdict(report)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, cast
 
 from sqlalchemy import Table, bindparam, case, func, insert, select, update
 
-from app.db.json_columns import parse
-from app.db.log import Entry, append
+from app.db.json_columns import parse_json_column
+from app.db.log import Entry, append_entries
 from app.db.session import Session
 from app.features.batches.completion_queries import complete_judged_groups
 from app.features.datasets.tables import GroupModel
@@ -161,7 +161,7 @@ def insert_verdicts(
     for row in rows:
         body = {name: value for name, value in row.items() if name not in ("id", "group_id")}
         entries.append(Entry("verdict", actor, at, body, dataset_id, row["group_id"]))
-    append(session, entries)
+    append_entries(session, entries)
     if dataset_id <= COPIES:
         states = {verdict.group_id: verdict.state for verdict in given}
         complete_judged_groups(session, states, actor=actor, at=at)
@@ -260,7 +260,7 @@ def update_batch(session: Session, batch_id: int, **values: Any) -> None:
 
 
 def _batch_from_row(row: Any) -> StoredBulkVerdict:
-    spans = {name: parse(getattr(row, name) or "null") for name in _SPANS}
+    spans = {name: parse_json_column(getattr(row, name) or "null") for name in _SPANS}
     return StoredBulkVerdict(**{**row._mapping, **spans})
 
 

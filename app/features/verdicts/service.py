@@ -21,7 +21,7 @@ from app.features.verdicts.queries import (
 )
 from app.json_text import Moment
 from app.soccer.choices import VerdictState
-from app.soccer.group import REASONS, Group, checked_note, require_explanation
+from app.soccer.group import REASONS, Group, require_explanation, strip_and_check_note
 from app.soccer.solution import Solution
 
 STATES: tuple[str, ...] = get_args(VerdictState)
@@ -86,7 +86,7 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     Raises:
         InputError: Unknown state or reason, or a note is missing or too long.
     """
-    note = checked_note(note)
+    note = strip_and_check_note(note)
     if state not in STATES:
         known = ", ".join(STATES)
         raise InputError(f'"{state}" is not a verdict; verdicts are {known}', pointer="/state")

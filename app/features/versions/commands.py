@@ -13,12 +13,17 @@ from app.terminal.options import (
     Dataset,
     Json,
     Workers,
-    current_actor,
+    get_current_actor,
     parse_cameras,
     read_text,
 )
 from app.terminal.remote import VERSION
-from app.terminal.server import connect_to_server, current_server, opened_store, opened_to_solve
+from app.terminal.server import (
+    connect_to_server,
+    get_current_server,
+    open_store,
+    open_store_to_solve,
+)
 from app.terminal.terminal import (
     print_error,
     print_json,
@@ -75,7 +80,7 @@ def freeze(
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
     chosen = Split(split, seed, test_share, cameras)
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
@@ -90,28 +95,28 @@ def freeze(
             found = remote.freeze_values(client, dataset, body, progress, dry_run=dry_run)
         print_values(found, json_)
         return
-    with opened_store() as store, show_progress("Freezing") as progress:
+    with open_store() as store, show_progress("Freezing") as progress:
         request = FreezeRequest(name or named, note, text, chosen, groups)
         if dry_run:
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return
-        version = run_freeze(store, dataset, request, actor=current_actor(), progress=progress)
+        version = run_freeze(store, dataset, request, actor=get_current_actor(), progress=progress)
     print_values(version_to_values(version), json_)
 
 
 @commands.command()
 def versions(dataset: Dataset, json_: Json = False) -> None:
     """List the frozen versions of a dataset, newest first."""
-    server = current_server()
+    server = get_current_server()
     if server is not None:
         from app.terminal import remote
 
         with connect_to_server(server) as client:
-            found = remote.version_values(client, dataset)
+            found = remote.fetch_versions(client, dataset)
     else:
         from app.features.versions.service import list_versions
 
-        with opened_store() as store:
+        with open_store() as store:
             found = [version_to_values(item) for item in list_versions(store, dataset)]
     print_rows(
         found,
@@ -130,7 +135,7 @@ def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json =
     from app.features.versions.diff import describe_diff, diff_versions
     from app.features.versions.service import find_version
 
-    with opened_store() as store:
+    with open_store() as store:
         ids = [find_version(store, dataset, name).id for name in (older, newer)]
         found = diff_versions(store, *ids)
     if json_:
@@ -158,12 +163,12 @@ def verify(
     from app.features.versions.service import find_version, get_newest_version
     from app.features.versions.verify import verify_and_keep
 
-    with opened_to_solve("Verifying", workers, cluster) as (store, executor, progress):
+    with open_store_to_solve("Verifying", workers, cluster) as (store, executor, progress):
         if version is None:
             chosen = get_newest_version(store, dataset)
         else:
             chosen = find_version(store, dataset, version)
-        report = verify_and_keep(store, chosen.id, executor, progress, actor=current_actor())
+        report = verify_and_keep(store, chosen.id, executor, progress, actor=get_current_actor())
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-from app.db.json_columns import Json, parse
+from app.db.json_columns import Json, parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
@@ -222,7 +222,7 @@ def _ball_move(before: Any, after: Any) -> BallMove | None:
 
 
 def _parse_point(text: str) -> tuple[float, float, float]:
-    x, y, z = parse(text)
+    x, y, z = parse_json_column(text)
     return x, y, z
 
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.db.json_columns import Json, pack
-from app.db.log import Entry, append
+from app.db.json_columns import Json, compress_json
+from app.db.log import Entry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
@@ -51,12 +51,12 @@ from app.features.versions.service import (
     read_version,
 )
 from app.formats.manifest import read_software_version
-from app.json_text import canonical, digest_of, quoted
-from app.media.files import media_facts
+from app.json_text import canonical_json_text, digest_of, quoted
+from app.media.files import read_media_facts
 from app.progress import ReportProgress
 from app.soccer.codec import policy_to_json
 from app.soccer.finding import Finding
-from app.soccer.group import Group, checked_note
+from app.soccer.group import Group, strip_and_check_note
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 
@@ -93,7 +93,7 @@ class FreezeRequest:
                 f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quoted(self.groups)}',
                 pointer="/groups",
             )
-        checked_note(self.note)
+        strip_and_check_note(self.note)
         if len(self.licence) > MAX_LICENCE:
             raise InputError(f"a licence has at most {MAX_LICENCE} characters", pointer="/licence")
 
@@ -223,7 +223,7 @@ class _FreezeRun:
         """Freeze the tracks that people accepted and whose groups have not changed since, each with all
         that it was computed from."""
         found = accepted_tracks(self._session, self._dataset)
-        texts = {stretch: canonical(value) for stretch, value in found.items()}
+        texts = {stretch: canonical_json_text(value) for stretch, value in found.items()}
         self._tracks = {key: TRACK + digest_of(text.encode()) for key, text in texts.items()}
         self._freeze_new({self._tracks[key]: text for key, text in texts.items()}, {}, set())
 
@@ -232,19 +232,19 @@ class _FreezeRun:
         request, dataset = self._request, self._dataset
         return {
             "dataset_id": dataset.id,
-            "note": checked_note(request.note) or "",
+            "note": strip_and_check_note(request.note) or "",
             "licence": request.licence.strip() or join_licences(self._matches(rows)),
             "created": now(),
             "actor": actor,
             "hash": hash_version(dataset.policy, SOLVER_VERSION, rows, self._tracks),
-            "tracks": canonical(self._tracks) if self._tracks else None,
+            "tracks": canonical_json_text(self._tracks) if self._tracks else None,
             "groups": request.groups,
-            "policy": canonical(policy_to_json(dataset.policy)),
+            "policy": canonical_json_text(policy_to_json(dataset.policy)),
             "policy_hash": dataset.policy.hash,
             "solver_version": SOLVER_VERSION,
             "software_version": read_software_version(),
-            "split": canonical(request.split.values()),
-            "counts": canonical(self._counts(rows)),
+            "split": canonical_json_text(request.split.values()),
+            "counts": canonical_json_text(self._counts(rows)),
         }
 
     def _matches(self, rows: Sequence[Mapping[str, Any]]) -> set[str]:
@@ -291,11 +291,11 @@ class _FreezeRun:
         frames = find_frame_files(group, _media_facts_by_view(group))
         return {
             "split": split,
-            "splits": None if splits is None else canonical(splits),
+            "splits": None if splits is None else canonical_json_text(splits),
             "said": annotations,
             "solution": solution,
-            "ball": canonical(solved["ball"]["point"]) if solved["ball"] else None,
-            "frames": None if frames is None else pack(frames),
+            "ball": canonical_json_text(solved["ball"]["point"]) if solved["ball"] else None,
+            "frames": None if frames is None else compress_json(frames),
         }
 
     def _freeze_new(
@@ -374,7 +374,7 @@ def _version_row(item: Candidate, position: int, dismissed: Json) -> dict[str, A
         "member": item.why is None,
         "why": item.why,
         "split": item.split,
-        "verdict": None if verdict is None else canonical(verdict),
+        "verdict": None if verdict is None else canonical_json_text(verdict),
     }
 
 
@@ -402,7 +402,9 @@ def _dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals
 
 
 def _media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
-    return {view.key: media_facts(view.media) for view in group.views if view.media is not None}
+    return {
+        view.key: read_media_facts(view.media) for view in group.views if view.media is not None
+    }
 
 
 def _count_reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
@@ -440,5 +442,5 @@ def _save_version(
     identity = insert_version(session, values, rows)
     body = {"version": identity, "name": values["name"], "hash": values["hash"]}
     entry = Entry("freeze", values["actor"], values["created"], body, values["dataset_id"])
-    append(session, [entry])
+    append_entries(session, [entry])
     return read_version(session, identity)

@@ -10,11 +10,11 @@ import msgspec
 from sqlalchemy import ColumnElement, Table, exists, func, insert, or_, select, tuple_
 from zlib_ng import zlib_ng
 
-from app.db.json_columns import Json, decompress, parse
+from app.db.json_columns import Json, decompress, parse_json_column
 from app.db.session import Session
 from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
 from app.features.versions.queries import FrozenModel, VersionGroupModel, VersionModel
-from app.json_text import canonical, digest_of, look_through
+from app.json_text import canonical_json_text, digest_of, prepare_msgspec_type
 from app.soccer.codec import (
     group_without_views_to_json,
     positions_from_json,
@@ -52,13 +52,13 @@ def freeze_annotations(group: Group) -> FrozenAnnotations:
     for view in group.views:
         station = _station_json_without_mirroring(view.station)
         if view.station.shared:
-            text = canonical(station)
+            text = canonical_json_text(station)
             station = STATION + digest_of(text.encode())
             texts[station] = text
         value = view_to_json(view, station)
         del value["media"]
         views.append(value)
-    text = canonical({**group_without_views_to_json(group), "views": views})
+    text = canonical_json_text({**group_without_views_to_json(group), "views": views})
     key = SAID + digest_of(text.encode())
     return FrozenAnnotations(key, {**texts, key: text})
 
@@ -93,7 +93,7 @@ class FrozenOutline(msgspec.Struct):
 
 
 for _kind in (FrozenOutline, OutlineStation):
-    look_through(_kind)
+    prepare_msgspec_type(_kind)
 
 
 def collect_shared_keys(annotations: Json) -> set[str]:
@@ -228,7 +228,7 @@ def read_text(body: bytes) -> str:
 
 def read_json(body: bytes) -> Json:
     """The value of frozen JSON."""
-    return parse(decompress(body))
+    return parse_json_column(decompress(body))
 
 
 def compress_text(text: str) -> bytes:

@@ -15,7 +15,7 @@ from sqlalchemy import ForeignKey, LargeBinary, Table, UniqueConstraint, func, i
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import insert_or_replace
-from app.db.json_columns import Json, parse, unpack
+from app.db.json_columns import Json, decompress_json, parse_json_column
 from app.db.session import Base, Session, now
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
@@ -24,7 +24,7 @@ from app.features.people.visibility_queries import list_columns_with_shown_actor
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
 from app.features.verdicts.tables import VerdictModel
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.solution import SOLVER_VERSION
 
 
@@ -289,7 +289,7 @@ def iterate_version_verdicts(
         .order_by(model.position)
     )
     for key, verdict in session.execute(statement):
-        yield key, None if verdict is None else parse(verdict)
+        yield key, None if verdict is None else parse_json_column(verdict)
 
 
 def read_version_matches(session: Session, version_id: int) -> set[str]:
@@ -335,7 +335,7 @@ def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[Candidate
 
 
 def _version_group(row: Any) -> VersionGroup:
-    ball = None if row.ball is None else parse(row.ball)
+    ball = None if row.ball is None else parse_json_column(row.ball)
     return VersionGroup(
         position=row.position,
         key=row.key,
@@ -343,12 +343,12 @@ def _version_group(row: Any) -> VersionGroup:
         member=row.member,
         why=row.why,
         split=row.split,
-        splits=None if row.splits is None else parse(row.splits),
-        verdict=None if row.verdict is None else parse(row.verdict),
+        splits=None if row.splits is None else parse_json_column(row.splits),
+        verdict=None if row.verdict is None else parse_json_column(row.verdict),
         said=row.said,
         solution=row.solution,
         ball=None if ball is None else (ball[0], ball[1], ball[2]),
-        frames=None if row.frames is None else unpack(row.frames),
+        frames=None if row.frames is None else decompress_json(row.frames),
     )
 
 
@@ -380,7 +380,7 @@ def keep_verification(
         "at": now(),
         "actor": actor,
         "solver_version": SOLVER_VERSION,
-        "report": None if report is None else canonical(report),
+        "report": None if report is None else canonical_json_text(report),
         "problem": problem,
     }
     statement = insert_or_replace(VersionCheckModel)
@@ -396,5 +396,5 @@ def read_verifications(session: Session, versions: list[int]) -> dict[int, Verif
 
 
 def _verification_from_row(row: Any) -> Verification:
-    report = None if row.report is None else parse(row.report)
+    report = None if row.report is None else parse_json_column(row.report)
     return Verification(row.at, row.actor, row.solver_version, report, row.problem)

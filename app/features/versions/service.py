@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from app.db.json_columns import Json, decompress, parse, parse_as
+from app.db.json_columns import Json, decompress, parse_as, parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
@@ -36,7 +36,7 @@ from app.features.versions.queries import (
     list_versions_of_dataset,
     read_verifications,
 )
-from app.json_text import canonical, quoted
+from app.json_text import canonical_json_text, quoted
 from app.soccer.codec import policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy, digested_values
@@ -274,10 +274,10 @@ def _version_from_row(row: VersionRow) -> Version:
     return Version(
         **{
             **values,
-            "policy": policy_from_json(parse(row.policy)),
-            "split": Split.of(parse(row.split)),
-            "counts": parse(row.counts),
-            "tracks": parse(row.tracks) if row.tracks else {},
+            "policy": policy_from_json(parse_json_column(row.policy)),
+            "split": Split.of(parse_json_column(row.split)),
+            "counts": parse_json_column(row.counts),
+            "tracks": parse_json_column(row.tracks) if row.tracks else {},
         }
     )
 
@@ -318,4 +318,4 @@ def hash_version(
 
 
 def _add_to_digest(digest: Any, value: Json) -> None:
-    digest.update(canonical(value).encode() + b"\n")
+    digest.update(canonical_json_text(value).encode() + b"\n")

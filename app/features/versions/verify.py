@@ -38,7 +38,7 @@ from app.features.versions.service import (
     hash_version,
     read_version,
 )
-from app.json_text import canonical, digest_of
+from app.json_text import canonical_json_text, digest_of
 from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -47,7 +47,7 @@ from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, compute_calibration_key
 from app.solving.solve import solve
 from app.wording import plural
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 
 CHUNK = 40
 """Groups a task."""
@@ -185,7 +185,7 @@ def verify_version(
         frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
         matches = read_version_matches(session, version.id)
     done = 0
-    for results in fan_out(verify_task, _VerifyTasks(store, version, matches), executor):
+    for results in run_tasks(verify_task, _VerifyTasks(store, version, matches), executor):
         for found in results:
             report.add(found)
             report.equal += not found
@@ -276,7 +276,7 @@ def _track_differences(place: str, value: Mapping[str, Any]) -> Iterator[Version
         yield VersionDifference(None, place, None, f"{type(error).__name__}: {error}")
         return
     for name, frozen in value["track"].items():
-        if canonical(now[name]) != canonical(frozen):
+        if canonical_json_text(now[name]) != canonical_json_text(frozen):
             yield VersionDifference(
                 None, f"{place}.{name}", _shorten_value(frozen), _shorten_value(now[name])
             )
@@ -284,7 +284,7 @@ def _track_differences(place: str, value: Mapping[str, Any]) -> Iterator[Version
 
 def _shorten_value(value: Json) -> Json:
     """A value for a report: long lists are told by their length and digest."""
-    text = canonical(value)
+    text = canonical_json_text(value)
     return value if len(text) < 200 else f"{len(text):,} characters, {digest_of(text.encode())}"
 
 

@@ -16,13 +16,13 @@ from typing import Any
 from standardwebhooks import Webhook
 
 from app.config import Settings
-from app.db.home import WEBHOOKS, installation_key
+from app.db.home import WEBHOOKS, get_installation_key
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.features.jobs.queries import DONE, FAILED
 from app.features.webhooks import queries as webhook_outbox
 from app.features.webhooks.queries import list_jobs_ended_since, list_log_entries_since
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 
 
 class Kind(StrEnum):
@@ -146,7 +146,7 @@ def _messages_of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Ite
 
 
 def _message_body(kind: Kind, at: str, data: Json) -> str:
-    return canonical({"type": str(kind), "timestamp": at, "data": data})
+    return canonical_json_text({"type": str(kind), "timestamp": at, "data": data})
 
 
 def make_salt() -> str:
@@ -160,7 +160,7 @@ def derive_webhook_secret(settings: Settings, salt: str) -> str:
     Raises:
         StorageError: The disk refuses the key.
     """
-    made = hmac.digest(installation_key(settings, WEBHOOKS), salt.encode(), hashlib.sha256)
+    made = hmac.digest(get_installation_key(settings, WEBHOOKS), salt.encode(), hashlib.sha256)
     return f"whsec_{b64encode(made).decode()}"
 
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple, cast
 from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 
 from app.db.dialects.dialect import insert
-from app.db.json_columns import Json, parse
+from app.db.json_columns import Json, parse_json_column
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session, now
 from app.features.batches.queries import count_work, find_batch, list_batch_people
 from app.features.datasets.queries import read_dataset_name
 from app.features.jobs.queries import JobModel
 from app.features.webhooks.tables import DeliveryModel, WebhookModel
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""
@@ -75,7 +75,7 @@ def insert_webhook(
     values = {
         "dataset_id": dataset_id,
         "url": url,
-        "kinds": canonical(sorted(kinds)),
+        "kinds": canonical_json_text(sorted(kinds)),
         "salt": salt,
         "created": at,
         "created_by": by,
@@ -279,7 +279,7 @@ def list_listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
     table = WebhookModel
     on = (table.dataset_id == dataset_id, table.off.is_(None))
     rows = session.execute(select(table.id, table.kinds).where(*on).order_by(table.id))
-    return [row.id for row in rows if kind in parse(row.kinds)]
+    return [row.id for row in rows if kind in parse_json_column(row.kinds)]
 
 
 def queue_webhook_messages(
@@ -311,7 +311,7 @@ def queue_webhook_messages(
     data: dict[str, Json] = {"dataset": read_dataset_name(session, dataset_id), "actor": actor}
     if batch_id is not None:
         data["batch"] = read_batch_values(session, batch_id)
-    body = canonical({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})
+    body = canonical_json_text({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})
     return sum(insert_delivery(session, hook, f"msg_{hook}_{event}", kind, body) for hook in hooks)
 
 

@@ -15,7 +15,7 @@ from urllib.parse import SplitResult, urlsplit
 import httpx
 import structlog
 
-from app.db.json_columns import parse
+from app.db.json_columns import parse_json_column
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
@@ -351,7 +351,7 @@ def _tls_context() -> ssl.SSLContext:
 
 
 def _queue_messages(session: Session, row: Any, messages: Sequence[Message]) -> int:
-    wanted = set(parse(row.kinds))
+    wanted = set(parse_json_column(row.kinds))
     made = 0
     for message in messages:
         if message.kind in wanted:

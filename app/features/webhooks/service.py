@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from app.db.json_columns import parse
-from app.db.log import newest_entry
+from app.db.json_columns import parse_json_column
+from app.db.log import find_newest_entry_id
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -38,7 +38,7 @@ from app.features.webhooks.queries import (
     update_webhook,
 )
 from app.features.webhooks.sender import require_allowed
-from app.json_text import Moment, canonical
+from app.json_text import Moment, canonical_json_text
 
 MOST = 20
 """Webhooks of one dataset."""
@@ -144,10 +144,10 @@ def change_webhook(
         if url is not None:
             values["url"] = url
         if kinds is not None:
-            values["kinds"] = canonical(_checked_kinds(kinds))
+            values["kinds"] = canonical_json_text(_checked_kinds(kinds))
         if on is not None and on != (found.off is None):
             values |= (
-                {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
+                {"off": None, "log_id": find_newest_entry_id(session), "jobs_until": now()}
                 if on
                 else {"off": OFF}
             )
@@ -250,7 +250,7 @@ def _webhook_from_row(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhoo
     waiting, delivered, failed = (
         counts.get((row.id, state), 0) for state in (WAITING, DELIVERED, FAILED)
     )
-    kinds = [Kind(kind) for kind in parse(row.kinds)]
+    kinds = [Kind(kind) for kind in parse_json_column(row.kinds)]
     made = (row.created, row.created_by)
     return Webhook(row.id, row.url, kinds, row.off, *made, waiting, delivered, failed)
 

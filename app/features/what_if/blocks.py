@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from app.db.log import entry_hash, newest_entry
+from app.db.log import find_newest_entry_id, read_entry_hash
 from app.db.session import Session
 from app.features.groups.queries import read_groups
 from app.features.groups.revision_queries import (
@@ -128,7 +128,7 @@ class DatasetBlocks:
         if kept is None or kept.mark > find_newest_change_id(session):
             return None
         number, digest = kept.entry
-        if number and entry_hash(session, number) != digest:
+        if number and read_entry_hash(session, number) != digest:
             return None
         found = DatasetBlocks(folder, dataset_id, calibration, kept.mark, kept.through)
         found.blocks, found.bare = list(kept.blocks), kept.bare
@@ -234,8 +234,8 @@ class DatasetBlocks:
         return write_cached_block(self.folder, table)
 
     def _write_block_list(self, session: Session) -> None:
-        number = newest_entry(session)
-        entry = number, entry_hash(session, number) or ""
+        number = find_newest_entry_id(session)
+        entry = number, read_entry_hash(session, number) or ""
         write_cached_block_list(
             self.folder,
             CachedTable(

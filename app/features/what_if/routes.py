@@ -17,7 +17,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
-from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, Threshold, thresholds_of
+from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, Threshold, list_thresholds
 
 LABELS = {
     UNSOLVED: "Solved",
@@ -44,7 +44,7 @@ def _optional_thresholds_model(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
     fields: dict[str, Any] = {
         item.name: (_threshold_type(item) | None, Field(default=None, description=item.text))
-        for item in thresholds_of(part)
+        for item in list_thresholds(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import structlog
 
-from app.db.log import entry_hash, newest_entry
+from app.db.log import find_newest_entry_id, read_entry_hash
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
@@ -149,11 +149,11 @@ def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]
 
 
 def _current_marks(session: Session) -> dict[str, Any]:
-    number = newest_entry(session)
+    number = find_newest_entry_id(session)
     return {
         "change": find_newest_change_id(session),
         "verdict": find_newest_verdict_id(session),
-        "entry": (number, entry_hash(session, number) or ""),
+        "entry": (number, read_entry_hash(session, number) or ""),
     }
 
 
@@ -234,7 +234,7 @@ def _read_columns(session: Session, file: Path) -> _DatasetColumns | None:
         number, digest = about["entry"]
         if about["format"] != FORMAT or about["change"] > find_newest_change_id(session):
             return None
-        if number and entry_hash(session, number) != digest:
+        if number and read_entry_hash(session, number) != digest:
             return None
         group_id = arrays.pop("group_id")
         held = Counted(tuple(about["splits"]), tuple(about["matches"]), **arrays)

@@ -30,7 +30,7 @@ from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs import runner as job_run
 from app.features.jobs.runner import JobProgress
 from app.media.frames import Frames, SentPicture, make_picture
-from app.object_store.path import find_path, target_path
+from app.object_store.path import find_path, resolve_target_path
 from app.object_store.store import open_store
 from app.soccer.group import Media
 from app.worker_process import WorkerProcess
@@ -59,7 +59,7 @@ class TestExports:
         self, imported: Store, proxy: StoreProxy, tmp_path: Path
     ) -> None:
         settings = imported.settings
-        out = target_path(settings, "s3://frames/out/league.zip")
+        out = resolve_target_path(settings, "s3://frames/out/league.zip")
         export_dataset(imported, "league", "coco", out, everything=True, images="copy")
         local = export_dataset(
             imported, "league", "coco", tmp_path / "l.zip", everything=True, images="copy"
@@ -77,7 +77,7 @@ class TestExports:
     def test_an_upload_that_breaks_off_leaves_the_earlier_export(
         self, settings: Settings, imported: Store, proxy: StoreProxy
     ) -> None:
-        out = target_path(settings, "s3://frames/out/twice.zip")
+        out = resolve_target_path(settings, "s3://frames/out/twice.zip")
         export_dataset(imported, "league", "parquet", out, everything=True)
         before = out.store.head(out.key)
         with pytest.raises(RuntimeError), out.store.writing(out.key, "application/zip") as file:
@@ -95,7 +95,7 @@ class TestExports:
     def test_the_manifest_is_written_last_and_removed_first_when_a_folder_is_exported_again(
         self, settings: Settings, imported: Store, proxy: StoreProxy
     ) -> None:
-        out = target_path(settings, "s3://frames/out/folder")
+        out = resolve_target_path(settings, "s3://frames/out/folder")
         export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
         written = [line.rsplit("/", 1)[-1] for line in proxy.asked if line.startswith("PUT")]
         assert written[-1] == "manifest.json"
@@ -120,7 +120,7 @@ class TestExports:
                     imported,
                     "league",
                     "parquet",
-                    target_path(settings, f"s3://frames/{name}"),
+                    resolve_target_path(settings, f"s3://frames/{name}"),
                     everything=True,
                 )
         assert open_store(settings, "frames").read_whole("own.zip", 99)[0] == b"somebody's own"
@@ -134,7 +134,7 @@ class TestExports:
                 imported,
                 "league",
                 "parquet",
-                target_path(closed, "s3://frames/x.zip"),
+                resolve_target_path(closed, "s3://frames/x.zip"),
                 everything=True,
             )
 

@@ -21,7 +21,7 @@ from app.formats.file_tree import Limits
 from app.formats.frames_reader import read_frame_list
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.media.files import content_type, read_frame
+from app.media.files import guess_content_type, read_frame
 from app.media.object_frames import is_kept
 from app.object_store.path import find_path, split_address
 from app.object_store.store import open_store
@@ -149,7 +149,7 @@ class TestReading:
         open_store(settings, "frames").put("all.zip", (tmp_path / "all.zip").read_bytes())
         media = first_media(settings, "s3://frames/all.zip")
         assert media.member is not None and "Frames-v3.zip/" in media.member
-        assert content_type(read_frame(media, None, False, settings)) == "image/png"
+        assert guess_content_type(read_frame(media, None, False, settings)) == "image/png"
 
 
 class TestFrameLists:
@@ -221,7 +221,7 @@ class TestBadDays:
         assert "soccer-data" not in caught.value.message
         assert not is_kept(picture_object, settings)
         proxy.mode = "open"
-        assert content_type(read_frame(picture_object, None, False, settings)) == "image/png"
+        assert guess_content_type(read_frame(picture_object, None, False, settings)) == "image/png"
 
     def test_an_object_that_was_changed_is_not_shown_in_the_place_of_the_first(
         self, settings: Settings, picture_object: Media

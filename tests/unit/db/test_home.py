@@ -8,10 +8,10 @@ import pytest
 from app.config import Settings
 from app.db.home import (
     delete_leftovers,
-    file_system,
+    find_file_system,
+    find_last_write_time,
     find_leftovers,
     is_half_written,
-    last_written,
     make_home,
     make_private,
     open_to_others,
@@ -47,21 +47,21 @@ class TestFileSystem:
     def test_is_that_of_the_nearest_mount(self, tmp_path: Path, folder: str, kind: str) -> None:
         mounts = tmp_path / "mounts"
         mounts.write_text(MOUNTS)
-        assert file_system(Path(folder), mounts) == kind
+        assert find_file_system(Path(folder), mounts) == kind
 
     def test_without_a_list_of_mounts_the_file_system_is_unknown(self, tmp_path: Path) -> None:
-        assert file_system(tmp_path, tmp_path / "nothing") == ""
+        assert find_file_system(tmp_path, tmp_path / "nothing") == ""
 
 
 class TestMakeHome:
     @pytest.mark.file_of_sqlite("where the file may lie")
     def test_a_network_file_system_is_refused(self, settings, monkeypatch) -> None:
-        monkeypatch.setattr("app.db.home.file_system", lambda _folder: "nfs4")
+        monkeypatch.setattr("app.db.home.find_file_system", lambda _folder: "nfs4")
         with pytest.raises(StorageError, match="network file system"):
             make_home(settings)
 
     def test_files_of_a_database_on_a_server_may_lie_there(self, settings, monkeypatch) -> None:
-        monkeypatch.setattr("app.db.home.file_system", lambda _folder: "nfs4")
+        monkeypatch.setattr("app.db.home.find_file_system", lambda _folder: "nfs4")
         other = settings.model_copy(update={"database_url": "postgresql://host/touchline"})
         assert make_home(other) == settings.home
 
@@ -176,7 +176,7 @@ class TestLeftovers:
         assert list(find_leftovers(settings)) == []
 
     def test_a_file_that_is_gone_has_no_time_of_writing(self, tmp_path: Path) -> None:
-        assert last_written(tmp_path / "gone") is None
+        assert find_last_write_time(tmp_path / "gone") is None
 
     def test_what_a_killed_writer_of_ours_leaves_goes_whatever_it_wrote(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch

@@ -6,7 +6,7 @@ import pytest
 
 from app.config import Settings
 from app.db import locks
-from app.db.locks import DatabaseInUse, database_alone, practice_lock, server_lock
+from app.db.locks import DatabaseInUse, hold_database_alone, hold_practice_lock, hold_server_lock
 from app.errors import BusyError, StorageError
 
 FLOCK = fcntl.flock
@@ -55,31 +55,31 @@ class TestDatabaseLock:
         first = DatabaseInUse(settings)
         first.share()
         refused = pytest.raises(StorageError, match="has the database open: not now")
-        with refused, database_alone(settings, "not now"):
+        with refused, hold_database_alone(settings, "not now"):
             pass
         first.release()
         first.release()
-        with database_alone(settings, "not now"):
+        with hold_database_alone(settings, "not now"):
             pass
 
 
 class TestServerLock:
     def test_a_home_has_one_server(self, settings) -> None:
         refused = pytest.raises(StorageError, match="another Touchline server")
-        with server_lock(settings), refused, server_lock(settings):
+        with hold_server_lock(settings), refused, hold_server_lock(settings):
             pass
-        with server_lock(settings):
+        with hold_server_lock(settings):
             pass
 
 
 class TestPracticeLock:
     def test_who_comes_second_waits_until_the_first_is_done(self, settings: Settings) -> None:
-        told, first = [], practice_lock(settings, lambda: None)
+        told, first = [], hold_practice_lock(settings, lambda: None)
         first.__enter__()
 
         def waiting() -> None:
             told.append(True)
             first.__exit__(None, None, None)
 
-        with practice_lock(settings, waiting):
+        with hold_practice_lock(settings, waiting):
             assert told == [True]

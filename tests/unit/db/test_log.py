@@ -8,13 +8,13 @@ from sqlalchemy import text
 from app.db.log import (
     Entry,
     LogModel,
-    append,
+    append_entries,
+    filter_groups_with_history,
+    find_newest_entry_id,
     group_entries,
-    groups_with_past,
-    newest_entry,
+    list_station_entries,
     read_entries,
     read_log,
-    station_entries,
     verify_chain,
 )
 from app.errors import StorageError
@@ -25,16 +25,19 @@ FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1,
 
 def fill(own_store, count: int) -> None:
     with own_store.write() as session:
-        append(session, [replace(FIRST, body={"n": number}) for number in range(count)])
+        append_entries(session, [replace(FIRST, body={"n": number}) for number in range(count)])
 
 
 class TestAppend:
     def test_entries_come_back_in_order_with_ids(self, own_store) -> None:
         with own_store.write() as session:
-            assert append(session, [FIRST, replace(FIRST, kind="edit", group_id=8)]) == [1, 2]
-            assert append(session, []) == []
+            assert append_entries(session, [FIRST, replace(FIRST, kind="edit", group_id=8)]) == [
+                1,
+                2,
+            ]
+            assert append_entries(session, []) == []
         with own_store.write() as session:
-            assert append(session, [replace(FIRST, group_id=None, station_id=3)]) == [3]
+            assert append_entries(session, [replace(FIRST, group_id=None, station_id=3)]) == [3]
         with own_store.read() as session:
             entries = list(read_log(session))
         assert [(item.id, item.kind, item.group_id) for item in entries] == [
@@ -46,7 +49,7 @@ class TestAppend:
 
     def test_an_entry_with_nan_is_refused(self, own_store) -> None:
         with pytest.raises(ValueError, match="JSON"), own_store.write() as session:
-            append(session, [replace(FIRST, body={"x": float("nan")})])
+            append_entries(session, [replace(FIRST, body={"x": float("nan")})])
 
 
 class TestReadLog:
@@ -90,12 +93,12 @@ class TestEntriesOfOne:
                 replace(FIRST, group_id=8),
                 replace(FIRST, group_id=8, kind="verdict"),
             ]
-            append(session, said)
+            append_entries(session, said)
             assert [item.id for item in group_entries(session, 7)] == [1, 2, 4]
             assert [item.id for item in group_entries(session, 7, verdicts=False)] == [1, 4]
-            assert [item.id for item in station_entries(session, 3)] == [3]
-            assert groups_with_past(session, [7, 8, 9]) == {7}
-            assert newest_entry(session) == 6
+            assert [item.id for item in list_station_entries(session, 3)] == [3]
+            assert filter_groups_with_history(session, [7, 8, 9]) == {7}
+            assert find_newest_entry_id(session) == 6
 
 
 class TestVerifyChain:

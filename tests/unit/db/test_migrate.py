@@ -19,8 +19,13 @@ from app.db.backup import verify_backup
 from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
 from app.db.locks import DatabaseInUse
-from app.db.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
-from app.db.restore import restore
+from app.db.migrate import (
+    KNOWN_REVISIONS,
+    find_migrations_folder,
+    migrate_database,
+    read_schema_revision,
+)
+from app.db.restore import restore_database
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.tables import Base
@@ -39,7 +44,7 @@ def make_old(settings: Settings, revision: str) -> None:
     """A home as an earlier version left it: its schema, a dataset, and no anchor."""
     make_home(settings)
     config = Config()
-    config.set_main_option("script_location", str(migrations_folder()))
+    config.set_main_option("script_location", str(find_migrations_folder()))
     engine = make_engine(settings).execution_options(**WRITE)
     with engine.begin() as connection:
         config.attributes["connection"] = connection
@@ -53,14 +58,14 @@ def state(settings: Settings) -> tuple[str | None, str]:
     engine = make_engine(settings)
     with engine.connect() as connection:
         name = connection.execute(text("SELECT name FROM dataset")).scalar_one()
-    revision = schema_revision(engine)
+    revision = read_schema_revision(engine)
     engine.dispose()
     return revision, name
 
 
 class TestMigrate:
     def test_makes_the_tables_of_the_models(self, settings) -> None:
-        assert migrate(settings).revision == KNOWN_REVISIONS[-1]
+        assert migrate_database(settings).revision == KNOWN_REVISIONS[-1]
         with make_engine(settings).connect() as connection:
             context = MigrationContext.configure(connection)
             assert compare_metadata(context, Base.metadata) == []
@@ -68,7 +73,7 @@ class TestMigrate:
     def test_again_it_changes_nothing(self, own_store, settings) -> None:
         with own_store.write() as session:
             session.execute(text("INSERT INTO calibration (key, body) VALUES ('k', 'b')"))
-        migrate(settings)
+        migrate_database(settings)
         with own_store.read() as session:
             assert session.execute(text("SELECT count(*) FROM calibration")).scalar() == 1
 
@@ -85,13 +90,13 @@ class TestMigrate:
         with pytest.raises(StorageError, match=r"another program \(tables: cookies\)"):
             Store.open(settings)
         with pytest.raises(StorageError, match="another program"):
-            migrate(settings)
+            migrate_database(settings)
         assert settings.database_file.read_bytes() == before
         # SQLite makes files beside a database of this mode, also for whoever only reads.
         assert list(settings.home.glob("touchline.db?*")) == []
 
     def test_knows_every_migration_there_is(self) -> None:
-        scripts = ScriptDirectory(str(migrations_folder()))
+        scripts = ScriptDirectory(str(find_migrations_folder()))
         revisions = [script.revision for script in scripts.walk_revisions()]
         assert tuple(reversed(revisions)) == KNOWN_REVISIONS
 
@@ -107,9 +112,9 @@ class TestMigrate:
 
         monkeypatch.setattr(Operations, "execute", broken)
         with pytest.raises(KeyboardInterrupt):
-            migrate(settings)
+            migrate_database(settings)
         engine = make_engine(settings)
-        assert schema_revision(engine) is None
+        assert read_schema_revision(engine) is None
         with engine.connect() as connection:
             assert connection.execute(text("SELECT count(*) FROM sqlite_master")).scalar() == 0
         monkeypatch.undo()
@@ -122,7 +127,7 @@ class TestOldHomes:
         self, settings: Settings, revision: str
     ) -> None:
         make_old(settings, revision)
-        migrated = migrate(settings)
+        migrated = migrate_database(settings)
         assert state(settings) == (KNOWN_REVISIONS[-1], "old")
         assert (
             migrated.copy == settings.home / "backups" / f"before-schema-{KNOWN_REVISIONS[-1]}.zip"
@@ -151,24 +156,24 @@ class TestOldHomes:
         done = subprocess.run(command, cwd=Path(__file__).parents[3], check=False)
         assert done.returncode == -9
         assert state(settings) == (revision, "old")
-        assert migrate(settings).revision == KNOWN_REVISIONS[-1]
+        assert migrate_database(settings).revision == KNOWN_REVISIONS[-1]
         assert state(settings)[1] == "old"
 
     def test_the_way_back_is_the_backup(self, settings: Settings) -> None:
         make_old(settings, "0009")
-        copy = migrate(settings).copy
+        copy = migrate_database(settings).copy
         assert copy is not None
-        restore(settings, copy)
+        restore_database(settings, copy)
         assert state(settings) == ("0009", "old")
 
     def test_an_older_version_names_the_way_back(self, settings: Settings, monkeypatch) -> None:
         make_old(settings, "0009")
-        copy = migrate(settings).copy
+        copy = migrate_database(settings).copy
         monkeypatch.setattr("app.db.migrate.KNOWN_REVISIONS", RELEASED)
         with pytest.raises(
             StorageError, match=f"newer version .* .schema {KNOWN_REVISIONS[-1]}"
         ) as caught:
-            migrate(settings)
+            migrate_database(settings)
         assert f"touchline restore {copy}" in str(caught.value.hint)
 
     def test_backups_of_earlier_migrations_go_with_the_next(self, settings: Settings) -> None:
@@ -176,7 +181,7 @@ class TestOldHomes:
         earlier = settings.home / "backups" / "before-schema-0009.zip"
         earlier.parent.mkdir()
         earlier.write_bytes(b"")
-        copy = migrate(settings).copy
+        copy = migrate_database(settings).copy
         assert list(earlier.parent.iterdir()) == [copy]
 
     def test_without_a_backup_nothing_is_migrated(self, settings: Settings, monkeypatch) -> None:
@@ -186,7 +191,7 @@ class TestOldHomes:
         make_old(settings, "0009")
         monkeypatch.setattr("app.db.migrate.write_backup", full)
         with pytest.raises(StorageError, match="disk is full"):
-            migrate(settings)
+            migrate_database(settings)
         assert state(settings) == ("0009", "old")
 
     def test_is_refused_while_somebody_has_the_database_open(self, settings: Settings) -> None:
@@ -194,7 +199,7 @@ class TestOldHomes:
         lock = DatabaseInUse(settings)
         lock.share()
         with pytest.raises(StorageError, match="another Touchline process has the database open"):
-            migrate(settings)
+            migrate_database(settings)
         assert state(settings) == ("0009", "old")
         lock.release()
-        migrate(settings)
+        migrate_database(settings)

@@ -13,8 +13,8 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.backup import FRAMES, back_up
-from app.db.locks import server_lock
-from app.db.restore import restore
+from app.db.locks import hold_server_lock
+from app.db.restore import restore_database
 from app.db.store import Store
 from app.errors import DamagedError, InputError, StorageError
 from tests.unit.db.homes import killed, say
@@ -42,28 +42,28 @@ def entries(home: Path) -> int:
 
 class TestRestore:
     def test_the_home_is_as_it_was_then(self, own_store: Store, backup: Path) -> None:
-        restored = restore(own_store.settings, backup)
+        restored = restore_database(own_store.settings, backup)
         assert (restored.entries, restored.files) == (3, 1)
         assert entries(own_store.settings.home) == 3
 
     def test_what_was_there_is_moved_aside_and_is_whole(
         self, own_store: Store, backup: Path
     ) -> None:
-        restored = restore(own_store.settings, backup)
+        restored = restore_database(own_store.settings, backup)
         assert restored.aside is not None
         assert (restored.aside / "uploads" / "1" / "upload.json").exists()
         shutil.rmtree(restored.aside / "uploads")
         assert entries(restored.aside) == 8
 
     def test_another_home_becomes_the_same(self, backup: Path, tmp_path: Path) -> None:
-        restored = restore(Settings(home=tmp_path / "new"), backup)
+        restored = restore_database(Settings(home=tmp_path / "new"), backup)
         assert restored.aside is None
         assert entries(tmp_path / "new") == 3
         assert (tmp_path / "new" / "uploads" / "1" / "upload.json").exists()
 
     def test_its_files_are_for_their_owner_alone(self, backup: Path, tmp_path: Path) -> None:
         home = tmp_path / "new"
-        restore(Settings(home=home), backup)
+        restore_database(Settings(home=home), backup)
         assert {path.stat().st_mode & 0o077 for path in home.rglob("*")} == {0}
 
     def test_a_home_that_is_in_use_is_left_alone(self, backup: Path, tmp_path: Path) -> None:
@@ -72,9 +72,12 @@ class TestRestore:
             closing(Store.open(settings)),
             pytest.raises(StorageError, match="has the database open"),
         ):
-            restore(settings, backup)
-        with server_lock(settings), pytest.raises(StorageError, match="another Touchline server"):
-            restore(settings, backup)
+            restore_database(settings, backup)
+        with (
+            hold_server_lock(settings),
+            pytest.raises(StorageError, match="another Touchline server"),
+        ):
+            restore_database(settings, backup)
         assert entries(settings.home) == 0
 
     def test_a_damaged_backup_changes_nothing(self, own_store: Store, backup: Path) -> None:
@@ -82,7 +85,7 @@ class TestRestore:
         content[len(content) // 2] ^= 1
         backup.write_bytes(content)
         with pytest.raises(InputError):
-            restore(own_store.settings, backup)
+            restore_database(own_store.settings, backup)
         assert entries(own_store.settings.home) == 8
 
     @pytest.mark.parametrize("name", ["../evil", "/evil", "uploads/../../evil", "other/evil"])
@@ -98,7 +101,7 @@ class TestRestore:
                 target.writestr(member, source.read(member))
             target.writestr(name, b"{}")
         with pytest.raises(InputError, match="not a file of a Touchline home"):
-            restore(own_store.settings, forged)
+            restore_database(own_store.settings, forged)
         assert not (tmp_path / "evil").exists()
 
     def test_killed_before_the_database_is_in_place_no_new_home_begins(
@@ -109,11 +112,11 @@ class TestRestore:
 
         monkeypatch.setattr("app.db.restore._move_into_home", kill)
         with pytest.raises(KeyboardInterrupt):
-            restore(own_store.settings, backup)
+            restore_database(own_store.settings, backup)
         monkeypatch.undo()
         with pytest.raises(DamagedError, match="is missing, but this home has been used"):
             Store.open(own_store.settings)
-        restore(own_store.settings, backup)
+        restore_database(own_store.settings, backup)
         assert entries(own_store.settings.home) == 3
 
     def test_a_database_beside_a_foreign_log_goes_on_without_it(
@@ -132,7 +135,7 @@ class TestRestore:
         killed(own_store, tmp_path / "left", "touchline.db-wal", "home.json")
         with pytest.raises(DamagedError, match="another database"):
             Store.open(early)
-        restored = restore(early, early.database_file)
+        restored = restore_database(early, early.database_file)
         assert (restored.entries, restored.foreign_log) == (4, True)
         assert entries(early.home) == 4
 
@@ -141,16 +144,16 @@ class TestRestore:
     ) -> None:
         say(own_store, 12)
         left = killed(own_store, tmp_path / "left")
-        assert restore(Settings(home=tmp_path / "new"), left.database_file).entries == 12
+        assert restore_database(Settings(home=tmp_path / "new"), left.database_file).entries == 12
 
     def test_a_backup_of_a_newer_version_is_refused(self, own_store: Store, tmp_path: Path) -> None:
         with own_store.write() as session:
             session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
         back_up(own_store.settings, tmp_path / "b.zip")
         with pytest.raises(StorageError, match="newer version"):
-            restore(Settings(home=tmp_path / "new"), tmp_path / "b.zip")
+            restore_database(Settings(home=tmp_path / "new"), tmp_path / "b.zip")
 
     def test_any_other_file_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "letter.txt").write_text("Dear all" * 100)
         with pytest.raises(InputError, match="neither a backup"):
-            restore(Settings(home=tmp_path / "new"), tmp_path / "letter.txt")
+            restore_database(Settings(home=tmp_path / "new"), tmp_path / "letter.txt")

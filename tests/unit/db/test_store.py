@@ -15,8 +15,8 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.db.dialects.sqlite import AGAIN_S, PRAGMAS
-from app.db.log import Entry, append, read_log
-from app.db.migrate import migrate
+from app.db.log import Entry, append_entries, read_log
+from app.db.migrate import migrate_database
 from app.db.store import Store
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from tests.databases import said_for_sqlite
@@ -44,7 +44,7 @@ class TestOpen:
             session.execute(text("SELECT count(*) FROM sqlite_schema"))
             assert lock_watcher.sees_open(settings.database_file)
             Store.open(settings).close()
-            migrate(settings)
+            migrate_database(settings)
             assert lock_watcher.sees_open(settings.database_file)
         own_store.close()
         assert not lock_watcher.sees_open(settings.database_file)
@@ -90,7 +90,7 @@ class TestOpen:
             pytest.raises(RuntimeError, match="must be durable"),
             own_store.write(lasting=False) as session,
         ):
-            append(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
+            append_entries(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
         with own_store.read() as session:
             assert list(read_log(session)) == []
 
@@ -106,7 +106,7 @@ class TestOpen:
     def test_a_newer_schema_is_refused(self, own_store: Store) -> None:
         with own_store.write() as session:
             session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
-        for attempt in (Store.open, migrate):
+        for attempt in (Store.open, migrate_database):
             with pytest.raises(StorageError, match="newer version"):
                 attempt(own_store.settings)
 

@@ -16,12 +16,12 @@ from app.errors import ImageError, NotFoundError, TooLargeError
 from app.media import files as media_module
 from app.media import video as video_index
 from app.media.files import (
-    content_type,
     decode_picture,
-    frame_name,
+    describe_frame,
+    guess_content_type,
     has_member,
-    media_facts,
     read_frame,
+    read_media_facts,
 )
 from app.media.object_frames import ArchiveMembers
 from app.soccer.group import Media
@@ -83,7 +83,7 @@ class TestFrameOfAZipInsideAZip:
         media = Media(str(upload), "league/Frames-v3.zip/v3_frames/7.png")
         assert read_frame(media, None, False, settings) == PNG
         assert read_frame(media, 40, True, settings) == read_frame(media, 40, True, settings)
-        assert media_facts(media) == {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
+        assert read_media_facts(media) == {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
 
     def test_real_bytes_are_counted(self, tmp_path, archive) -> None:
         upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
@@ -145,7 +145,7 @@ class TestReadFrame:
     def test_a_file_comes_as_it_is(self, file, settings) -> None:
         data = read_frame(Media(str(file)), None, False, settings)
         assert data == PNG
-        assert content_type(data) == "image/png"
+        assert guess_content_type(data) == "image/png"
 
     def test_a_member_of_an_archive_is_read_in_place(self, archive, settings) -> None:
         media = Media(str(archive), "v3_frames/7.png")
@@ -156,7 +156,7 @@ class TestReadFrame:
         media = Media(str(archive), "v3_frames/7.png")
         data = read_frame(media, 40, False, settings)
         assert decoded(data).shape == (22, 40, 3)
-        assert content_type(data) == "image/jpeg"
+        assert guess_content_type(data) == "image/jpeg"
         (cached,) = (path for path in settings.cache.rglob("*") if path.is_file())
         assert cached.read_bytes() == data
         cached.write_bytes(b"from the cache")
@@ -230,7 +230,7 @@ class TestReadFrame:
         with pytest.MonkeyPatch.context() as patch:
             for module in (media_module, video_index):
                 patch.setattr(module, "open_video", lambda _: nullcontext(Growing()))
-            patch.setattr(media_module, "video_times", lambda *_: np.arange(2.0))
+            patch.setattr(media_module, "read_video_times", lambda *_: np.arange(2.0))
             with pytest.raises(TooLargeError, match="8000 x 8000"):
                 read_frame(Media(str(path), frame=1), None, False, settings)
 
@@ -255,7 +255,7 @@ class TestReadFrame:
         ):
             with pytest.raises(NotFoundError, match=r"swapped\.zip is now a symbolic link"):
                 asked()
-        assert media_facts(media) == {}
+        assert read_media_facts(media) == {}
 
     def test_a_folder_swapped_for_a_link_does_not_lead_out(self, tmp_path, settings) -> None:
         outside, root = tmp_path / "outside", tmp_path / "root"
@@ -359,24 +359,25 @@ class TestReadFrame:
 
 class TestFrameName:
     def test_says_file_and_place_in_it_and_no_folder(self) -> None:
-        assert frame_name(Media("/data/7.png")) == "frame 7.png"
+        assert describe_frame(Media("/data/7.png")) == "frame 7.png"
         assert (
-            frame_name(Media("/data/a.zip", "v3_frames/7.png")) == "frame v3_frames/7.png of a.zip"
+            describe_frame(Media("/data/a.zip", "v3_frames/7.png"))
+            == "frame v3_frames/7.png of a.zip"
         )
-        assert frame_name(Media("/data/cam1.mp4", frame=3)) == "frame 3 of cam1.mp4"
+        assert describe_frame(Media("/data/cam1.mp4", frame=3)) == "frame 3 of cam1.mp4"
 
 
 class TestMediaFacts:
     def test_an_archive_knows_size_and_checksum(self, file, archive) -> None:
-        assert media_facts(Media(str(archive), "v3_frames/7.png")) == {
+        assert read_media_facts(Media(str(archive), "v3_frames/7.png")) == {
             "bytes": len(PNG),
             "crc32": zlib.crc32(PNG),
         }
-        assert media_facts(Media(str(file))) == {"bytes": len(PNG)}
+        assert read_media_facts(Media(str(file))) == {"bytes": len(PNG)}
 
     def test_a_missing_file_has_no_facts(self, tmp_path, archive) -> None:
-        assert media_facts(Media(str(tmp_path / "gone.png"))) == {}
-        assert media_facts(Media(str(archive), "gone.png")) == {}
+        assert read_media_facts(Media(str(tmp_path / "gone.png"))) == {}
+        assert read_media_facts(Media(str(archive), "gone.png")) == {}
 
 
 class TestArchives:

@@ -12,8 +12,8 @@ from app.config import Settings
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.media import files as media_module
 from app.media import video as video_index
-from app.media.files import decode_frame, has_index, read_frame, video_times
-from app.media.frames import Frames, neighbouring_frames
+from app.media.files import decode_frame, has_index, read_frame, read_video_times
+from app.media.frames import Frames, find_neighbouring_frames
 from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
 
@@ -45,7 +45,7 @@ CODECS = [
 
 def wrong(path: Path, settings: Settings, step: int = 7) -> list[tuple[int, int]]:
     """Frames that show another number than theirs."""
-    times = video_times(Media(str(path), frame=0), settings)
+    times = read_video_times(Media(str(path), frame=0), settings)
     assert len(times) == COUNT
     found = []
     for number in [*range(0, COUNT, step), COUNT - 1]:
@@ -101,7 +101,7 @@ class TestFrameAt:
         self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 100)
-        video_times(Media(str(path), frame=60), settings)
+        read_video_times(Media(str(path), frame=60), settings)
         monkeypatch.setattr(cv2, "VideoCapture", Astray)
         monkeypatch.setattr(Astray, "jumps", [])
         picture = decode_frame(Media(str(path), frame=60), False, settings)
@@ -115,27 +115,27 @@ class TestVideoTimes:
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
         assert not has_index(media, settings)
-        times = video_times(media, settings)
+        times = read_video_times(media, settings)
         assert times.tolist() == pytest.approx([40.0 * number for number in range(20)])
         assert has_index(media, settings)
         monkeypatch.setattr(media_module, "make_index", lambda *_: pytest.fail("decoded again"))
-        assert (video_times(media, settings) == times).all()
+        assert (read_video_times(media, settings) == times).all()
 
     def test_another_video_in_its_place_is_decoded_again(
         self, tmp_path: Path, settings: Settings
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        video_times(media, settings)
+        read_video_times(media, settings)
         write_video(tmp_path / "cam1.mp4", "mp4v", 9)
-        assert len(video_times(media, settings)) == 9
+        assert len(read_video_times(media, settings)) == 9
 
     def test_a_damaged_index_is_made_again(self, tmp_path: Path, settings: Settings) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        video_times(media, settings)
+        read_video_times(media, settings)
         (kept,) = (settings.cache / "videos").iterdir()
         for content in (b"", b"no array", kept.read_bytes()[:90]):
             kept.write_bytes(content)
-            assert len(video_times(media, settings)) == 20
+            assert len(read_video_times(media, settings)) == 20
 
     def test_a_frame_behind_the_last_is_refused_with_their_number(
         self, tmp_path: Path, settings: Settings
@@ -151,12 +151,12 @@ class TestVideoTimes:
         monkeypatch.setattr(video_index, "MAX_FRAMES", 19)
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
         with pytest.raises(TooLargeError, match="more than 19 frames"):
-            video_times(media, settings)
+            read_video_times(media, settings)
 
     def test_what_is_no_video_is_refused(self, tmp_path: Path, settings: Settings) -> None:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
         with pytest.raises(ImageError, match="not a video that can be read"):
-            video_times(Media(str(tmp_path / "cam1.mp4"), frame=0), settings)
+            read_video_times(Media(str(tmp_path / "cam1.mp4"), frame=0), settings)
 
 
 def is_indexed(media: Media, _flipped: bool, settings: Settings) -> bool:
@@ -274,5 +274,5 @@ class TestFramesOfTheServer:
 
     def test_neighbours_end_with_the_last_frame(self, tmp_path: Path, settings: Settings) -> None:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
-        found = neighbouring_frames(Media(str(path), frame=18), "18", True, settings)
+        found = find_neighbouring_frames(Media(str(path), frame=18), "18", True, settings)
         assert max(found) == 1

@@ -9,7 +9,7 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.paint.grass import find_field_of_play
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
@@ -31,7 +31,7 @@ class Rendered:
 def rendered() -> Rendered:
     scene = make_scenes(1, 1, faults=False)[0]
     view = scene.group.views[0]
-    image = np.ascontiguousarray(render(scene, view.key)[:, :, ::-1])
+    image = np.ascontiguousarray(render_view(scene, view.key)[:, :, ::-1])
     truth = scene.truth.view(view.key)
     assert truth is not None
     clicked = calibrate(view.station.lines, Pitch(), view.size, PAPER.calibration)

@@ -22,7 +22,7 @@ from app.paint.propose import (
     scale_snapped,
 )
 from app.paint.snap import SnappedCamera, snap_reading
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.sample.scenes import make_match
 from app.soccer.annotation import make_lines
@@ -43,7 +43,7 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="module")
 def frame(scene: Scene) -> Image:
-    return np.ascontiguousarray(render(scene, scene.group.views[0].key)[:, :, ::-1])
+    return np.ascontiguousarray(render_view(scene, scene.group.views[0].key)[:, :, ::-1])
 
 
 class TestPropose:

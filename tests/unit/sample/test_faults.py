@@ -12,7 +12,7 @@ from app.sample.faults import (
     POINT_SHIFT_PX,
     TINY_BASELINE_M,
     FaultPlan,
-    confusable_markings,
+    list_confusable_markings,
     plant_annotation_fault,
 )
 from app.sample.scene import FAULT_KINDS, PlantedFault, Scene
@@ -144,7 +144,7 @@ class TestWrongLabel:
 class TestConfusions:
     def test_every_marking_can_be_taken_for_another(self):
         for marking in MARKINGS:
-            names = confusable_markings(marking)
+            names = list_confusable_markings(marking)
             assert names
             assert marking not in names
             assert set(names) <= set(MARKINGS)

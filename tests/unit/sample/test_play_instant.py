@@ -7,16 +7,16 @@ from app.sample.play import (
     BALL_DIAMETER,
     PEOPLE,
     advance_instant,
+    choose_shirt_numbers,
     clear_lines_of_sight,
     make_instant,
-    shirt_numbers,
 )
 
 
 @pytest.fixture
 def instant():
     rng = np.random.default_rng(1)
-    return make_instant(rng, shirt_numbers(rng))
+    return make_instant(rng, choose_shirt_numbers(rng))
 
 
 class TestMakeInstant:
@@ -34,7 +34,7 @@ class TestMakeInstant:
 
 class TestShirtNumbers:
     def test_a_team_wears_every_number_once(self):
-        numbers = shirt_numbers(np.random.default_rng(3))
+        numbers = choose_shirt_numbers(np.random.default_rng(3))
         assert len(numbers) == PEOPLE
         assert numbers[0] == numbers[11] == 1
         assert numbers[22] == 0

@@ -5,14 +5,14 @@ import pytest
 
 from app.errors import NotFoundError
 from app.sample.cameras import COARSE, is_inside_image
-from app.sample.render import Image, render
+from app.sample.render import Image, render_view
 from app.sample.scene import Scene
 
 
 @pytest.fixture(scope="module")
 def frame(clean_scenes: list[Scene]) -> Image:
     scene = clean_scenes[0]
-    return render(scene, scene.group.views[0].key)
+    return render_view(scene, scene.group.views[0].key)
 
 
 class TestRender:
@@ -29,7 +29,7 @@ class TestRender:
         brighter = []
         for scene in clean_scenes[::12]:
             view = scene.truth.views[0]
-            image = render(scene, view.view).min(axis=2).astype(float)
+            image = render_view(scene, view.view).min(axis=2).astype(float)
             goals = COARSE.points[:, 2] < 0
             pixels = view.camera.project(COARSE.points[~goals])
             pixels = pixels[is_inside_image(pixels, 20)].round().astype(int)
@@ -41,7 +41,7 @@ class TestRender:
     def test_the_ball_is_bright_where_it_is(self, clean_scenes: list[Scene]):
         for scene in clean_scenes[::15]:
             view = scene.truth.views[0]
-            image = render(scene, view.view).astype(float)
+            image = render_view(scene, view.view).astype(float)
             x, y = view.camera.project(np.array([view.ball]))[0]
             radius = max(2, int(view.ball_diameter_px / 2))
             column, row = round(x), round(y)
@@ -49,15 +49,15 @@ class TestRender:
             assert np.percentile(patch.min(axis=2), 85) > 120
 
     def test_the_same_scene_gives_the_same_pixels(self, frame: Image, clean_scenes: list[Scene]):
-        again = render(clean_scenes[0], clean_scenes[0].group.views[0].key)
+        again = render_view(clean_scenes[0], clean_scenes[0].group.views[0].key)
         np.testing.assert_array_equal(again, frame)
 
     def test_matches_differ(self, frame: Image, clean_scenes: list[Scene]):
         other = clean_scenes[-1]
         assert other.fixture != clean_scenes[0].fixture
-        image = render(other, other.group.views[0].key)
+        image = render_view(other, other.group.views[0].key)
         assert np.abs(image.mean(axis=(0, 1)) - frame.mean(axis=(0, 1))).max() > 3
 
     def test_a_view_that_is_not_there_is_named(self, clean_scenes: list[Scene]):
         with pytest.raises(NotFoundError, match=r"99\.png"):
-            render(clean_scenes[0], "99.png")
+            render_view(clean_scenes[0], "99.png")

@@ -6,7 +6,13 @@ import pytest
 from app.sample import SEED
 from app.sample.cameras import MIN_PARALLAX, PITCH, parallax_angle_at_ball
 from app.sample.scene import Scene
-from app.sample.scenes import BOX_EXCESS, loose_box, make_match, true_ball_box, visible_paths
+from app.sample.scenes import (
+    BOX_EXCESS,
+    compute_true_ball_box,
+    find_visible_paths,
+    make_match,
+    simulate_loose_box,
+)
 from app.soccer.frames import Box
 from app.soccer.pitch import CIRCLES, MARKINGS
 from app.soccer.policy import PAPER, TOUCHLINE
@@ -87,7 +93,7 @@ class TestMakeMatch:
 class TestBallBox:
     def test_holds_the_outline_of_the_sphere(self, clean_scenes: list[Scene]):
         view = clean_scenes[0].truth.views[0]
-        box = true_ball_box(view.camera, np.array(view.ball))
+        box = compute_true_ball_box(view.camera, np.array(view.ball))
         depth = view.camera.pitch_to_camera(np.array([view.ball]))[0, 2]
         expected = PAPER.ball_diameter_m * view.camera.focal_length[0] / depth
         assert box.diameter == pytest.approx(expected, rel=0.06)
@@ -143,7 +149,7 @@ class TestClickLines:
 class TestVisiblePaths:
     def test_a_cut_marking_ends_on_the_border(self, clean_scenes: list[Scene]):
         camera = clean_scenes[0].truth.views[0].camera
-        paths = visible_paths(camera)
+        paths = find_visible_paths(camera)
         seen = np.flatnonzero(paths.lengths > 5)
         assert len(seen) > 5
         for number in seen:
@@ -156,7 +162,7 @@ class TestVisiblePaths:
                 assert MARKINGS[number] == "Circle central" or min(at_end, abs(at_border)) < 0.1
 
     def test_half_of_the_length_is_half_of_the_way(self, clean_scenes: list[Scene]):
-        paths = visible_paths(clean_scenes[0].truth.views[0].camera)
+        paths = find_visible_paths(clean_scenes[0].truth.views[0].camera)
         number = int(np.argmax(paths.lengths * [name not in CIRCLES for name in MARKINGS]))
         start, middle, end = paths.pixels_at(np.full(3, number), np.array([0.0, 0.5, 1.0]))
         # Distortion bends the line a little.
@@ -167,7 +173,7 @@ class TestLooseBox:
     def test_boxes_are_ten_to_forty_per_cent_too_large(self):
         rng = np.random.default_rng(1)
         tight = Box(300.0, 200.0, 20.0, 20.0)
-        ratios = [loose_box(rng, tight).box.diameter / 20 for _ in range(400)]
+        ratios = [simulate_loose_box(rng, tight).box.diameter / 20 for _ in range(400)]
         low, high = BOX_EXCESS
         assert 1 + low - 0.05 < min(ratios) < 1 + low + 0.05
         assert 1 + high - 0.1 < max(ratios) < 1 + high + 0.06
@@ -176,7 +182,7 @@ class TestLooseBox:
         rng = np.random.default_rng(2)
         tight = Box(300.0, 200.0, 12.0, 12.0)
         errors = [
-            100 * abs(loose_box(rng, tight).box.diameter - 12) / np.hypot(12, 12)
+            100 * abs(simulate_loose_box(rng, tight).box.diameter - 12) / np.hypot(12, 12)
             for _ in range(400)
         ]
         assert 16 < np.mean(errors) < 21

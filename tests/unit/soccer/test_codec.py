@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.db.json_columns import pack, parse, unpack
+from app.db.json_columns import compress_json, decompress_json, parse_json_column
 from app.errors import InputError
 from app.geometry.camera import Camera
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.codec import (
     group_from_json,
     group_inputs_hash,
     group_to_json,
-    source_hash,
+    hash_imported_group,
     station_digest,
     view_digest,
 )
@@ -42,7 +42,7 @@ EXACT = Camera(
 
 class TestGroup:
     def test_comes_back_to_the_last_bit(self, full_group) -> None:
-        value = unpack(pack(codec.group_to_json(full_group)))
+        value = decompress_json(compress_json(codec.group_to_json(full_group)))
         assert codec.group_from_json(value) == full_group
 
     def test_a_shared_station_can_stand_as_its_key(self, full_group) -> None:
@@ -56,14 +56,14 @@ class TestGroup:
         bare = codec.station_to_json(station)
         assert "given_covariance" not in bare  # digests of stations without one stay
         known = replace(station, given_covariance=COVARIANCE)
-        value = json.loads(canonical(codec.station_to_json(known)))
+        value = json.loads(canonical_json_text(codec.station_to_json(known)))
         assert codec.station_from_json(value) == known
 
     @pytest.mark.parametrize("lens", WIDE_LENSES)
     def test_a_wide_lens_comes_back(self, full_group, lens) -> None:
         given = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
         station = replace(full_group.views[0].station, given=given)
-        value = json.loads(canonical(codec.station_to_json(station)))
+        value = json.loads(canonical_json_text(codec.station_to_json(station)))
         assert value["given"]["lens"] == lens
         assert codec.station_from_json(value) == station
 
@@ -85,7 +85,7 @@ class TestGroup:
         station = full_group.views[0].station
         assert "picture" not in codec.station_to_json(station)  # digests of those without one stay
         known = replace(station, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
-        value = json.loads(canonical(codec.station_to_json(known)))
+        value = json.loads(canonical_json_text(codec.station_to_json(known)))
         assert codec.station_from_json(value) == known
 
     @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ class TestGroup:
 
     def test_integers_and_floats_are_one_text(self) -> None:
         whole = BallAnnotation(box=Box(1, 2, 3, 4))
-        assert canonical(codec.ball_to_json(whole)) == canonical(
+        assert canonical_json_text(codec.ball_to_json(whole)) == canonical_json_text(
             codec.ball_to_json(BallAnnotation(box=Box(1.0, 2.0, 3.0, 4.0)))
         )
 
@@ -121,7 +121,7 @@ class TestGroup:
 
 class TestCamera:
     def test_every_number_comes_back(self, full_camera) -> None:
-        text = canonical(codec.camera_to_json(full_camera))
+        text = canonical_json_text(codec.camera_to_json(full_camera))
         again = codec.camera_from_json(json.loads(text))
         assert np.array_equal(again.parameters, full_camera.parameters)
 
@@ -129,7 +129,9 @@ class TestCamera:
 class TestPolicy:
     @pytest.mark.parametrize("policy", [PAPER, STRICT, Policy(name="mine", tau_percent=0.7)])
     def test_comes_back(self, policy: Policy) -> None:
-        again = codec.policy_from_json(parse(canonical(codec.policy_to_json(policy))))
+        again = codec.policy_from_json(
+            parse_json_column(canonical_json_text(codec.policy_to_json(policy)))
+        )
         assert again == policy
         assert again.hash == policy.hash
 
@@ -196,7 +198,7 @@ class TestInputsHash:
     )
     def test_ignores_what_solving_does_not_read(self, full_group, change) -> None:
         assert group_inputs_hash(change(full_group)) == group_inputs_hash(full_group)
-        assert source_hash(change(full_group)) != source_hash(full_group)
+        assert hash_imported_group(change(full_group)) != hash_imported_group(full_group)
 
     def test_a_group_without_paint_has_the_hash_that_it_had_before_there_was_any(self) -> None:
         bare = Group("g", ())
@@ -207,7 +209,7 @@ class TestInputsHash:
         full_group = replace(full_group, paint={full_group.views[0].key: READ})
         again = group_from_json(group_to_json(full_group))
         assert group_inputs_hash(again) == group_inputs_hash(full_group)
-        assert source_hash(again) == source_hash(full_group)
+        assert hash_imported_group(again) == hash_imported_group(full_group)
 
 
 class TestSourceHash:
@@ -216,6 +218,6 @@ class TestSourceHash:
     ) -> None:
         shared = replace(full_group.views[1].station, given=None)
         other = full_group.with_view(replace(full_group.views[1], station=shared))
-        assert source_hash(other) == source_hash(full_group)
+        assert hash_imported_group(other) == hash_imported_group(full_group)
         assert station_digest(shared) != station_digest(full_group.views[1].station)
         assert view_digest(other.views[1]) == view_digest(full_group.views[1])

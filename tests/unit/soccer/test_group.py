@@ -1,6 +1,6 @@
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Station, View, view_letter
+from app.soccer.group import Group, Station, View, make_view_letter
 
 STATION = Station("7.png", ImageSize(1280, 720))
 BALL = BallAnnotation(box=Box(10.0, 20.0, 8.0, 6.0))
@@ -8,7 +8,7 @@ BALL = BallAnnotation(box=Box(10.0, 20.0, 8.0, 6.0))
 
 class TestViewLetter:
     def test_views_after_the_26th_are_numbered(self):
-        assert [view_letter(index) for index in (0, 2, 25, 26)] == ["A", "C", "Z", "V27"]
+        assert [make_view_letter(index) for index in (0, 2, 25, 26)] == ["A", "C", "Z", "V27"]
 
 
 class TestBall:

@@ -14,7 +14,7 @@ from app.terminal.terminal import (
     MAX_MISSING,
     allow_any_text,
     escape_controls,
-    held_interrupts,
+    hold_interrupts,
     print_error,
     print_export,
     print_import,
@@ -71,7 +71,7 @@ def default_ctrl_c() -> Iterator[None]:
 
 class TestHeldInterrupts:
     def test_ctrl_c_is_heard_and_is_no_exception_until_it_is_over(self, default_ctrl_c) -> None:
-        with held_interrupts() as interrupted:
+        with hold_interrupts() as interrupted:
             assert not interrupted()
             # To this thread: the kernel may give what the process gets to any other, and in its time.
             signal.raise_signal(signal.SIGINT)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.config import Settings
-from app.video.cuts import hard_cuts
+from app.video.cuts import find_hard_cuts
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
 from tests.films import Clip, Join, flash, freeze, join, rendered, slow, whip, write_film
@@ -18,7 +18,7 @@ def indexed(folder: Path, film: Clip, settings: Settings, codec: str = "mp4v") -
 
 
 def cuts_of(index: RecordingIndex) -> list[int]:
-    return hard_cuts(index.measured, index.step)[0].tolist()
+    return find_hard_cuts(index.measured, index.step)[0].tolist()
 
 
 class TestHardCuts:
@@ -46,7 +46,7 @@ class TestHardCuts:
     ) -> None:
         film = flash(rendered(3, 60), 30, frames)
         index = indexed(tmp_path, film, settings)
-        cuts, lit = hard_cuts(index.measured, index.step)
+        cuts, lit = find_hard_cuts(index.measured, index.step)
         assert cuts.tolist() == []
         assert np.flatnonzero(lit).tolist() == list(range(30, 30 + frames))
 

@@ -9,10 +9,10 @@ from app.config import Settings
 from app.errors import InputError
 from app.video.index import (
     RecordingIndex,
+    find_time_base,
     index_from_bytes,
     index_to_bytes,
     read_index_seconds,
-    time_base_of,
 )
 from app.video.indexing import index_recording
 from tests.videos import vary_times, write_video
@@ -33,25 +33,25 @@ class TestTimeBaseOf:
         self, over: int, under: int
     ) -> None:
         count = 5400 * under // over
-        base, ticks = time_base_of(np.arange(count) * (over / under) * 1000.0)
+        base, ticks = find_time_base(np.arange(count) * (over / under) * 1000.0)
         assert base == (over, under)
         assert (ticks == np.arange(count)).all()
 
     def test_any_durations_are_counted_in_the_ticks_of_their_container(self) -> None:
         wanted = np.cumsum(np.random.default_rng(1).integers(100, 1500, 500))
         wanted = np.append([0], wanted)
-        base, ticks = time_base_of(wanted / 12800 * 1000)
+        base, ticks = find_time_base(wanted / 12800 * 1000)
         assert base == (1, 12800)
         assert (ticks == wanted).all()
 
     def test_times_without_a_common_tick_are_counted_in_nanoseconds(self) -> None:
         times = np.sort(np.random.default_rng(2).uniform(0, 1e5, 100))
-        base, ticks = time_base_of(times)
+        base, ticks = find_time_base(times)
         assert base == (1, 10**9)
         assert np.abs(ticks / 1e6 - times).max() < 1e-6
 
     def test_a_single_frame_has_a_time_base(self) -> None:
-        base, ticks = time_base_of(np.zeros(1))
+        base, ticks = find_time_base(np.zeros(1))
         assert base[0] > 0 and ticks.tolist() == [0]
 
 

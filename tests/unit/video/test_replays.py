@@ -7,7 +7,7 @@ import pytest
 
 from app.config import Settings
 from app.video.indexing import index_recording
-from app.video.replays import between_logos, logo_clusters
+from app.video.replays import cluster_logos, find_shots_between_logos
 from tests.films import Join, join, rendered, write_film
 
 
@@ -20,7 +20,7 @@ class TestLogoClusters:
         film, shots = join(clips, [Join(kind, 12, turn) for kind, turn in kinds])
         rows = index_recording(write_film(tmp_path / "film.mp4", film), settings).measured
         intervals = [(one.last + 1, other.first - 1) for one, other in pairwise(shots)]
-        found = logo_clusters(rows, intervals)
+        found = cluster_logos(rows, intervals)
         assert found[0] == found[3] is not None
         assert found[2] == found[5] is not None
         assert found[0] != found[2]
@@ -32,7 +32,7 @@ class TestLogoClusters:
         film, shots = join([rendered(seed, 50) for seed in range(4)], [Join("fade", 14)] * 3)
         rows = index_recording(write_film(tmp_path / "film.mp4", film), settings).measured
         intervals = [(one.last + 1, other.first - 1) for one, other in pairwise(shots)]
-        assert logo_clusters(rows, intervals) == [None] * 3
+        assert cluster_logos(rows, intervals) == [None] * 3
 
 
 class TestBetweenLogos:
@@ -58,9 +58,9 @@ class TestBetweenLogos:
         self, clusters: list[int | None], main: list[int], replays: list[int]
     ) -> None:
         seconds = [(10.0 * at, 10.0 * at + 9.0) for at in range(len(main))]
-        found = between_logos(clusters, seconds, [bool(one) for one in main])
+        found = find_shots_between_logos(clusters, seconds, [bool(one) for one in main])
         assert found.astype(int).tolist() == replays
 
     def test_a_stretch_of_minutes_is_none(self) -> None:
         seconds = [(0.0, 10.0), (10.0, 200.0), (200.0, 210.0)]
-        assert not between_logos([0, 0], seconds, [True, False, True]).any()
+        assert not find_shots_between_logos([0, 0], seconds, [True, False, True]).any()

@@ -8,7 +8,13 @@ import pytest
 
 from app.config import Settings
 from app.video.indexing import index_recording
-from app.video.shots import LookedAt, find_shots, frames_that_tell_kind, kind_of, look_at
+from app.video.shots import (
+    LookedAt,
+    analyse_frame,
+    choose_frames_for_kind,
+    classify_shot,
+    find_shots,
+)
 from tests.films import Join, freeze, join, rendered, write_film
 from tests.videos import vary_times
 
@@ -84,14 +90,14 @@ class TestKindOf:
     def test_it_follows_from_what_its_frames_show(
         self, looks: list[tuple[float, bool]], kind: str
     ) -> None:
-        assert kind_of([looked(*look) for look in looks]) == kind
+        assert classify_shot([looked(*look) for look in looks]) == kind
 
     def test_three_frames_are_looked_at_and_one_of_a_short_shot(self) -> None:
-        assert frames_that_tell_kind(100, 200, 4.0) == [120, 150, 180]
-        assert frames_that_tell_kind(100, 110, 0.4) == [105]
+        assert choose_frames_for_kind(100, 200, 4.0) == [120, 150, 180]
+        assert choose_frames_for_kind(100, 110, 0.4) == [105]
 
 
 class TestLookAt:
     def test_a_picture_without_grass_shows_none(self) -> None:
         grey = np.full((180, 320, 3), 128, np.uint8)
-        assert look_at(grey) == LookedAt(0.0, False)
+        assert analyse_frame(grey) == LookedAt(0.0, False)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from app.config import Settings
-from app.video.cuts import hard_cuts
+from app.video.cuts import find_hard_cuts
 from app.video.indexing import index_recording
-from app.video.transitions import Transition, soft_transitions
+from app.video.transitions import Transition, find_soft_transitions
 from tests.films import Clip, Join, flash, freeze, join, rendered, whip, write_film
 
 NEAR = 2
@@ -19,7 +19,9 @@ def transitions_of(
     folder: Path, film: Clip, settings: Settings, rate: float = 25
 ) -> list[Transition]:
     index = index_recording(write_film(folder / "film.mp4", film, rate=rate), settings)
-    return soft_transitions(index.measured, index.step, *hard_cuts(index.measured, index.step))
+    return find_soft_transitions(
+        index.measured, index.step, *find_hard_cuts(index.measured, index.step)
+    )
 
 
 class TestSoftTransitions:

@@ -16,12 +16,12 @@ from app.workers import cluster
 from app.workers.cluster import (
     Cluster,
     SchedulerPlace,
-    carry_out,
     read_place,
+    read_software_versions,
     require_same,
-    software_versions,
+    run_task_on_worker,
 )
-from app.workers.executors import fan_out
+from app.workers.executors import run_tasks
 from tests.certificates import write_keys
 from tests.waiting import SECONDS
 
@@ -109,10 +109,10 @@ class TestReadPlace:
 
 class TestRequireSame:
     def test_each_difference_is_named(self) -> None:
-        other = {**software_versions(), "solver": "4", "numpy": "1.0"}
+        other = {**read_software_versions(), "solver": "4", "numpy": "1.0"}
         del other["numba"]
         with pytest.raises(ClusterError) as refused:
-            require_same(software_versions(), other, "far")
+            require_same(read_software_versions(), other, "far")
         said = refused.value.message
         assert "the worker at far has solver 4 instead of" in said
         assert "numba missing instead of" in said
@@ -122,7 +122,7 @@ class TestRequireSame:
 class TestCluster:
     def test_results_come_back_and_so_do_errors_as_they_are(self, place: SchedulerPlace) -> None:
         with Cluster(place) as executor:
-            assert sorted(fan_out(double, range(20), executor)) == list(range(0, 40, 2))
+            assert sorted(run_tasks(double, range(20), executor)) == list(range(0, 40, 2))
             with pytest.raises(NotFoundError, match="there is no 7") as refused:
                 executor.submit(refuse, 7).result(SECONDS)
             assert refused.value.hint == "Look elsewhere."
@@ -186,11 +186,11 @@ class TestCluster:
     ) -> None:
         with Cluster(place) as executor:
             asked: Future[int] = executor.submit(
-                carry_out, {**software_versions(), "solver": "4"}, double, (1,)
+                run_task_on_worker, {**read_software_versions(), "solver": "4"}, double, (1,)
             )
             with pytest.raises(ClusterError, match="instead of 4"):
                 asked.result(SECONDS)
-        monkeypatch.setattr(cluster, "software_versions", of_another_version)
+        monkeypatch.setattr(cluster, "read_software_versions", of_another_version)
         with pytest.raises(ClusterError, match="has solver 4 instead of 5"):
             Cluster(place)
 

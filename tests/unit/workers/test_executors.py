@@ -15,7 +15,7 @@ import pytest
 from app.config import Settings
 from app.errors import InputError
 from app.workers import executors
-from app.workers.executors import executor_of, process_pool, server_pool
+from app.workers.executors import make_server_pool_opener, open_executor, open_process_pool
 from tests.waiting import SECONDS
 
 
@@ -30,7 +30,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         with Executor() as pool:
             yield pool
 
-    monkeypatch.setattr(executors, "process_pool", pretend)
+    monkeypatch.setattr(executors, "open_process_pool", pretend)
     return counts
 
 
@@ -41,7 +41,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_command_has_as_many_processes_as_it_asks_for_else_as_the_settings_say(
     tmp_path: Path, opened: list[int], own: int, asked: int | None, expected: list[int]
 ) -> None:
-    with executor_of(Settings(home=tmp_path, workers=own), asked) as executor:
+    with open_executor(Settings(home=tmp_path, workers=own), asked) as executor:
         assert (executor is None) == (not expected)
     assert opened == expected
 
@@ -50,7 +50,7 @@ def test_a_command_has_as_many_processes_as_it_asks_for_else_as_the_settings_say
 def test_a_server_leaves_one_processor_for_requests_and_opens_nothing_before_there_is_a_job(
     tmp_path: Path, opened: list[int], own: int, left: int
 ) -> None:
-    pool = server_pool(Settings(home=tmp_path, workers=own))
+    pool = make_server_pool_opener(Settings(home=tmp_path, workers=own))
     assert opened == []
     with pool():
         assert opened == [left]
@@ -60,9 +60,9 @@ def test_where_a_cluster_is_named_it_solves_and_no_process_of_this_machine(
     tmp_path: Path, opened: list[int]
 ) -> None:
     settings = Settings(home=tmp_path, workers=3, cluster="nonsense")
-    with pytest.raises(InputError, match="nonsense"), executor_of(settings, 2):
+    with pytest.raises(InputError, match="nonsense"), open_executor(settings, 2):
         pass
-    with pytest.raises(InputError, match="nonsense"), server_pool(settings)():
+    with pytest.raises(InputError, match="nonsense"), make_server_pool_opener(settings)():
         pass
     assert opened == []
 
@@ -74,7 +74,7 @@ class TestProcessPool:
         """As with sudo from somebody else's home: each process would end with a traceback."""
 
         def solve() -> str:
-            with pytest.raises(InputError) as refused, process_pool(2):
+            with pytest.raises(InputError) as refused, open_process_pool(2):
                 pass
             return f"{refused.value.message} {refused.value.hint}"
 
@@ -89,7 +89,7 @@ class TestProcessPool:
 
     def test_processes_end_with_the_work_that_fails_however_much_they_have_to_do(self) -> None:
         end = time.monotonic() + SECONDS
-        with pytest.raises(LookupError), process_pool(1) as pool:
+        with pytest.raises(LookupError), open_process_pool(1) as pool:
             pid = pool.submit(os.getpid).result()
             pool.submit(time.sleep, 3 * SECONDS)
             pool.submit(time.sleep, 3 * SECONDS)

@@ -12,7 +12,7 @@ from sqlalchemy import insert, select, text
 from app.config import Settings
 from app.db.backup import back_up
 from app.db.dialects import postgresql
-from app.db.restore import restore
+from app.db.restore import restore_database
 from app.db.store import Store
 from app.errors import BusyError, InputError, StorageError
 from app.features.datasets.tables import DatasetModel
@@ -202,7 +202,7 @@ class TestCopies:
     def test_are_made_by_the_server_and_the_command_is_named(
         self, own_store: Store, tmp_path
     ) -> None:
-        for copy in (back_up, restore):
+        for copy in (back_up, restore_database):
             with pytest.raises(InputError) as caught:
                 copy(own_store.settings, tmp_path / "x.zip")
             assert caught.value.hint is not None

@@ -13,7 +13,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.migrate import migrate
+from app.db.migrate import migrate_database
 from app.db.recovery.preopen_check import log_file
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
@@ -31,7 +31,7 @@ def content(home: Path) -> dict[str, bytes]:
 def refused(settings: Settings, match: str) -> None:
     """Neither opened nor migrated, with a way out, and not one byte is changed."""
     before = content(settings.home)
-    for attempt in (Store.open, migrate):
+    for attempt in (Store.open, migrate_database):
         with pytest.raises(DamagedError, match=match) as caught:
             attempt(settings)
         assert "touchline restore" in str(caught.value.hint)

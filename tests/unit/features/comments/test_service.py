@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.db.log import newest_entry, verify_chain
+from app.db.log import find_newest_entry_id, verify_chain
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
@@ -124,7 +124,7 @@ class TestLog:
         self, store: Store, group: int
     ) -> None:
         with store.read() as session:
-            before, position = read_etags(session, [group]), newest_entry(session)
+            before, position = read_etags(session, [group]), find_newest_entry_id(session)
         thread = comments.begin_thread(store, group, "One", actor="anna")
         comments.edit_comment(store, group, thread.id, thread.comments[0].id, "Two", actor="anna")
         comments.resolve_thread(store, group, thread.id, True, actor="bob")
@@ -137,7 +137,7 @@ class TestLog:
             ("anna", "deleted", None),
         ]
         with store.read() as session:
-            assert verify_chain(session) == newest_entry(session)
+            assert verify_chain(session) == find_newest_entry_id(session)
             assert read_etags(session, [group]) == before
             (change,) = read_changes(session, position)
         assert (change.kind, change.group_id) == ("comment", group)

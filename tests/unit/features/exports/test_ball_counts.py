@@ -20,7 +20,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
 from app.formats.parquet import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
+from app.soccer.ball_boxes import ball_fit, collect_ball_boxes, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from tests.balls import seen
@@ -196,6 +196,6 @@ class TestBoxOfAViewApart:
         ids: Any = {item.key: item for item in (load(mixed, 1), load(mixed, 2))}
         state = ids[f"{MATCH}/8.png"]
         view = replace(state.group.views[2], balls=())
-        assert ball_boxes(state.solution, view) == {}
+        assert collect_ball_boxes(state.solution, view) == {}
         assert ball_fit(state.solution, view, everything=True) is None
         assert not has_ball_3d(state.solution, view)

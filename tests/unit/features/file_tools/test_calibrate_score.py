@@ -3,17 +3,17 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
-from app.workers.executors import AHEAD, fan_out
+from app.workers.executors import AHEAD, run_tasks
 from tests.waiting import SECONDS
 
 
 class TestFanOut:
     def test_without_an_executor_results_come_in_order(self) -> None:
-        assert list(fan_out(abs, [-3, -1, -2], None)) == [3, 1, 2]
+        assert list(run_tasks(abs, [-3, -1, -2], None)) == [3, 1, 2]
 
     def test_an_executor_does_all_of_them(self) -> None:
         with ThreadPoolExecutor(2) as executor:
-            assert sorted(fan_out(abs, range(-50, 0), executor)) == list(range(1, 51))
+            assert sorted(run_tasks(abs, range(-50, 0), executor)) == list(range(1, 51))
 
     def test_tasks_are_made_as_workers_become_free(self) -> None:
         made: list[int] = []
@@ -24,7 +24,7 @@ class TestFanOut:
                 yield number
 
         with ThreadPoolExecutor(1) as executor:
-            results = fan_out(abs, tasks(), executor)
+            results = run_tasks(abs, tasks(), executor)
             next(results)
             assert len(made) <= AHEAD + 1
             results.close()
@@ -38,7 +38,7 @@ class TestFanOut:
             return number
 
         with ThreadPoolExecutor(3) as executor:
-            results = fan_out(work, range(5), executor, stopped.is_set)
+            results = run_tasks(work, range(5), executor, stopped.is_set)
             found = [next(results)]
             stopped.set()
             found += list(results)
@@ -47,4 +47,4 @@ class TestFanOut:
 
     def test_without_an_executor_it_stops_before_the_next_task(self) -> None:
         stops = iter([False, False, True])
-        assert list(fan_out(abs, [-1, -2, -3], None, lambda: next(stops))) == [1, 2]
+        assert list(run_tasks(abs, [-1, -2, -3], None, lambda: next(stops))) == [1, 2]

@@ -18,7 +18,7 @@ from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
 from app.formats.sn_calibration_writer import write_line_files
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.frames import ImageSize
 from tests.cameras import write_cameras
 from tests.scenes import make_scenes
@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("paint")
     scene = make_scenes(1, 1, faults=False)[0]
     view = scene.group.views[0]
-    good = render(scene, view.key)
+    good = render_view(scene, view.key)
     grey = cv2.cvtColor(cv2.cvtColor(good, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
     pictures = {
         "good": good,

@@ -26,7 +26,7 @@ from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.codec import group_inputs_hash, source_hash
+from app.soccer.codec import group_inputs_hash, hash_imported_group
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, LeftOut, Station, View
 from tests.balls import seen
@@ -129,7 +129,7 @@ class TestDigests:
     def test_groups_without_a_reason_are_frozen_without_that_field(self, make_group) -> None:
         group = IncludeView("7_1.png", False).apply(make_group(7))
         assert "left_out" not in "".join(freeze_annotations(group).texts.values())
-        assert source_hash(group) != source_hash(LEAVE.apply(make_group(7)))
+        assert hash_imported_group(group) != hash_imported_group(LEAVE.apply(make_group(7)))
 
 
 class TestVersions:

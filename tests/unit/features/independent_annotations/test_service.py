@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from app.db.log import newest_entry, verify_chain
+from app.db.log import find_newest_entry_id, verify_chain
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.features.batches.own_annotations import count_own_groups_left
 from app.features.batches.service import NewBatch, make_batch
@@ -398,7 +398,7 @@ class TestCopies:
     def test_one_that_is_made_later_is_hidden_from_the_first_entry_on(self, store, state) -> None:
         reader = Visibility(True, frozenset(), "ben", frozenset())
         with store.read() as session:
-            last = newest_entry(session)
+            last = find_newest_entry_id(session)
         begin_take(store, state.id, person="ann")
         changes = read_news(store, {last}, None).changes[last]
         assert changes and not [one for one in changes if reader.sees(one.dataset_id)]

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from app.command_line import app
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
-from app.db.locks import server_lock
+from app.db.locks import hold_server_lock
 from app.db.store import Store
 from app.features.imports.ingest import ensure_dataset
 
@@ -46,7 +46,7 @@ class TestDoctor:
 
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:
         assert CliRunner().invoke(app, ["doctor", "--rebuild"]).exit_code == 0
-        with server_lock(settings):
+        with hold_server_lock(settings):
             refused = CliRunner().invoke(app, ["doctor", "--rebuild"])
         assert refused.exit_code == 1
         assert "another Touchline server" in str(refused.exception)

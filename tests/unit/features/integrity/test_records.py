@@ -78,7 +78,7 @@ class TestExaminePeople:
     def test_roles_in_a_dataset_that_begins_afresh_are_those_of_the_new_one(
         self, team: Store, monkeypatch: pytest.MonkeyPatch, earlier: bool
     ) -> None:
-        plain = delete.append
+        plain = delete.append_entries
 
         def without_heir(session: Session, entries: list[Entry]) -> object:
             for entry in entries:
@@ -86,7 +86,7 @@ class TestExaminePeople:
             return plain(session, entries)
 
         if earlier:
-            monkeypatch.setattr(delete, "append", without_heir)
+            monkeypatch.setattr(delete, "append_entries", without_heir)
         delete_dataset(team, "demo", confirm="demo", actor="ann", afresh=PAPER)
         assert found(team)["roles in datasets"].sentence == "1, as the log says"
         forge(team, "UPDATE dataset_role SET role = 'viewer'")

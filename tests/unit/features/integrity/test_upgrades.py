@@ -13,7 +13,7 @@ from sqlalchemy import text
 from app.config import Settings
 from app.db.check import Check
 from app.db.home import make_home
-from app.db.migrate import KNOWN_REVISIONS, migrate
+from app.db.migrate import KNOWN_REVISIONS, migrate_database
 from app.db.store import Store
 from app.features.integrity.checks import examine_everything
 from app.soccer.solution import SOLVER_VERSION
@@ -74,7 +74,7 @@ def test_no_fault_is_found_and_what_is_advised_leaves_nothing_to_do(
 ) -> None:
     old = of_earlier_solver(worked_in, revision, tmp_path / "old")
     monkeypatch.setenv("TOUCHLINE_HOME", str(old.home))
-    migrate(old)
+    migrate_database(old)
     before = numbers(old)
     assert all(row[1] for row in before)
     checks = examine_everything(old)

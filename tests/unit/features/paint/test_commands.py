@@ -91,7 +91,7 @@ class TestPropose:
     def test_a_folder_without_pictures_is_said(self, tmp_path: Path, touchline: Run):
         (tmp_path / "in").mkdir()
         code, _, err = touchline("propose", tmp_path / "in", tmp_path / "out")
-        assert (code, "no pictures" in err) == (1, True)
+        assert (code, "no picture (" in err) == (1, True)
 
 
 class TestOfDataset:

@@ -32,7 +32,7 @@ from app.features.versions.verify import verify_version
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
 from app.media import files as media
-from app.sample.render import render
+from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint
@@ -54,7 +54,7 @@ def pictures(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("pictures")
     for number, scene in enumerate(scenes()):
         for view in scene.group.views[:2]:
-            cv2.imwrite(str(folder / f"{number}_{view.key}"), render(scene, view.key))
+            cv2.imwrite(str(folder / f"{number}_{view.key}"), render_view(scene, view.key))
     return folder
 
 

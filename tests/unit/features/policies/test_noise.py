@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.db.log import Entry, append
+from app.db.log import Entry, append_entries
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
 from app.features.datasets.queries import group_ids
@@ -124,7 +124,7 @@ class TestReadNoise:
         import_groups(store, "demo", groups, source="test", actor="ann")
         solve_dataset(store, "demo")
         with store.write() as session:
-            append(session, [*placings(read_states_of(store))])
+            append_entries(session, [*placings(read_states_of(store))])
         found = read_noise(store, "demo")
         worst, *rest = found.stations
         assert worst.source == "b" and not any(one.differs for one in rest if one.ratio > 1)

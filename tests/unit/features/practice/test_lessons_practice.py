@@ -110,7 +110,7 @@ class TestWritePractice:
     def test_writes_frames_labels_and_the_truth(self, tmp_path: Path, monkeypatch):
         # What a frame looks like is the renderer's own test.
         blank = np.zeros((8, 8, 3), np.uint8)
-        monkeypatch.setattr("app.features.practice.lessons.render", lambda _scene, _key: blank)
+        monkeypatch.setattr("app.features.practice.lessons.render_view", lambda _scene, _key: blank)
         said: list[tuple[int, int]] = []
         write_practice(tmp_path, lambda done, total: said.append((done, total)))
         truths = read_truth(tmp_path)

@@ -24,7 +24,7 @@ Json = dict[str, Any]
 def blank_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a frame looks like is the renderer's own test."""
     blank = np.zeros((720, 1280, 3), np.uint8)
-    monkeypatch.setattr("app.features.practice.lessons.render", lambda _scene, _key: blank)
+    monkeypatch.setattr("app.features.practice.lessons.render_view", lambda _scene, _key: blank)
 
 
 def make(app, client, **body: object) -> Json:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.db.log import newest_entry
+from app.db.log import find_newest_entry_id
 from app.db.store import Store
 from app.features.comments.service import begin_thread
 from app.features.datasets.service import delete_dataset, get_dataset
@@ -28,7 +28,7 @@ def since(store: Store, after: int) -> list[LoggedChange]:
 
 def newest(store: Store) -> int:
     with store.read() as session:
-        return newest_entry(session)
+        return find_newest_entry_id(session)
 
 
 class TestReadChanges:

@@ -14,7 +14,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.dialects.dialect import make_engine
-from app.db.migrate import KNOWN_REVISIONS, migrate, schema_revision
+from app.db.migrate import KNOWN_REVISIONS, migrate_database, read_schema_revision
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.groups.submit import load
@@ -126,7 +126,7 @@ def upgraded(store: Store, home: Path) -> Store:
         as_before(copy)
     # A home of that time had none.
     (home / "home.json").unlink()
-    migrate(settings)
+    migrate_database(settings)
     return Store.open(settings)
 
 
@@ -162,7 +162,7 @@ class TestUpgrade:
         assert [(row.pictures, row.views) for row in queue] == [(2, 2), (0, 3), (2, 2), (2, 2)]
         assert queue[2].x_m is None and queue[3].box_px is None
         with closing(upgraded(filled, tmp_path / "home")) as store:
-            assert schema_revision(make_engine(store.settings)) == KNOWN_REVISIONS[-1]
+            assert read_schema_revision(make_engine(store.settings)) == KNOWN_REVISIONS[-1]
             assert read(store, QUEUE) == queue
             again = read(store, SUMMARIES)
         assert [json.loads(row.summary) for row in again] == [

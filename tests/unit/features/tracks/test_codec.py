@@ -23,7 +23,7 @@ from app.features.tracks.codec import (
 )
 from app.features.tracks.stretches import gather_stretches
 from app.formats.export_record import ExportRecord
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
@@ -53,7 +53,7 @@ def track(inputs) -> BallTrack:
 
 
 def equal(one: BallTrack, other: BallTrack) -> bool:
-    return canonical(track_to_json(one)) == canonical(track_to_json(other))
+    return canonical_json_text(track_to_json(one)) == canonical_json_text(track_to_json(other))
 
 
 class TestMakeTrack:
@@ -116,13 +116,13 @@ class TestCorrections:
     def test_patches_come_back_bit_for_bit(self, inputs, track) -> None:
         said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
         patches = correct(said, track)
-        again = patches_from_json(json.loads(canonical(patches_to_json(patches))))
+        again = patches_from_json(json.loads(canonical_json_text(patches_to_json(patches))))
         assert len(patches) == 1
         assert equal(corrected(said, track, again), corrected(said, track, patches))
 
     def test_a_stored_track_is_corrected_as_a_fresh_one(self, inputs, track) -> None:
         said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
-        stored = track_from_json(json.loads(canonical(track_to_json(track))))
+        stored = track_from_json(json.loads(canonical_json_text(track_to_json(track))))
         assert equal(corrected(said, stored, correct(said, stored)), make_track(said))
 
 

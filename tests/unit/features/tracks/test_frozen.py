@@ -22,7 +22,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version
 from app.features.versions.verify import verify_version
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.tracking.ball_track import Correction
 from tests.databases import said_for_sqlite
 from tests.flights import FIRST
@@ -115,7 +115,7 @@ class TestVerify:
             unseal(session)
             session.execute(
                 text("UPDATE frozen SET body = :body WHERE key = :key"),
-                {"body": compress_text(canonical(value)), "key": key},
+                {"body": compress_text(canonical_json_text(value)), "key": key},
             )
         report = verify_version(store, version.id)
         assert (report.ok, report.different) == (False, 1)

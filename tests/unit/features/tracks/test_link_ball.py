@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.db.idempotency import without_response
-from app.db.json_columns import pack
+from app.db.json_columns import compress_json
 from app.db.session import now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
@@ -24,7 +24,7 @@ from app.features.tracks.link_ball import _of_groups, ball_places
 from app.features.tracks.queries import insert_track
 from app.features.tracks.stored import TrackSummary, track_stamp
 from app.geometry.arrays import FloatArray
-from app.json_text import canonical
+from app.json_text import canonical_json_text
 from app.soccer.pitch import Pitch
 from app.solving.sides import turn_camera
 from app.tracking.ball_track import BallMeasurements, BallTrack
@@ -224,9 +224,9 @@ def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str
             **stretch,
             "stamp": track_stamp(policy, (), SimpleNamespace(**stretch)),
             "digest": "none",
-            "inputs": pack(inputs_to_json(inputs)),
-            "body": pack(track_to_json(made)),
-            "summary": canonical(asdict(summary)),
+            "inputs": compress_json(inputs_to_json(inputs)),
+            "body": compress_json(track_to_json(made)),
+            "summary": canonical_json_text(asdict(summary)),
             "corrections": "[]",
             "revision": 0,
             **dict.fromkeys(("verdict", "note", "judged_by", "judged_at")),

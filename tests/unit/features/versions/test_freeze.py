@@ -276,7 +276,7 @@ class TestFreeze:
             raise KeyboardInterrupt
 
         with monkeypatch.context() as patch:
-            patch.setattr("app.features.versions.freeze.append", stop)
+            patch.setattr("app.features.versions.freeze.append_entries", stop)
             with pytest.raises(KeyboardInterrupt):
                 frozen(store)
         after = content(store)

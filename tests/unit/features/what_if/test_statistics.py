@@ -119,7 +119,7 @@ def test_a_file_of_another_database_is_not_used(
 ) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
     StatisticsCache(store).statistics(1)
-    monkeypatch.setattr(kept, "entry_hash", lambda *_: "another")
+    monkeypatch.setattr(kept, "read_entry_hash", lambda *_: "another")
     StatisticsCache(store).statistics(1)
     assert len(looked) == 2
 
