@@ -1,6 +1,6 @@
 """Film: what a camera on a tripod shows of play, picture after picture, quickly.
 
-Stadium and grass are drawn once for each place (``render`` takes a second for so many rays) as the inside of a
+Stadium and grass are drawn once for each place (``render_view`` takes a second for so many rays) as the inside of a
 cylinder around it; a picture is a look at that, with people and ball drawn anew.
 """
 
