@@ -144,13 +144,13 @@ class TestOldHomes:
         script = (
             "import os, sys; from pathlib import Path\n"
             "from alembic.runtime.migration import HeadMaintainer\n"
-            "from app.config import Settings; from app.db.migrate import KNOWN_REVISIONS, migrate\n"
+            "from app.config import Settings; from app.db.migrate import KNOWN_REVISIONS, migrate_database\n"
             "note = HeadMaintainer.update_to_step\n"
             "def killed(self, step):\n"
             "    KNOWN_REVISIONS[-1] in step.to_revisions and os.kill(os.getpid(), 9)\n"
             "    note(self, step)\n"
             "HeadMaintainer.update_to_step = killed\n"
-            "migrate(Settings(home=Path(sys.argv[1])))\n"
+            "migrate_database(Settings(home=Path(sys.argv[1])))\n"
         )
         command = [sys.executable, "-c", script, str(settings.home)]
         done = subprocess.run(command, cwd=Path(__file__).parents[3], check=False)
