@@ -154,7 +154,9 @@ class TestUploadWriter:
     ) -> None:
         synced: list[tuple[str, bool]] = []
         monkeypatch.setattr(
-            uploads, "sync", lambda path: synced.append((path.name, bool(list_uploads(settings))))
+            uploads,
+            "sync_to_disk",
+            lambda path: synced.append((path.name, bool(list_uploads(settings)))),
         )
         send(settings)
         assert synced == [("home", False), ("content", False), ("uploads", True)]
@@ -354,7 +356,9 @@ class TestDeleteUpload:
     ) -> None:
         upload, synced = send(settings), list[tuple[str, bool]]()
         monkeypatch.setattr(
-            uploads, "sync", lambda path: synced.append((path.name, bool(list_uploads(settings))))
+            uploads,
+            "sync_to_disk",
+            lambda path: synced.append((path.name, bool(list_uploads(settings)))),
         )
         delete_upload(settings, upload.id)
         assert synced == [("uploads", False)]
