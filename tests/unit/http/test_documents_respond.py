@@ -253,7 +253,7 @@ class TestUpload:
         stops = {
             "written down": stopped_after_a_commit(store, monkeypatch),
             "moved": stopped_at("delete_path", monkeypatch),
-            "removed": stopped_at("sync", monkeypatch),
+            "removed": stopped_at("sync_to_disk", monkeypatch),
             "answered": stopped_after_a_commit(store, monkeypatch, commits=2),
         }
         path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
@@ -268,7 +268,7 @@ class TestUpload:
         self, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
-        with stopped_at("sync", monkeypatch):
+        with stopped_at("sync_to_disk", monkeypatch):
             assert api.delete(path, headers=KEY).status_code == 500
         dataset_requests.uploaded(api, "a.csv", b"a")
         assert api.delete(path, headers=KEY).status_code == 204
