@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.media.files import decode_frame, turn_as_annotated, video_times
+from app.media.files import decode_frame, read_video_times, turn_as_annotated
 from app.media.frames import file_of_frame
 from app.media.object_frames import is_stored
 from app.media.video import FrameReader
@@ -159,7 +159,7 @@ class CameraFrames:
 
     def _video(self, media: Media) -> Any:
         reader = self._readers.get(media.path)
-        times = video_times(media, self._settings)
+        times = read_video_times(media, self._settings)
         if not 0 <= (media.frame or 0) < len(times):
             raise NotFoundError(f"{Path(media.path).name} has no frame {media.frame}")
         if reader is None:

@@ -21,7 +21,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import get_dataset
 from app.features.groups.state import read_state
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_ids
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.follow import follow_view
@@ -165,7 +165,7 @@ def follow_stretches(data: Path, folder: Path, camera: int, *, others: bool) -> 
     groups, truth, stretches = painted_groups(data, folder, camera, others=others)
     dice, met = np.random.default_rng(camera), Met()
     with closing(Store.open(Settings(home=folder / f"home-{camera}-{others}"))) as store:
-        ingest(store, "rig", groups, source="test", actor="test")
+        import_groups(store, "rig", groups, source="test", actor="test")
         solve_dataset(store, "rig")
         ids = list_ids(store, get_dataset(store, "rig").id).ids
         by_number = {int(group.key): one for group, one in zip(groups, ids, strict=True)}

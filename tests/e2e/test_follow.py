@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from tests.e2e.screen import Screen, until
 from tests.e2e.service import serving
@@ -35,7 +35,7 @@ def build(folder: Path) -> None:
     )
     store = Store.open(Settings(home=folder / "home"))
     try:
-        ingest(store, "rolling", groups, source="test", actor="local")
+        import_groups(store, "rolling", groups, source="test", actor="local")
         solve_dataset(store, "rolling")
     finally:
         store.close()

@@ -8,8 +8,8 @@ import typer
 
 from app.errors import NotFoundError
 from app.soccer.frames import ImagePoint
-from app.terminal.options import Dataset, Json, current_actor
-from app.terminal.server import opened_store
+from app.terminal.options import Dataset, Json, get_current_actor
+from app.terminal.server import open_store
 from app.terminal.terminal import print_json, say
 from app.wording import plural
 
@@ -53,10 +53,10 @@ def follow(
     if accept and undo:
         raise typer.BadParameter("place the balls or take them away, one at a time")
     place = _parse_place(at)
-    with opened_store() as store:
+    with open_store() as store:
         view = _find(store, dataset, group, camera)
         if undo:
-            changed = take_back_followed(store, view, actor=current_actor())
+            changed = take_back_followed(store, view, actor=get_current_actor())
             _print({"taken_back": changed}, json_, f"{plural(changed, 'ball')} taken away.")
             return
         pictures = Frames(store.settings)
@@ -64,7 +64,7 @@ def follow(
             found = follow_view(store, pictures, view, place, frames)
         finally:
             pictures.close()
-        placed = accept_followed(store, found, actor=current_actor()) if accept else None
+        placed = accept_followed(store, found, actor=get_current_actor()) if accept else None
     items = [
         {
             "group": item.key,
@@ -110,11 +110,11 @@ def _parse_place(text: str | None) -> ImagePoint | None:
 def _find(store: Any, dataset: str, group: str, camera: str) -> int:
     """Id of a view."""
     from app.features.datasets.service import dataset_id
-    from app.features.groups.view_queries import present_ids
+    from app.features.groups.view_queries import find_group_and_view_ids
 
     number = dataset_id(store, dataset)
     with store.read() as session:
-        views = present_ids(session, number, [group]).get(group, (0, {}))[1]
+        views = find_group_and_view_ids(session, number, [group]).get(group, (0, {}))[1]
     if camera not in views:
         raise NotFoundError(f'"{dataset}" has no view {camera} in a group {group}')
     return int(views[camera])

@@ -157,7 +157,7 @@ class TestBackUp:
             back_up(own_store.settings, out)
         assert out.read_bytes() == b"mine"
 
-    @pytest.mark.parametrize("step", ["verify_backup", "sync"])
+    @pytest.mark.parametrize("step", ["verify_backup", "sync_to_disk"])
     def test_leaves_nothing_when_it_fails(
         self, own_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
     ) -> None:
@@ -171,7 +171,7 @@ class TestBackUp:
             back_up(own_store.settings, folder / "b.zip")
         left = [path.name for path in folder.iterdir()]
         # The one that is in its place was verified, and may be lost with the power alone.
-        assert left == (["b.zip"] if step == "sync" else [])
+        assert left == (["b.zip"] if step == "sync_to_disk" else [])
 
     def test_what_a_killed_one_left_goes_with_the_next(
         self, own_store: Store, tmp_path: Path

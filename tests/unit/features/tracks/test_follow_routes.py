@@ -12,7 +12,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.http.deps import Services
 from tests.filmed_rigs import filmed_groups
@@ -29,7 +29,7 @@ def services(app: Any, tmp_path: Path) -> Services:
     services: Services = app.state.services
     (tmp_path / "film").mkdir()
     groups = filmed_groups(tmp_path / "film", COUNT, "cam1", said=[FIRST + CLICKED])
-    ingest(services.store, "rolling", groups, source="test", actor="ann")
+    import_groups(services.store, "rolling", groups, source="test", actor="ann")
     solve_dataset(services.store, "rolling")
     return services
 
@@ -111,7 +111,7 @@ class TestCommand:
         (tmp_path / "film").mkdir()
         groups = filmed_groups(tmp_path / "film", COUNT, "cam1", said=[FIRST + CLICKED])
         with closing(Store.open(Settings(home=home))) as store:
-            ingest(store, "rolling", groups, source="test", actor="ann")
+            import_groups(store, "rolling", groups, source="test", actor="ann")
         return home
 
     def test_it_tells_places_and_takes_back(self, touchline: Run, home: Path) -> None:
