@@ -394,7 +394,9 @@ class TestLinkedGroups:
         (film.parent / "other.mp4").unlink()
         body = {"frames": [7], "propose": False, "linked": True}
         job = finished(api.post(f"{recording}/groups", json=body))
-        assert "other.mp4 is not where it was imported from" in job.problem["detail"]
+        assert (
+            "other.mp4 is no longer in the place that it was imported from" in job.problem["detail"]
+        )
         assert "final/7.png" not in self.views(api)
 
 

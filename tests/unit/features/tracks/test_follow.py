@@ -219,7 +219,9 @@ class TestRefusals:
     ) -> None:
         ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
         (folder / CAMERA / f"{FIRST:06d}.jpg").unlink()
-        assert "is not where it was imported from" in self.refused(store, frames, ids[0])
+        assert "is no longer in the place that it was imported from" in self.refused(
+            store, frames, ids[0]
+        )
 
     def test_of_an_independent_annotation(
         self,
