@@ -119,7 +119,7 @@ class TestBatch:
         assert list_groups(store, dataset, f"-batch:{batch.id}").total == 2
 
     def test_is_given_to_those_alone_who_may(self, store, dataset):
-        with pytest.raises(InputError, match="ada cannot be reviewer") as refused:
+        with pytest.raises(InputError, match="ada does not have the role reviewer") as refused:
             make_batch(store, dataset, NewBatch("a", reviewers=["ada"]), actor="lead")
         assert refused.value.pointer == "/reviewers"
         batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead")
@@ -415,7 +415,7 @@ class TestLeases:
         batch = make_batch(store, dataset, new, actor="lead").id
         leases.submit(batch, groups[0], ADA, actor="ada")
         judge(store, groups[0], "bo")
-        with pytest.raises(ConflictError, match="judged"):
+        with pytest.raises(ConflictError, match="already has a verdict"):
             leases.return_group(batch, groups[0], BO, "once more", actor="bo")
 
 

@@ -151,7 +151,7 @@ class TestEditViews:
         )
         (one,) = answer.json()["items"]
         assert (one["outcome"], one["status"], one["pointer"]) == ("refused", 409, "/items/0/lines")
-        assert "station" in one["hint"]
+        assert "static camera" in one["hint"]
 
     def test_an_annotation_that_was_submitted_is_closed(self, api) -> None:
         request = take_handed_in(api)

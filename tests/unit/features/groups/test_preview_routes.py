@@ -165,7 +165,7 @@ class TestApart:
         )
         answer = large_preview(api)
         assert (apart.status_code, answer.status_code) == (200, 503)
-        assert answer.json()["detail"].startswith("solving this made its process crash")
+        assert answer.json()["detail"].startswith("solving this group made its process crash")
 
     def test_damage_that_the_process_sees_stops_changes_here(
         self, app, ready, api, monkeypatch
@@ -186,5 +186,5 @@ class TestApart:
             )
             answer = preview(api)
         assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
-        assert answer.json()["detail"].startswith("this preview made its process crash")
+        assert answer.json()["detail"].startswith("computing this preview made its process crash")
         assert preview(api).status_code == 200

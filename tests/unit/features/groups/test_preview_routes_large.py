@@ -96,7 +96,7 @@ def test_a_process_that_breaks_down_costs_its_large_edit_alone(
         broken.setattr("app.features.groups.view_routes.solve_encoded", break_down)
         answer = draw(api, large_lines())
     assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
-    assert answer.json()["detail"].startswith("solving this made its process crash")
+    assert answer.json()["detail"].startswith("solving this group made its process crash")
     assert api.get(f"{API}/groups/1").json() == before
     assert draw(api, large_lines()).status_code == 200
 
