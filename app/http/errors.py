@@ -224,7 +224,10 @@ def _problem_sentence(request: Request, detail: dict[str, Any]) -> str:
 
 def _pointer_of_location(location: Sequence[int | str]) -> str:
     """JSON pointer (RFC 6901) of the place; the first part says body, query or header."""
-    parts = [part for part in location[1:] if part != "[key]"]
+    # Pydantic names the branch of a union, such as ``literal['a','b']``, as if it were a place.
+    parts = [
+        part for part in location[1:] if part != "[key]" and not str(part).startswith("literal[")
+    ]
     escaped = (str(part).replace("~", "~0").replace("/", "~1") for part in parts)
     return "".join(f"/{part}" for part in escaped)
 
