@@ -141,7 +141,7 @@ export function ContactSheet({ pictures, policy }) {
 	const { columns, wide, tall, side } = layout(pictures.length, size.width, size.height);
 	return html`
 		<section class="card strip-card" aria-label="Ball, crops of one metre">
-			<h2 title="The shorter side of every crop is one metre at the ball: the balls must look equally large">Ball, crops of 1 m</h2>
+			<h2 title="The shorter side of every crop is one metre at the ball: the balls must look equally large">Ball, 1 m crops</h2>
 			<ul class="crops" ref=${ref} style=${{ gridTemplateColumns: `repeat(${columns}, max-content)` }}>
 				${side < SMALLEST ? null : pictures.map((picture) => html`
 					<${Crop}

@@ -79,7 +79,7 @@ export function LineList({ pictures }) {
 	const rest = rows[fitting];
 	return html`
 		<section class="card strip-card" data-card="lines" aria-label="Lines, worst first">
-			<h2 title="The picture along each marking, straightened, with 12 pixels on either side; the worst first">Line strips, ±12 px${rest ? html`<span class="card__aside">${rows.length - fitting} more ${rows.length - fitting === 1 ? 'line' : 'lines'}, ${rows.length - fitting === 1 ? '' : 'all '}≤ ${pixelText(rest.marking.largest)}</span>` : null}</h2>
+			<h2 title="The picture along each marking, straightened, with 12 pixels on either side; the worst first">Line strips${rest ? html`<span class="card__aside">${rows.length - fitting} more ${rows.length - fitting === 1 ? 'line' : 'lines'}, ${rows.length - fitting === 1 ? '' : 'all '}≤ ${pixelText(rest.marking.largest)}</span>` : null}</h2>
 			<ul class="line-list" ref=${ref} data-narrow=${narrow}>
 				${rows.length ? null : html`<li class="empty-note">No lines are annotated in this group.</li>`}
 				${size.width < 100 ? null : shown.map((row) => html`
