@@ -50,7 +50,7 @@ class Film:
         return float(np.hypot(*(camera.project(places) - pixels[inside]).T).max())
 
 
-def _posed(scene: Scene, camera: Camera) -> Scene:
+def pose_scene(scene: Scene, camera: Camera) -> Scene:
     main, *others = scene.truth.views
     return replace(scene, truth=replace(scene.truth, views=(replace(main, camera=camera), *others)))
 
@@ -70,5 +70,5 @@ def render_film(frames: int = FRAMES) -> Film:
         parameters[LOG_FOCAL] += np.log(ZOOM) * number
         camera = camera_from_parameters(parameters, start.principal_point, half)
         cameras.append(camera)
-        images.append(render_view(_posed(scene, camera), view.key))
+        images.append(render_view(pose_scene(scene, camera), view.key))
     return Film(images, cameras)

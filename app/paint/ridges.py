@@ -21,7 +21,7 @@ STRONGEST_PERCENT = 93.0
 LEAST_STRENGTH = 1.0
 """Grey levels per square pixel below which nothing is a ridge."""
 LEAST_LENGTH_PX = 22.0
-BROADEST_PX = 6.0
+BROADEST_PX = 8.0
 """Of what counts as a line, pixels of ``WORK_WIDTH``."""
 SIDE_PX = 5.0
 """Where grass is looked for to both sides."""

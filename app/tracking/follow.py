@@ -34,6 +34,7 @@ from app.paint.propose import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.tracking.missing_marking import cameras_by_missing_marking
 from app.tracking.motion import BackgroundMatches, rotate_camera
 from app.tracking.picture import Picture, propose_in_picture
 
@@ -43,6 +44,7 @@ BRIDGED: Outcome = "bridged"
 LOST: Outcome = "lost"
 OUTCOMES = (TRACKED, BRIDGED, LOST)
 NO_CAMERA = "there is no camera to follow"
+MISSING = "a marking that would be seen has no paint"
 
 GRID = (6, 4)
 ANGLE_SIGMA = np.radians(4.0)
@@ -55,6 +57,8 @@ PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.1
 """Where less has paint another camera is looked for, and how much better that has to agree."""
 AGAIN_AFTER = 4
 """Frames after which it is sought once more farther off where that was in vain."""
+MOST_MOVED_ANEW_PX = 12.0
+"""How far a camera through a marking that was missing may move what was seen, in the median, at 960 wide."""
 SAID_ONCE = 4.0
 """How many places on the grass the background tells."""
 MOST_BRIDGED = 20
@@ -157,6 +161,7 @@ class Follower:
         unsure: Frames with a camera that is likely and not certain.
         patchy_every: Frames between two tries to propose another camera for one that has paint.
         sought: Frame in which paint was sought farther off in vain.
+        missed: Frame in which no line was found for a marking without paint.
         in_vain: How often a camera was proposed in vain since one was found, or since a cut.
         turned_since: Share of the picture by which it has moved since.
     """
@@ -170,6 +175,7 @@ class Follower:
     unsure: list[Likely] = field(default_factory=list)
     patchy_every: int = PATCHY_EVERY
     sought: int | None = None
+    missed: int | None = None
     in_vain: int = 0
     turned_since: float = 0.0
 
@@ -200,7 +206,7 @@ class Follower:
             # What is shown now is another picture than the one that was tried.
             self.tried, self.patchy_every, self.in_vain = None, PATCHY_EVERY, 0
         else:
-            self.turned_since += _share_turned(match, picture.reading.width)
+            self.turned_since += _share_turned(match, picture.image.shape[1])
         if found.outcome is TRACKED and found.seen is not None:
             return self._now(self._another(picture, found) if self._is_patchy(found) else found)
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
@@ -319,7 +325,42 @@ class Follower:
                 best_score, told, best = score, why, found
             if told is None and not self._is_worth_more(best, picture):
                 break
+        if told == MISSING and best is not None and best.snapped is not None:
+            moved = self._drawn_through_missing_marking(picture, best, best.snapped, unit)
+            if moved is not None:
+                return moved, None
         return best, told
+
+    def _drawn_through_missing_marking(
+        self, picture: Picture, best: TrackedFrame, snapped: SnappedCamera, unit: float
+    ) -> TrackedFrame | None:
+        """The frame with a camera on whose paint the missing marking is as well; None where there is none."""
+        if self.missed is not None and abs(picture.number - self.missed) < AGAIN_AFTER:
+            return None
+        self.missed = picture.number
+        for camera in cameras_by_missing_marking(picture, snapped, self.pitch, self.policy):
+            try:
+                found = self._snap(picture, camera, None, REACHES[1].windows)
+                seen = measure_agreement(found.camera, picture.field, picture.paint, self.pitch)
+            except (GeometryError, np.linalg.LinAlgError):
+                continue
+            if found.reason is not None or _moved_px(snapped, found) > MOST_MOVED_ANEW_PX * unit:
+                continue
+            weakest = weakest_marking(picture.reading, found, self.pitch)
+            frame = replace(
+                best,
+                outcome=TRACKED,
+                camera=found.camera,
+                snapped=found,
+                seen=seen,
+                weakest=weakest,
+            )
+            if self._why_not(found, seen, weakest, unit, np.inf) is None and (
+                frame.score > CLEARLY * best.score
+            ):
+                self.missed = None
+                return frame
+        return None
 
     def _is_worth_more(self, found: TrackedFrame | None, picture: Picture) -> bool:
         """Whether paint is sought farther off for a camera that has paint."""
@@ -337,6 +378,10 @@ class Follower:
             or found.seen.supported < PATCHY_OF_USUAL * self.usual
             or (found.snapped.error_px or 0.0) > PATCHY_PX * unit
         )
+
+    def has_camera(self) -> bool:
+        """Whether there is a camera to follow."""
+        return self.last is not None and self.last.camera is not None
 
     @property
     def age(self) -> int:
@@ -360,7 +405,7 @@ class Follower:
         if seen.supported < max(LEAST_SUPPORTED, LEAST_OF_USUAL * self.usual):
             return "much of the markings has no paint"
         if weakest < LEAST_WEAKEST:
-            return "a marking that would be seen has no paint"
+            return MISSING
         return None
 
     def _snap(
@@ -386,6 +431,13 @@ def _share_turned(match: BackgroundMatches, width: int) -> float:
     shift = float(np.hypot(*np.median(moved, axis=0)))
     spread = [float(np.std(each)) for each in (match.here, match.there)]
     return shift / width + abs(float(np.log(spread[1] / spread[0])))
+
+
+def _moved_px(before: SnappedCamera, after: SnappedCamera) -> float:
+    """How far the places on which paint was seen are moved by another camera, in the median, pixels."""
+    places = before.evidence.traced.places
+    apart = np.hypot(*(after.camera.project(places) - before.camera.project(places)).T)
+    return float(np.median(np.nan_to_num(apart, nan=np.inf)))
 
 
 def _product(frame: TrackedFrame) -> float:

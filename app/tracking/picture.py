@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 
@@ -32,56 +33,92 @@ AHEAD = 4
 """Pictures that are read while another one is followed."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Picture:
-    """A frame and what is seen in it.
+    """A frame and what is seen in it, each part computed when it is asked for first.
 
     Attributes:
         number: From 0.
         time: When it is shown, seconds.
         image: Red green blue, work size, shape (H, W, 3).
-        grey: For its motion, shape (H, W).
-        field: The field of play, shape (H, W).
-        strength: Of what looks like painted lines, 0 elsewhere, shape (H, W).
-        reading: Ready for paint to be read along markings.
     """
 
     number: int
     time: float
     image: Image
-    grey: Grey
-    field: BoolArray
-    strength: Strength
-    reading: Reading
+    # Not ``cached_property``: that has one lock for all pictures in Python 3.11.
+    _grey: Grey | None = dataclasses.field(default=None, init=False, repr=False)
+    _field: BoolArray | None = dataclasses.field(default=None, init=False, repr=False)
+    _strength: Strength | None = dataclasses.field(default=None, init=False, repr=False)
+    _reading: Reading | None = dataclasses.field(default=None, init=False, repr=False)
+
+    @property
+    def grey(self) -> Grey:
+        """For its motion, shape (H, W)."""
+        if self._grey is None:
+            self._grey = np.asarray(cv2.cvtColor(self.image, cv2.COLOR_RGB2GRAY), np.uint8)
+        return self._grey
+
+    @property
+    def field(self) -> BoolArray:
+        """The field of play, shape (H, W)."""
+        if self._field is None:
+            self._field = field_of_play(self.image)
+        return self._field
+
+    @property
+    def strength(self) -> Strength:
+        """Of what looks like painted lines, 0 elsewhere, shape (H, W)."""
+        if self._strength is None:
+            self._strength = line_strength(self.image, self.field)
+        return self._strength
+
+    @property
+    def reading(self) -> Reading:
+        """Ready for paint to be read along markings."""
+        if self._reading is None:
+            self._reading = read_picture(self.image, self.field)
+        return self._reading
 
     @property
     def paint(self) -> BoolArray:
         """What looks like painted lines, shape (H, W)."""
         return np.asarray(self.strength > 0)
 
+    def read(self) -> Picture:
+        """The same with all parts computed."""
+        _ = self.grey, self.strength, self.reading
+        return self
+
 
 def read_frame(frame: Frame) -> Picture:
-    """All that a frame shows."""
-    image = frame.image
-    field = find_field_of_play(image)
-    strength, reading = line_strength(image, field), read_picture(image, field)
-    return Picture(frame.number, frame.time, image, grey_of(frame), field, strength, reading)
+    """What a frame shows."""
+    return Picture(frame.number, frame.time, frame.image)
 
 
-def grey_of(frame: Frame) -> Grey:
-    """A frame as its motion is seen, shape (H, W)."""
-    return np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), np.uint8)
+def read_frames(
+    frames: Iterable[Frame], is_followed: Callable[[], bool] = lambda: True
+) -> Iterator[Picture]:
+    """Frames read in threads, in their order, a few ahead.
 
-
-def read_frames(frames: Iterable[Frame]) -> Iterator[Picture]:
-    """Frames read in threads, in their order, a few ahead."""
+    Args:
+        is_followed: Whether a camera is followed by now. Where none is, most frames are only looked
+            at for their motion, and their paint is read when it is asked for.
+    """
     waiting: deque[Future[Picture]] = deque()
     for frame in frames:
-        waiting.append(get_kernel_executor().submit(read_frame, frame))
+        picture = read_frame(frame)
+        work = Picture.read if is_followed() else _read_motion
+        waiting.append(get_kernel_executor().submit(work, picture))
         if len(waiting) > AHEAD:
             yield waiting.popleft().result()
     while waiting:
         yield waiting.popleft().result()
+
+
+def _read_motion(picture: Picture) -> Picture:
+    _ = picture.grey
+    return picture
 
 
 def propose_in_picture(

@@ -35,7 +35,6 @@ from app.tracking.motion import BackgroundMatches, match_background, rotate_came
 from app.tracking.picture import (
     AHEAD,
     Picture,
-    grey_of,
     propose_in_picture,
     read_frame,
     read_frames,
@@ -171,13 +170,13 @@ def _follow_on(
     frames, before = clip.frames(), None
     for frame in islice(frames, min(given, default=0)):
         # They are followed backwards, and their paint is read then.
-        grey = grey_of(frame)
+        grey = read_frame(frame).grey
         shot.matches.append(None if before is None else match_background(before, grey))
         shot.frames.append(TrackedFrame(frame.number, frame.time, LOST, reason=NO_CAMERA))
         before = grey
         if tell is not None:
             tell(len(shot.frames))
-    for picture in read_frames(frames):
+    for picture in read_frames(frames, follower.has_camera):
         match = None if before is None else match_background(before, picture.grey)
         shot.matches.append(match)
         key = given.get(picture.number)

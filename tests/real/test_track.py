@@ -28,3 +28,14 @@ def test_a_real_clip_is_tracked_onto_its_paint(annotated: list[int]):
     assert np.mean(hits) >= 0.95
     if annotated:
         assert all(found[number].is_keyframe for number in annotated)
+
+
+@pytest.mark.skipif(not (DATA / "replays").is_dir(), reason=f"no replays in {DATA}")
+def test_a_small_clip_is_tracked_where_the_middle_line_comes_into_the_picture():
+    found = track_clip(DATA / "replays" / "action_0_clip_0.mp4", {}).frames
+    tracked = [frame for frame in found if frame.outcome == "tracked"]
+    assert len(tracked) >= 0.97 * len(found)
+    # Its first frames alone show the middle line, which tells where the camera stands.
+    for frame in found[:8]:
+        assert frame.camera is not None and frame.supported is not None
+        assert abs(frame.camera.position[0]) < 1 and frame.supported > 0.5
