@@ -23,7 +23,7 @@ from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins
 from app.features.people.roles import DatasetRoles, require_scope
 from app.features.people.visibility_queries import EVERYTHING, READER, Visibility
-from app.http.headers import read_bearer_token, read_cookie
+from app.http.headers import read_bearer_token
 from app.http.permissions import (
     OwnedMention,
     RequestSubject,
@@ -90,7 +90,7 @@ class Access:
             NotLoggedInError: Nobody's.
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
-        if read_bearer_token(scope) is None and not read_cookie(scope, self._team.cookie):
+        if read_bearer_token(scope) is None and not self._team.cookies.session(scope):
             raise _not_logged_in_error()
         login = self._login_at_once(scope)
         if login is None:
@@ -159,14 +159,14 @@ class Access:
         if read_bearer_token(scope) is not None:
             return None
         with suppress(StorageError):
-            return self._team.logins.find(read_cookie(scope, self._team.cookie) or "", at_once=True)
+            return self._team.logins.find(self._team.cookies.session(scope) or "", at_once=True)
         return None
 
     def _find_login(self, scope: Scope) -> Login:
         bearer = read_bearer_token(scope)
         if bearer is not None:
             return self._team.login_with(bearer, Request(scope))
-        login = self._team.logins.find(read_cookie(scope, self._team.cookie) or "")
+        login = self._team.logins.find(self._team.cookies.session(scope) or "")
         if login is None:
             raise _not_logged_in_error()
         return login

@@ -13,8 +13,8 @@ from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
 from starlette.responses import JSONResponse
 
+from app.http.cookies import SESSION
 from app.http.events import EVENTS
-from app.http.headers import SESSION
 from app.http.permissions import Action, Where, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES

@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 from ipaddress import ip_address
-from typing import Annotated, Any
+from typing import Annotated
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
@@ -18,23 +18,13 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import ConflictError, NotLoggedInError, TooManyTriesError
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.devices import CHALLENGE_LASTS, AttemptWindow, Devices
-from app.features.people.devices import LASTS as DEVICE_LASTS
-from app.features.people.logins import LASTS, Login, LoginMethod, Logins
+from app.features.people.devices import AttemptWindow, Devices
+from app.features.people.logins import Login, LoginMethod, Logins
 from app.features.people.passkeys import Passkeys, PasskeySite
 from app.features.people.second_factor import SecondFactors
-from app.features.people.sign_on import LASTS as BEGUN_LASTS
 from app.features.people.sign_on import SignOn
 from app.features.people.sign_on_rules import read_rules
-from app.http.headers import (
-    DEVICE,
-    PASSKEY,
-    SESSION,
-    SIGN_ON,
-    cookie_values,
-    make_cookie_name,
-    read_cookie,
-)
+from app.http.cookies import Cookies
 from app.mail import MailServer, read_mail_server
 
 NAME_LIMIT = parse("10/minute")
@@ -177,23 +167,9 @@ class Team:
         return (self.url or "").startswith("https://")
 
     @property
-    def cookie(self) -> str:
-        """Name of the cookie of a session."""
-        return self._cookie_name(SESSION)
-
-    def cookie_values(self, token: str | None) -> dict[str, Any]:
-        """How the cookie of a token is set; None: how it is taken back."""
-        return self._cookie_arguments(
-            SESSION, token or "", int(LASTS.total_seconds()) if token else 0
-        )
-
-    def asker(self, request: Request) -> str:
-        """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
-        return read_cookie(request.scope, self._cookie_name(PASSKEY)) or ""
-
-    def asker_values(self, asker: str) -> dict[str, Any]:
-        """How it is told that."""
-        return self._cookie_arguments(PASSKEY, asker, int(CHALLENGE_LASTS.total_seconds()))
+    def cookies(self) -> Cookies:
+        """The cookies of its server."""
+        return Cookies(self.secure, self.devices)
 
     def count_try(self, request: Request, name: str | None = None) -> None:
         """Count that somebody asks whether a password is right.
@@ -201,30 +177,8 @@ class Team:
         Raises:
             TooManyTriesError: There were too many.
         """
-        device = None
-        if name is not None and (token := read_cookie(request.scope, self._device_cookie(name))):
-            device = self.devices.recognise(name, token)
+        device = None if name is None else self.cookies.known_device(request.scope, name)
         self.attempts.count_login(self.address(request), name, device)
-
-    def device_values(self, name: str) -> dict[str, Any]:
-        """How a browser is told that it is a known one of a person, who has just logged in there."""
-        values = self._cookie_arguments(
-            DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds())
-        )
-        return {**values, "key": self._device_cookie(name)}
-
-    def _device_cookie(self, name: str) -> str:
-        return f"{self._cookie_name(DEVICE)}_{self.devices.cookie_of(name)}"
-
-    def sign_on_secret(self, request: Request) -> str:
-        """Value of the sign-on cookie of a browser; empty where it began no sign-on."""
-        return read_cookie(request.scope, self._cookie_name(SIGN_ON)) or ""
-
-    def sign_on_cookie_values(self, asker: str | None) -> dict[str, Any]:
-        """How that cookie is set; None: how it is removed."""
-        return self._cookie_arguments(
-            SIGN_ON, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0
-        )
 
     def landing(self, request: Request) -> str:
         """The address to which the provider sends people back."""
@@ -264,15 +218,9 @@ class Team:
             " localhost.",
         )
 
-    def _cookie_name(self, name: str) -> str:
-        return make_cookie_name(name, self.secure)
-
-    def _cookie_arguments(self, name: str, value: str, age: int) -> dict[str, Any]:
-        return cookie_values(name, value, age, self.secure)
-
     def token(self, request: Request) -> str | None:
         """The token that a browser sent."""
-        return read_cookie(request.scope, self.cookie)
+        return self.cookies.session(request.scope)
 
     def login(self, request: Request) -> Login | None:
         """Who that is, on a route that anybody may ask."""

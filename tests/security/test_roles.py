@@ -183,8 +183,8 @@ class TestSessions:
         with closing(Store.open(settings)) as store:
             way = Way.of(settings, store)
         assert way is not None
-        assert way.cookie.startswith("__Host-")
-        assert way.cookie_values("x")["secure"] is True
+        assert way.cookies.session_name.startswith("__Host-")
+        assert way.cookies.session_values("x")["secure"] is True
 
     def test_a_login_gives_a_new_session_and_ends_the_old(self, team: Team) -> None:
         old = team.add("fixed", Role.VIEWER)

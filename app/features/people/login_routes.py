@@ -111,7 +111,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
     team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     options = team.passkeys.ask(asker, team.site(request))
-    response.set_cookie(**team.asker_values(asker))
+    response.set_cookie(**team.cookies.passkey_values(asker))
     return RequestOptions(options=options)
 
 
@@ -130,7 +130,7 @@ def log_in(
     team.count_try(request)
     try:
         token = team.passkeys.log_in(
-            team.asker(request),
+            team.cookies.passkey_secret(request.scope),
             body.credential.model_dump(),
             team.site(request),
             browser=request.headers.get("user-agent", ""),
@@ -140,7 +140,7 @@ def log_in(
     except NotLoggedInError:
         log.warning("a login with a passkey was refused", address=address)
         raise
-    response.set_cookie(**team.cookie_values(token))
+    response.set_cookie(**team.cookies.session_values(token))
     return make_session_document(team.logins.find(token), store)
 
 

@@ -157,11 +157,11 @@ def _begin_session(
         # Without the name: people type passwords into the wrong field.
         log.warning("a login was refused", address=address)
         raise
-    response.set_cookie(**team.cookie_values(token))
+    response.set_cookie(**team.cookies.session_values(token))
     login = team.logins.find(token)
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
-    response.set_cookie(**team.device_values(login.name))
+    response.set_cookie(**team.cookies.known_device_values(login.name))
     return make_session_document(login, store)
 
 
@@ -175,7 +175,7 @@ def log_out(
     login = team.login(request)
     if login is not None:
         team.logins.end(login, login.id)
-    response.set_cookie(**team.cookie_values(None))
+    response.set_cookie(**team.cookies.session_values(None))
     return make_session_document(None, store)
 
 
@@ -198,7 +198,7 @@ def change_password(
     team.require_passwords()
     team.count_try(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
-    response.set_cookie(**team.cookie_values(token))
+    response.set_cookie(**team.cookies.session_values(token))
     return make_session_document(me, store)
 
 
@@ -277,7 +277,7 @@ def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam
     address = sign_on.begin(
         asker, redirect=team.landing(request), to=body.to, link=body.link, name=body.name
     )
-    response.set_cookie(**team.sign_on_cookie_values(asker))
+    response.set_cookie(**team.cookies.sign_on_values(asker))
     return SignOnStarted(address=address)
 
 
@@ -300,7 +300,7 @@ def finish(
     team.count_try(request)
     try:
         entered = sign_on.finish(
-            team.sign_on_secret(request),
+            team.cookies.sign_on_secret(request.scope),
             body.state,
             body.code,
             factor=body.factor,
@@ -314,10 +314,10 @@ def finish(
     except AccessError as error:
         log.warning("a single sign-on was refused", address=address, reason=error.message)
         raise
-    response.set_cookie(**team.sign_on_cookie_values(None))
+    response.set_cookie(**team.cookies.sign_on_values(None))
     if entered.token is None:
         return SignOnEnd(session=make_session_document(team.login(request), store), to=entered.to)
-    response.set_cookie(**team.cookie_values(entered.token))
+    response.set_cookie(**team.cookies.session_values(entered.token))
     return SignOnEnd(
         session=make_session_document(team.logins.find(entered.token), store), to=entered.to
     )
@@ -351,7 +351,7 @@ def begin_link(
     team.count_try(request, me.name)
     asker = secrets.token_urlsafe()
     address = sign_on.begin_link(asker, me, body.password, redirect=team.landing(request))
-    response.set_cookie(**team.sign_on_cookie_values(asker))
+    response.set_cookie(**team.cookies.sign_on_values(asker))
     return SignOnStarted(address=address)
 
 
