@@ -29,7 +29,7 @@ PLAIN_WORDS = """
     batches before block blocks body boxes browser bulk bundle button buttons cache calibrate
     candidates canvas caption card cards cell changes chart chip choice chooser class cli client
     clip clock cluster codec colours command comment comments compare comparison completion config
-    confirm constraints contact copy copying correct cross css csv cursor curve cuts database
+    confirm constraints contact cookies copy copying correct cross css csv cursor curve cuts database
     datasets day delete deps descriptions details detect devices diagram dialect dialog diff
     differences dismissals distance documents drags drawing durable editor empty enrol equations
     errors estimates estimator evaluate event events executors expected export exports facets facts faults
@@ -40,7 +40,7 @@ PLAIN_WORDS = """
     kernels key keys known konva last latest lazy lease leases least legend lens lesson lessons
     letter limits links list listing live local locks login logins lone loupe mail main maintenance
     making many map markdown marks match matches matrix me measurements measures membership mentions
-    menu merge messages metrics migrate mini models motion name names navigation needs notice nudge
+    menu merge messages metrics migrate mini missing models motion name names navigation needs notice nudge
     numbers object on open openapi opentrackio options order other output own ownership packing page
     pages paint palette panel parquet parse parts path pen people permissions pins pitch pitches
     pixel place places play playback player pointer policies pool popover position postgresql
