@@ -346,7 +346,7 @@ class Follower:
                 continue
             if found.reason is not None or _moved_px(snapped, found) > MOST_MOVED_ANEW_PX * unit:
                 continue
-            weakest = weakest_marking(picture.reading, found, self.pitch)
+            weakest = measure_weakest_marking(picture.reading, found, self.pitch)
             frame = replace(
                 best,
                 outcome=TRACKED,

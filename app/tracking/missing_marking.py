@@ -29,7 +29,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import MARKINGS, Arc, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.sides import turned_camera
+from app.solving.sides import turn_camera
 from app.tracking.picture import Picture
 
 MOST_PIECES, LEAST_PIECE_PX = 12, 80.0
@@ -82,7 +82,7 @@ def cameras_by_missing_marking(
         if found.camera is not None:
             # Lines do not tell a camera from the one opposite, and are taken for the near side.
             opposite = found.camera.position[:2] @ snapped.camera.position[:2] < 0
-            yield turned_camera(found.camera) if opposite else found.camera
+            yield turn_camera(found.camera) if opposite else found.camera
 
 
 def _missing_straight_markings(

@@ -237,7 +237,7 @@ class TestPractice:
         page.keyboard.press("x")
         page.keyboard.press("1")
         expect(card).to_contain_text("Lesson 3 of 8")
-        expect(card).to_contain_text("Look again: it could have been fixed")
+        expect(card).to_contain_text("Look again: the group could have been fixed")
         expect(card).to_contain_text("Best:")
         # Mended by a key: told before the verdict, too.
         page.wait_for_selector('.image-panel[data-view="B"] .image-panel__stage[data-ready="true"]')

@@ -140,7 +140,7 @@ def test_a_camera_of_other_lines_is_contradicted(rendered) -> None:
 
 def test_without_a_camera_only_what_looks_like_paint_is_told(rendered) -> None:
     found = seen(rendered.image, calibrate({}, Pitch(), SIZE, POLICY))
-    assert found.outcome == "nothing" and "no camera" in found.sentence
+    assert found.outcome == "nothing" and "do not determine a camera" in found.sentence
     assert found.line_like and not found.evidence.points
 
 

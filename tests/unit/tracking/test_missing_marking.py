@@ -21,9 +21,9 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.propose import weakest_marking
+from app.paint.propose import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
-from app.sample.render import render
+from app.sample.render import render_view
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Frame
@@ -51,7 +51,7 @@ def scene() -> tuple[Picture, Camera, FloatArray]:
     parameters[[PAN, TILT, ROLL]] = np.radians([9.5, 79.3, 0.5])
     parameters[X : Z + 1], parameters[LOG_FOCAL] = STAND, np.log(3000.0)
     camera = camera_from_parameters(parameters, truth.camera.principal_point, half)
-    image = render(pose_scene(drawn, camera), view.key)
+    image = render_view(pose_scene(drawn, camera), view.key)
     return read_frame(Frame(0, 0.0, image)), camera, parameters
 
 
@@ -85,13 +85,13 @@ def test_the_middle_line_that_lies_elsewhere_leads_back_to_the_tripod(
 ):
     picture, camera, parameters = scene
     wrong = beside(picture, camera, parameters)
-    assert wrong.reason is None and weakest_marking(picture.reading, wrong, PITCH) < 0.25
+    assert wrong.reason is None and measure_weakest_marking(picture.reading, wrong, PITCH) < 0.25
     assert np.linalg.norm(wrong.camera.position - camera.position) > 2
     found = next(cameras_by_missing_marking(picture, wrong, PITCH, POLICY))
     snapped = snap_reading(
         picture.reading, found, PITCH, REACHES[1].windows, POLICY, None, circles_count_twice=True
     )
-    assert weakest_marking(picture.reading, snapped, PITCH) > 0.5
+    assert measure_weakest_marking(picture.reading, snapped, PITCH) > 0.5
     assert np.linalg.norm(snapped.camera.position - camera.position) < 1
 
 
