@@ -63,7 +63,7 @@ class Picture:
     def field(self) -> BoolArray:
         """The field of play, shape (H, W)."""
         if self._field is None:
-            self._field = field_of_play(self.image)
+            self._field = find_field_of_play(self.image)
         return self._field
 
     @property
