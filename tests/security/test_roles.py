@@ -354,7 +354,7 @@ class TestWhoActs:
         body = {"name": "a", "q": ""}
         answer = team.ask("POST", target, body, role="annotator", X_Actor="bot")
         assert answer.status == 400
-        assert b"is not accepted where people log in" in answer.body
+        assert b"is not accepted on a server with logins" in answer.body
 
     def test_the_log_names_the_person(self, team: Team) -> None:
         team.ask("POST", f"{API}/users", {"name": "logged", "role": "viewer"}, role="admin")
