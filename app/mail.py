@@ -41,7 +41,7 @@ _POLICY = SMTP.clone(max_line_length=900)
 
 
 @dataclass(frozen=True)
-class Letter:
+class MailMessage:
     """A plain letter to one address."""
 
     to: str
@@ -69,7 +69,9 @@ class MailServer:
     sender: str
     own_name: str
 
-    def send(self, letters: Sequence[Letter], seconds: float = SEND_SECONDS) -> list[str | None]:
+    def send(
+        self, letters: Sequence[MailMessage], seconds: float = SEND_SECONDS
+    ) -> list[str | None]:
         """Send letters over one connection.
 
         Args:
@@ -129,7 +131,7 @@ class MailServer:
                 connection.login(self.user, self.password)
             yield connection
 
-    def _send_one(self, connection: smtplib.SMTP, letter: Letter) -> str | None:
+    def _send_one(self, connection: smtplib.SMTP, letter: MailMessage) -> str | None:
         message = EmailMessage(policy=_POLICY)
         message["From"], message["To"] = self.sender, letter.to
         message["Subject"] = letter.subject

@@ -72,7 +72,7 @@ from app.http.requests import (
     refuse_unknown_parameters,
 )
 from app.http.route import Gate, Route, require_permissions, respond_to_unknown_route
-from app.http.team import Team, list_allowed_hosts
+from app.http.team import TeamLogin, list_allowed_hosts
 
 PREFIX = "/api/v1"
 ROUTERS = (
@@ -165,7 +165,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         lifespan=_lifespan,
     )
     app.state.services = services
-    team = app.state.team = Team.of(settings, services.store)
+    team = app.state.team = TeamLogin.of(settings, services.store)
     app.state.gate = Gate(
         None if team is None else Access(team, services.store),
         Idempotency(),

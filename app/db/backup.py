@@ -27,7 +27,7 @@ from app.db.dialects.dialect import dialect_in, dialect_of, make_engine, report_
 from app.db.home import is_half_written, refused_file_error
 from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain
-from app.db.recovery.anchor import Anchor, read_anchor_of_database, require_own_database
+from app.db.recovery.anchor import DatabaseAnchor, read_anchor_of_database, require_own_database
 from app.db.recovery.preopen_check import list_signs_of_use, require_sound
 from app.db.session import Session, now
 from app.durable import PARTIAL, sync_to_disk
@@ -194,7 +194,7 @@ def verify_backup(path: Path) -> BackupManifest:
 
 def examine_database(
     settings: Settings, file: Path, known_as: Path
-) -> tuple[Anchor, dict[str, int]]:
+) -> tuple[DatabaseAnchor, dict[str, int]]:
     """Look at every page of a database that nobody else has open, and at the log's hash chain.
 
     Args:
@@ -231,10 +231,10 @@ def examine_database(
         engine.dispose()
 
 
-def _anchor_without_installation(session: Session) -> Anchor:
+def _anchor_without_installation(session: Session) -> DatabaseAnchor:
     schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
     last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
-    return Anchor("", "", schema, *(tuple(last) if last else (0, "")))
+    return DatabaseAnchor("", "", schema, *(tuple(last) if last else (0, "")))
 
 
 def _require_free_place(out: Path, replace: bool) -> None:

@@ -11,7 +11,7 @@ SHOWN = 5
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckResult:
     """One thing that was looked at.
 
     Attributes:
@@ -27,7 +27,9 @@ class Check:
     mend: str | None = None
 
 
-def compare_records(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str) -> Check:
+def compare_records(
+    name: str, whole: str, apart: Sequence[str], wrong: str, mend: str
+) -> CheckResult:
     """What came of looking at many records.
 
     Args:
@@ -38,9 +40,9 @@ def compare_records(name: str, whole: str, apart: Sequence[str], wrong: str, men
         mend: What to do about them.
     """
     if not apart:
-        return Check(name, True, whole)
+        return CheckResult(name, True, whole)
     shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
-    return Check(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
+    return CheckResult(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
 
 
 def record_name(key: object) -> str:
@@ -57,7 +59,7 @@ def _equal_but_null_characters(logged: Any, present: Any) -> bool:
 
 def compare_with_log(
     name: str, logged: Any, present: Any, advice: str, call: Callable[[Any], str] = record_name
-) -> Check:
+) -> CheckResult:
     """What came of comparing a table with what the log says of it.
 
     Args:

@@ -214,7 +214,7 @@ class PendingResponse(Generic[R]):
                     "another copy of this request was carried out first",
                     hint="Wait, then send it again with the same Idempotency-Key.",
                 )
-        session.once_kept(lambda: self._commit(outcome, response))
+        session.call_after_commit(lambda: self._commit(outcome, response))
 
     def _commit(self, outcome: object, response: R | None) -> None:
         self._committed = outcome, response

@@ -70,7 +70,7 @@ _BATCH = 500
 
 
 @dataclass(frozen=True)
-class Entry:
+class NewLogEntry:
     """One thing that was said.
 
     ``kind`` is ``dataset``, ``dataset_deleted``, ``policy``, ``station``, ``import``, ``camera``,
@@ -90,14 +90,14 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class LogEntry(Entry):
+class LogEntry(NewLogEntry):
     """An entry as it stands in the log."""
 
     id: int = 0
     hash: str = ""
 
 
-def append_entries(session: Session, entries: Sequence[Entry]) -> list[int]:
+def append_entries(session: Session, entries: Sequence[NewLogEntry]) -> list[int]:
     """Write entries at the end of the log, inside the caller's write transaction.
 
     Returns:
@@ -273,7 +273,7 @@ def verify_chain(session: Session) -> int:
     return count
 
 
-def compute_chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
+def compute_chain_hash(previous: str, number: int, entry: NewLogEntry, body: bytes) -> str:
     """Hash of a row: SHA-256 over the hash before it, its columns and the hash of its body.
 
     Args:

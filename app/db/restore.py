@@ -16,7 +16,7 @@ from app.db.backup import DATABASE, EXPORTS, FRAMES, examine_database, require_f
 from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused_file_error
 from app.db.locks import hold_database_alone, hold_server_lock
 from app.db.migrate import KNOWN_REVISIONS, newer_schema_error
-from app.db.recovery.anchor import Anchor, anchor_file, make_anchor
+from app.db.recovery.anchor import DatabaseAnchor, anchor_file, make_anchor
 from app.db.recovery.preopen_check import MAGIC, log_file, read_header, read_log
 from app.durable import sync_to_disk
 from app.errors import DamagedError, InputError
@@ -177,7 +177,7 @@ def _new_folder(home: Path) -> Path:
     return folder
 
 
-def _move_into_home(settings: Settings, folder: Path, anchor: Anchor) -> None:
+def _move_into_home(settings: Settings, folder: Path, anchor: DatabaseAnchor) -> None:
     """The database last: without it nothing is served."""
     # Their marks are those of the changes of another database.
     shutil.rmtree(settings.yields, ignore_errors=True)

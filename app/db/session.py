@@ -96,7 +96,7 @@ class Session(Connection):
         if self._pending is not None and self._outcome is not None:
             self._pending.store(self, *self._outcome)
 
-    def once_kept(self, tell: Callable[[], None]) -> None:
+    def call_after_commit(self, tell: Callable[[], None]) -> None:
         """Call a function once this is committed, before the next write of its process begins.
 
         What was not kept is not told of. It must be quick, and not ask the database.

@@ -24,7 +24,7 @@ from app.db.migrate import (
     read_schema_revision,
 )
 from app.db.recovery.anchor import (
-    Anchor,
+    DatabaseAnchor,
     move_anchor,
     read_anchor,
     renew_anchor,
@@ -281,7 +281,7 @@ class Store:
         """
         if session.log_end is None or self._anchor is None:
             return
-        there: Anchor | None = self._anchor
+        there: DatabaseAnchor | None = self._anchor
         with suppress(OSError, DamagedError):
             there = read_anchor(self.settings.database_file)
         # One that was taken away is meant to be.

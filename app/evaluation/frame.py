@@ -223,7 +223,7 @@ class FrameNames:
         identity = None if number is None else self._numbered.get(number)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
-    def why_not_number(self, text: str) -> str:
+    def explain_unknown_number(self, text: str) -> str:
         """Why ``find_number`` found nothing, in words."""
         if _parse_number(text) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
@@ -236,7 +236,7 @@ class FrameNames:
             f"{frame.station}/{frame.group}" if frame.station else frame.view for frame in found
         ]
 
-    def why_not(self, name: str) -> str:
+    def explain_unknown(self, name: str) -> str:
         """Why ``find`` found nothing, in words."""
         if self._lookup(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"

@@ -44,7 +44,7 @@ from app.formats.cameras import read_cameras
 from app.formats.fields import IdIndex, id_to_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.formats.json_reader import describe_document, read_json, read_json_lines
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree_while_read
 from app.geometry.camera import Camera
 from app.json_text import quoted
@@ -76,7 +76,7 @@ class ReadPredictedCameras:
     cameras: dict[int, Camera] = field(default_factory=dict)
     unknown: Counter[str] = field(default_factory=Counter)
     reasons: dict[str, str] = field(default_factory=dict)
-    report: Report = field(default_factory=Report)
+    report: ReaderReport = field(default_factory=ReaderReport)
 
 
 def read_predictions(
@@ -150,7 +150,7 @@ def _unused_option_error(option: str, what: str, kind: str) -> InputError:
 def _kind_by_ending(path: Path, limits: Limits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
     # What is wrong is reported by whoever reads them then.
-    with open_tree_while_read(path, Report(), limits) as tree:
+    with open_tree_while_read(path, ReaderReport(), limits) as tree:
         names = [] if tree is None else tree.names()
         endings = {PurePosixPath(name).suffix.lower() for name in names}
         kind = next((kind for ending, kind in ENDINGS if ending in endings), "coco")
@@ -195,7 +195,7 @@ def read_predicted_cameras(
         ids = (frame.id,) if frame is not None else names.of_station(name)
         if not ids:
             found.unknown[name] += 1
-            found.reasons[name] = names.why_not(name)
+            found.reasons[name] = names.explain_unknown(name)
         for identity in ids:
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size
@@ -245,7 +245,7 @@ def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> N
                 _add_coco(run, item, known)
 
 
-def _json_documents(tree: FileTree, path: Path, report: Report) -> Documents:
+def _json_documents(tree: FileTree, path: Path, report: ReaderReport) -> Documents:
     found = []
     other = None
     for name in tree.names():
@@ -291,7 +291,7 @@ class _CocoImages:
     classes: IdIndex[str]
 
     @staticmethod
-    def of(documents: Documents, report: Report) -> _CocoImages:
+    def of(documents: Documents, report: ReaderReport) -> _CocoImages:
         names, classes = IdIndex[str](), IdIndex[str]()
         sizes: dict[str, ImageSize] = {}
         balls = False
@@ -432,7 +432,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
         frame = run.names.find(name)
         if frame is None:
             run.found.unknown[name] += len(boxes)
-            run.found.reasons[name] = run.names.why_not(name)
+            run.found.reasons[name] = run.names.explain_unknown(name)
         else:
             run.matched = True
         rows.extend((shown, number, frame, cells) for number, cells in boxes)

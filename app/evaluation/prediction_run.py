@@ -13,7 +13,7 @@ import numpy as np
 from app.errors import InputError
 from app.evaluation.frame import Detection, FrameNames, NamedFrame
 from app.formats.ball_names import is_ball
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
 from app.soccer.frames import Box, ImageSize, box_from_corner, box_to_corner
 
@@ -87,7 +87,7 @@ class ReadPredictions:
     reasons: dict[str, str] = field(default_factory=dict)
     without_score: int = 0
     tracks: dict[str, PredictedTrack] = field(default_factory=dict)
-    report: Report = field(default_factory=Report)
+    report: ReaderReport = field(default_factory=ReaderReport)
     format: str = ""
 
     @property
@@ -113,7 +113,7 @@ class PredictionRun:
         """The frame of a name; a name that is none is counted."""
         found = self.names.find(name)
         if found is None:
-            self.miss(name, self.names.why_not(name))
+            self.miss(name, self.names.explain_unknown(name))
         else:
             self.matched = True
         return found
@@ -122,7 +122,7 @@ class PredictionRun:
         """The frame of a number as its picture or view has it in its name, ``4`` for ``0004.jpg``."""
         found = self.names.find(text) or self.names.find_number(text)
         if found is None:
-            self.miss(text, self.names.why_not_number(text))
+            self.miss(text, self.names.explain_unknown_number(text))
         else:
             self.matched = True
         return found
@@ -281,7 +281,7 @@ class in_field:  # noqa: N801
 class noted:  # noqa: N801
     """Notes a record that is wrong, and goes on with the next one."""
 
-    def __init__(self, report: Report, path: str, record: str):
+    def __init__(self, report: ReaderReport, path: str, record: str):
         self.report, self.path, self.record = report, path, record
 
     def __enter__(self) -> None:

@@ -31,7 +31,7 @@ from app.formats import fields
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.fields import id_to_text
 from app.formats.file_tree import FileTree, Limits
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import quoted
 from app.soccer.choices import BallEventKind
 from app.soccer.frames import Box, ImageSize
@@ -249,7 +249,7 @@ def is_ball_table(content: bytes) -> bool:
 
 
 def read_tracks(
-    tree: FileTree, path: Path, report: Report, limits: Limits
+    tree: FileTree, path: Path, report: ReaderReport, limits: Limits
 ) -> dict[str, PredictedTrack]:
     """Predicted tracks by the folders that they lie in, the file at the top under the empty name.
 
@@ -283,7 +283,7 @@ def _rows_by_track(
     tree: FileTree,
     name: str,
     columns: tuple[str, ...],
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
     add: Callable[[Mapping[str, str]], object],
 ) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.formats.fields import IdIndex, id_to_text
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.wording import plural
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+")
@@ -114,7 +114,7 @@ class Categories:
         listed: Sequence[Any],
         annotations: Sequence[Any],
         path: str,
-        report: Report,
+        report: ReaderReport,
         ball: str = "",
     ):
         self._path, self._report, self._named = path, report, ball

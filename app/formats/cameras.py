@@ -27,7 +27,7 @@ from app.formats.fields import parse_image_size
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import fold_file_name, frame_name_claims, view_file_path
 from app.formats.json_reader import describe_document, is_camera, read_json, read_json_lines
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import CAMERAS, LINES, find_original_frame_path, read_match_info
 from app.formats.synloc import camera_from_synloc, index_image_records, is_synloc
 from app.formats.trees import open_tree_while_read
@@ -72,7 +72,7 @@ _MEANT = (
 
 def read_cameras(
     path: Root,
-    report: Report,
+    report: ReaderReport,
     limits: Limits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
     covariances: dict[str, Any] | None = None,
@@ -111,7 +111,7 @@ def read_cameras(
 def read_camera_files(
     tree: FileTree,
     names: Sequence[str],
-    report: Report,
+    report: ReaderReport,
     places: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
@@ -143,7 +143,7 @@ def _frame_places_of_export(tree: FileTree, names: list[str]) -> dict[str, str]:
     """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
     found = {}
     # What is wrong with the file is no matter of cameras.
-    for image, record in read_match_info(tree, names, Report()).items():
+    for image, record in read_match_info(tree, names, ReaderReport()).items():
         lines, place = PurePosixPath(image), find_original_frame_path(record)
         if place is not None and lines.parts[0] == LINES:
             file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
@@ -177,7 +177,7 @@ def _read_file(
     key: str,
     cameras: dict[str, Camera],
     stated: _StatedValues,
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
 ) -> None:
     shown = tree.shown(name)
@@ -240,7 +240,7 @@ _Items = list[tuple[str | None, Any]]
 
 
 def _parse_camera_items(
-    content: bytes, name: str, key: str, shown: str, report: Report, limits: Limits
+    content: bytes, name: str, key: str, shown: str, report: ReaderReport, limits: Limits
 ) -> _Items:
     ending = PurePosixPath(name).suffix.lower()
     if ending == ".npz":

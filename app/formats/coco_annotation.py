@@ -13,7 +13,7 @@ from typing import Any
 from app.formats import fields
 from app.formats.fields import IdIndex, id_to_text
 from app.formats.picture_finder import split_picture_name
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import quoted
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, box_from_corner
@@ -37,7 +37,7 @@ class JoinedAnnotations:
     """
 
     def __init__(
-        self, images: Sequence[Any], annotations: Sequence[Any], path: str, report: Report
+        self, images: Sequence[Any], annotations: Sequence[Any], path: str, report: ReaderReport
     ):
         self._path, self._report = path, report
         self._ids: IdIndex[int] = IdIndex()

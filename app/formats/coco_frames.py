@@ -23,7 +23,7 @@ from app.formats.picture_finder import (
     split_of_word,
     split_picture_name,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
@@ -92,7 +92,7 @@ def group_frames(
     tree: FileTree,
     names: Sequence[str],
     calibration: str,
-    report: Report,
+    report: ReaderReport,
 ) -> Iterator[Group]:
     """The groups of all files, each frame once.
 
@@ -136,7 +136,7 @@ def _with_folders_of_others(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
         yield file
 
 
-def _find_pictures(file: FrameFile, finder: PictureFinder, report: Report) -> None:
+def _find_pictures(file: FrameFile, finder: PictureFinder, report: ReaderReport) -> None:
     first: dict[tuple[str, ...], Frame] = {}
     for frame in file.frames:
         first.setdefault(frame.parts, frame)
@@ -161,7 +161,7 @@ def _report_pictures(
     found: Mapping[tuple[str, ...], PictureSearchResult],
     first: Mapping[tuple[str, ...], Frame],
     finder: PictureFinder,
-    report: Report,
+    report: ReaderReport,
 ) -> None:
     """What cannot be told apart, one by one; what is missing or was guessed, once a file."""
     missing, guessed = [], []
@@ -196,7 +196,7 @@ def _report_pictures(
             report.remark(f"{file.path}: {sentence}")
 
 
-def _merge_frames(files: Sequence[FrameFile], report: Report) -> list[Frame]:
+def _merge_frames(files: Sequence[FrameFile], report: ReaderReport) -> list[Frame]:
     """Each frame once, with all that the files say of it."""
     known: dict[tuple[str, ...], list[Frame]] = {}
     frames: list[Frame] = []
@@ -219,7 +219,7 @@ def _is_one_view(one: Frame, other: Frame) -> bool:
     return (one.group, one.view) == (other.group, other.view)
 
 
-def _merge_records_of_frame(frame: Frame, other: Frame, report: Report) -> None:
+def _merge_records_of_frame(frame: Frame, other: Frame, report: ReaderReport) -> None:
     """Add what another record says of a frame; what contradicts is named, and the first one counts."""
     first = f"{frame.path}, {frame.record}" if other.path != frame.path else frame.record
     if other.size != frame.size:
@@ -256,7 +256,9 @@ def _class_and_points(box: Mapping[str, Any]) -> tuple[Any, Any]:
     return box.get("class"), box.get("points")
 
 
-def _add_ball(frame: Frame, ball: BallAnnotation, other: Frame, first: str, report: Report) -> None:
+def _add_ball(
+    frame: Frame, ball: BallAnnotation, other: Frame, first: str, report: ReaderReport
+) -> None:
     for place, known in enumerate(frame.balls):
         if _is_one_ball(known, ball):
             occluded = known.occluded or ball.occluded
@@ -289,7 +291,9 @@ def _box_corners(box: Box) -> tuple[float, ...]:
     return box.x, box.y, box.x + box.width, box.y + box.height
 
 
-def _group_by_key(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, list[Frame]]]:
+def _group_by_key(
+    frames: Sequence[Frame], report: ReaderReport
+) -> Iterator[tuple[str, list[Frame]]]:
     """Groups by key; where sets of frames use one key for different frames, each has its own."""
     groups: dict[str, list[Frame]] = {}
     for frame in frames:
@@ -323,7 +327,7 @@ def _add_folders_to_view_names(frames: Sequence[Frame]) -> None:
                 frame.view = long(frame).strip("/")
 
 
-def _unique_frames(key: str, frames: Sequence[Frame], report: Report) -> list[Frame]:
+def _unique_frames(key: str, frames: Sequence[Frame], report: ReaderReport) -> list[Frame]:
     """The frames of a group, one of each name."""
     views: dict[str, Frame] = {}
     for frame in frames:
@@ -348,7 +352,7 @@ def _make_view(group: str, frame: Frame, tree: FileTree, calibration: str) -> Vi
     return View(key, station, tuple(frame.balls), media, extras=Extras(tuple(frame.boxes)))
 
 
-def _choose_split(frames: Sequence[Frame], key: str, report: Report) -> str:
+def _choose_split(frames: Sequence[Frame], key: str, report: ReaderReport) -> str:
     splits = list(dict.fromkeys(frame.split for frame in frames if frame.split))
     for other in splits[1:]:
         frame = next(item for item in frames if item.split == other)

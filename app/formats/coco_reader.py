@@ -40,7 +40,7 @@ from app.formats.picture_finder import (
     split_picture_name,
     split_within_word,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc
 from app.formats.trees import open_tree_while_read
@@ -61,7 +61,7 @@ _TASK = re.compile(
 
 def read_coco(
     root: Root,
-    report: Report,
+    report: ReaderReport,
     *,
     calibration: str = "given",
     limits: Limits = DEFAULT_LIMITS,
@@ -108,7 +108,7 @@ def read_coco(
 
 
 def _read_coco_file(
-    tree: FileTree, name: str, report: Report, limits: Limits
+    tree: FileTree, name: str, report: ReaderReport, limits: Limits
 ) -> dict[str, Any] | None:
     """A file with a list of images; None for any other, which is said."""
     shown = tree.shown(name)
@@ -127,7 +127,7 @@ def _read_coco_file(
     return None
 
 
-def _report_ball_categories(files: list[_CocoFile], report: Report) -> None:
+def _report_ball_categories(files: list[_CocoFile], report: ReaderReport) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
     some = any(file.categories.balls for file in files)
     foreign = [file for file in files if file.frames.frames]
@@ -144,7 +144,7 @@ class _CocoFile:
         name: str,
         finder: PictureFinder,
         value: Mapping[str, Any],
-        report: Report,
+        report: ReaderReport,
         ball_category: str,
     ):
         self.path, self._tree, self._finder = tree.shown(name), tree, finder

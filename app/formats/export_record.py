@@ -87,7 +87,7 @@ class ExportRecord:
         shown = any(not ball.out_of_view for ball in view.balls)
         return not shown or self.has_ball_3d(view)
 
-    def for_training(self) -> ExportRecord:
+    def keep_training_views(self) -> ExportRecord:
         """The same group with the views alone from which a detector may learn."""
         views = tuple(view for view in self.group.views if self.is_training_view(view))
         return replace(self, group=replace(self.group, views=views))

@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Protocol
 
 from app.config import Settings
 from app.errors import DatasetFormatError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.object_store.path import StoredPath
 from app.soccer.group import Media
 
@@ -81,7 +81,7 @@ class FileTree(Protocol):
     def media_in_zip(self, name: str, member: str) -> Media:
         """The same of a member of a zip file among the files."""
 
-    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file among the files, read in place.
 
         Raises:

@@ -15,7 +15,7 @@ from app.errors import DatasetFormatError, ImageError, InputError, NotFoundError
 from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file, require_safe_path
 from app.formats.trees import open_tree_while_read
 from app.object_store.path import (
@@ -74,7 +74,7 @@ def check_grouping(grouping: str) -> re.Pattern[str] | None:
 def read_frames(
     root: Root,
     size_of: SizeOf,
-    report: Report,
+    report: ReaderReport,
     limits: Limits = DEFAULT_LIMITS,
     grouping: str = "",
 ) -> Iterator[Group]:
@@ -132,7 +132,7 @@ def _group_by_name(
     return groups
 
 
-def _report_groups(report: Report, groups: dict[str, list[str]], grouping: str) -> None:
+def _report_groups(report: ReaderReport, groups: dict[str, list[str]], grouping: str) -> None:
     """Say in one sentence what the grouping made, with the largest group as an example."""
     key, names = max(groups.items(), key=lambda item: len(item[1]))
     shown = ", ".join(PurePosixPath(name).name for name in names[:4])
@@ -148,7 +148,7 @@ def _report_groups(report: Report, groups: dict[str, list[str]], grouping: str) 
 
 
 def _read_views(
-    tree: FileTree, names: Iterable[str], short: bool, size_of: SizeOf, report: Report
+    tree: FileTree, names: Iterable[str], short: bool, size_of: SizeOf, report: ReaderReport
 ) -> Iterator[View]:
     for name in names:
         report.read += 1
@@ -200,7 +200,7 @@ class FrameList:
         shown: str,
         settings: Settings,
         folder: StoredPath | None,
-        report: Report,
+        report: ReaderReport,
         limits: Limits = DEFAULT_LIMITS,
     ):
         self._settings, self._folder = settings, folder
@@ -279,7 +279,7 @@ class FrameList:
 
 
 def read_frame_list(
-    place: Root, settings: Settings, report: Report, limits: Limits = DEFAULT_LIMITS
+    place: Root, settings: Settings, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> FrameList:
     """The list at a place, on a disk or in a store.
 

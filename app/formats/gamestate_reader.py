@@ -14,7 +14,7 @@ from app.formats.fields import IdIndex
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.frame_names import UNASSIGNED, view_stem
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
@@ -84,7 +84,7 @@ _FOLDERS = ("img1/", "", "frames/")
 
 def read_gamestate(
     root: Root,
-    report: Report,
+    report: ReaderReport,
     *,
     calibration: str = "given",
     limits: Limits = DEFAULT_LIMITS,
@@ -134,7 +134,9 @@ class _AnnotatedImage:
 class _LabelledSequence:
     """One Labels-GameState.json on its way to groups."""
 
-    def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
+    def __init__(
+        self, tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: Limits
+    ):
         self.path, self._report, self._tree = tree.shown(name), report, tree
         content = tree.read_bytes(name)
         value = read_json(content, self.path, max_bytes=limits.file_bytes, report=report)

@@ -14,7 +14,7 @@ from app.errors import ReviewError
 from app.formats.file_tree import BROKEN, FileTree, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
 from app.formats.json_reader import EVALUATE, EXPORT
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import MAX_PART
 from app.formats.trees import open_tree_while_read
 from app.object_store.path import StoredPath
@@ -225,7 +225,7 @@ def guess_from_content(path: Root, format_: str) -> FormatGuess | None:
         format_: The format that they were given for.
     """
     try:
-        with open_tree_while_read(path, Report()) as tree:
+        with open_tree_while_read(path, ReaderReport()) as tree:
             found = None if tree is None else _guess_of_tree(tree)
     except (*BROKEN, ReviewError, ValueError):
         found = None

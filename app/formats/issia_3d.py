@@ -26,7 +26,7 @@ from app.formats.issia_reader import (
     add_stations_and_media,
     count_annotations,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree_while_read
 from app.formats.view_files import SortedSpill, open_spill
 from app.formats.viper_reader import ViperTrack
@@ -41,7 +41,7 @@ _AXIS = re.compile(r"([xy])_cam(\d{1,3})", re.ASCII)
 
 
 def open_issia_3d(
-    folder: Root, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip, or the table alone) as if it were ISSIA's own ground truth.
 
@@ -69,7 +69,7 @@ def open_issia_3d(
 
 
 def _read_table(
-    tree: FileTree, name: str, found: IssiaFolder, report: Report, limits: Limits
+    tree: FileTree, name: str, found: IssiaFolder, report: ReaderReport, limits: Limits
 ) -> None:
     shown, seen = tree.shown(name), set[int]()
     try:
@@ -93,7 +93,7 @@ def _read_table(
         report.skip(error)
 
 
-def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: Report) -> None:
+def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: ReaderReport) -> None:
     """Name each column of x without one of y, or the other way round: nothing is read of it."""
     there = {(found[1], found[2]) for name in columns if (found := _AXIS.fullmatch(name))}
     for axis, camera in sorted(there):
@@ -115,7 +115,7 @@ def _read_ball_centers(
     frame: int,
     found: IssiaFolder,
     place: DatasetFormatError,
-    report: Report,
+    report: ReaderReport,
 ) -> None:
     """The ball centres of one row; ``place`` is where it stands."""
     for name in cells:

@@ -20,7 +20,7 @@ from app.formats.issia import (
     find_cameras_with_mirrored_people,
     mirror_people,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
 from app.formats.trees import FolderTree, open_tree_while_read
@@ -144,7 +144,7 @@ def _split_of_cameras(cameras: list[int]) -> str:
 
 
 def open_issia(
-    folder: Root, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip) once, for its groups and its persons.
 
@@ -168,7 +168,7 @@ def add_stations_and_media(
     tree: FileTree,
     names: list[str],
     options: IssiaOptions,
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
 ) -> None:
     """Give each camera that has a track its station and its media."""
@@ -179,7 +179,7 @@ def add_stations_and_media(
     drawn = set[int]()
     for index, size in enumerate(dict.fromkeys(sizes.values())):
         # Each file is read for the size of its own camera; what is wrong with it is told once.
-        own_report = Report() if index else report
+        own_report = ReaderReport() if index else report
         if options.lines is None:
             read = _read_exported_lines(tree, names, size, own_report)
         else:
@@ -202,7 +202,7 @@ def add_stations_and_media(
 
 
 def _report_unused(
-    found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: Report
+    found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: ReaderReport
 ) -> None:
     """Say which numbers of cameras came without ground truth of that camera."""
     for what, numbers in brought.items():
@@ -231,7 +231,7 @@ def _read_tracks(
     names: list[str],
     options: IssiaOptions,
     found: IssiaFolder,
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
 ) -> None:
     files = [name for name in names if _XGTF.search(name)]
@@ -264,7 +264,7 @@ def _read_tracks(
 
 
 def _tracks_by_camera(
-    stem: str, tracks: list[ViperTrack], shown: str, report: Report
+    stem: str, tracks: list[ViperTrack], shown: str, report: ReaderReport
 ) -> Iterator[tuple[int | None, ViperTrack]]:
     """Each source of a file with the number of its camera.
 
@@ -291,7 +291,7 @@ def _tracks_by_camera(
 
 
 def _compare_sizes(
-    camera: int, track: ViperTrack, shown: str, options: IssiaOptions, report: Report
+    camera: int, track: ViperTrack, shown: str, options: IssiaOptions, report: ReaderReport
 ) -> None:
     """Say which size counts where file and options differ."""
     size = options.size_of(track)
@@ -312,13 +312,15 @@ def _shift_frames(track: ViperTrack, offset: int) -> ViperTrack:
     )
 
 
-def _read_given_cameras(tree: FileTree, names: list[str], report: Report) -> dict[int, Camera]:
+def _read_given_cameras(
+    tree: FileTree, names: list[str], report: ReaderReport
+) -> dict[int, Camera]:
     files = [name for name in names if PurePosixPath(name).name == CALIBRATION]
     if not files:
         return {}
     for name in files[1:]:
         report.note(tree.shown(name), None, None, f"is a second {CALIBRATION}; {files[0]} is used")
-    side = Report()
+    side = ReaderReport()
     cameras = read_camera_files(tree, files[:1], side)
     for problem in side.problems:
         report.skip(problem)
@@ -332,21 +334,23 @@ def _read_given_cameras(tree: FileTree, names: list[str], report: Report) -> dic
     return given
 
 
-def _read_lines(path: Root, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
-    side = Report()
+def _read_lines(
+    path: Root, size: ImageSize, report: ReaderReport, limits: Limits
+) -> dict[int, LineFile]:
+    side = ReaderReport()
     return _line_files_by_camera(read_line_files(path, size, side, limits), side, report)
 
 
 def _read_exported_lines(
-    tree: FileTree, names: list[str], size: ImageSize, report: Report
+    tree: FileTree, names: list[str], size: ImageSize, report: ReaderReport
 ) -> dict[int, LineFile]:
     """Lines that an export of this format laid beside the ground truth."""
-    own, side = [name for name in names if _OWN_LINES.fullmatch(name)], Report()
+    own, side = [name for name in names if _OWN_LINES.fullmatch(name)], ReaderReport()
     return _line_files_by_camera(read_line_files_of_tree(tree, own, size, side), side, report)
 
 
 def _line_files_by_camera(
-    files: Iterator[LineFile], side: Report, report: Report
+    files: Iterator[LineFile], side: ReaderReport, report: ReaderReport
 ) -> dict[int, LineFile]:
     lines: dict[int, LineFile] = {}
     for file in files:
@@ -402,7 +406,7 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
                 found.frames.setdefault((camera, int(number[1])), tree.media(name))
 
 
-def count_annotations(found: IssiaFolder, report: Report) -> None:
+def count_annotations(found: IssiaFolder, report: ReaderReport) -> None:
     """Note what a folder held."""
     balls = {frame for track in found.tracks.values() for frame in track.balls}
     persons = {frame for track in found.tracks.values() for frame in track.persons}

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.errors import DatasetFormatError
 from app.formats.camera_matrix import holds_homography, holds_matrices
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import quoted
 from app.soccer.pitch import find_marking_like
 from app.wording import plural
@@ -122,7 +122,7 @@ def read_json(
     double_encoded: bool = False,
     nan: NanRule = "refuse",
     max_bytes: int = MAX_BYTES,
-    report: Report | None = None,
+    report: ReaderReport | None = None,
 ) -> Any:
     """The value of JSON text.
 
@@ -147,7 +147,7 @@ def read_json(
     return value
 
 
-def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | None:
+def read_json_lines(content: bytes, path: str, report: ReaderReport) -> list[Any] | None:
     """The objects of JSON lines, an object a line, NaN allowed; None where the text is something else.
 
     A line that cannot be read is reported and left out.
@@ -175,7 +175,7 @@ def _parse_json(
     record: str | None,
     max_bytes: int,
     nan: NanRule,
-    report: Report | None,
+    report: ReaderReport | None,
 ) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
@@ -204,17 +204,17 @@ def _parse_json(
 
 
 def _parse_inner_text(
-    text: str, path: str, record: str | None, nan: NanRule, report: Report | None
+    text: str, path: str, record: str | None, nan: NanRule, report: ReaderReport | None
 ) -> Any:
     try:
         return _parse_json(text.encode(), path, record, MAX_LITERAL_CHARACTERS, nan, report)
     except (DatasetFormatError, UnicodeEncodeError):
         # A literal has no number that is not finite: what is missing there is refused by its field.
-        return parse_literal(text, path, record, Report() if nan == "keep" else report)
+        return parse_literal(text, path, record, ReaderReport() if nan == "keep" else report)
 
 
 def parse_literal(
-    text: str, path: str, record: str | None = None, report: Report | None = None
+    text: str, path: str, record: str | None = None, report: ReaderReport | None = None
 ) -> Any:
     """The value of a Python literal of dicts, lists, tuples, strings, numbers and None.
 
@@ -258,7 +258,9 @@ class _NonFiniteToNone(ast.NodeTransformer):
         return self.visit(node.operand) if named else self.generic_visit(node)
 
 
-def _parse_literal_with_nulls(text: str, path: str, record: str | None, report: Report) -> Any:
+def _parse_literal_with_nulls(
+    text: str, path: str, record: str | None, report: ReaderReport
+) -> Any:
     missing = _NonFiniteToNone()
     value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
     if missing.count:
@@ -292,7 +294,7 @@ def _nesting_depth(content: bytes, strings: re.Pattern[bytes]) -> int:
     return int(np.cumsum(steps).max(initial=0))
 
 
-def _replace_non_finite(value: Any, path: str, report: Report) -> Any:
+def _replace_non_finite(value: Any, path: str, report: ReaderReport) -> Any:
     """The value with null for each number that is not finite, the first of which are reported."""
     found: list[tuple[tuple[str | int, ...], float]] = []
     value = _copy_without_non_finite(value, (), found)
@@ -310,7 +312,7 @@ def _replace_non_finite(value: Any, path: str, report: Report) -> Any:
 
 
 def _report_non_finite(
-    report: Report, path: str, record: str | None, field: str | None, what: str
+    report: ReaderReport, path: str, record: str | None, field: str | None, what: str
 ) -> None:
     """Say what a file holds. Where it is of no use without that number, its reader leaves it out."""
     problem = DatasetFormatError(path, record, field, f"{what}; read as missing")

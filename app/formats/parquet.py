@@ -18,7 +18,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, read_l
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_reader import read_json
 from app.formats.manifest import read_software_version
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import FolderTree, open_tree_while_read
 from app.formats.view_state import (
     PlacedView,
@@ -375,7 +375,9 @@ OPTIONAL = (
 _BATCH = 512
 
 
-def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS) -> Iterator[Group]:
+def read_parquet(
+    root: Root, report: ReaderReport, *, limits: Limits = DEFAULT_LIMITS
+) -> Iterator[Group]:
     """The groups of every Parquet file below ``root`` that has the columns of our exports.
 
     What was said is read, what was computed is computed again.
@@ -398,7 +400,7 @@ def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS)
 
 
 def _read_views(
-    tree: FileTree, name: str, names: list[str], report: Report, limits: Limits
+    tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: Limits
 ) -> Iterator[PlacedView]:
     shown, present, number = tree.shown(name), set(names), 0
     try:

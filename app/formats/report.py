@@ -15,7 +15,7 @@ MAX_REMARKS = 200
 
 
 @dataclass
-class Report:
+class ReaderReport:
     """Filled by a reader while it runs.
 
     Attributes:

@@ -22,7 +22,7 @@ from app.formats.frame_names import (
     view_file_path,
 )
 from app.formats.json_reader import describe_document, read_json, read_json_lines
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import IMAGE, SPLITS
 from app.json_text import json_text
@@ -147,7 +147,7 @@ class LineDocument:
     size: ImageSize | None = None
 
 
-def read_line_documents(content: bytes, path: str, report: Report) -> list[LineDocument]:
+def read_line_documents(content: bytes, path: str, report: ReaderReport) -> list[LineDocument]:
     """``read_lines_of_images`` of the text of a file, JSON or JSON lines.
 
     Raises:
@@ -162,7 +162,7 @@ def read_line_documents(content: bytes, path: str, report: Report) -> list[LineD
     return read_lines_of_images(value, path, report)
 
 
-def read_lines_of_images(value: Any, path: str, report: Report) -> list[LineDocument]:
+def read_lines_of_images(value: Any, path: str, report: ReaderReport) -> list[LineDocument]:
     """The images of a parsed file of lines.
 
     An object of markings, the same inside another object (``lines``), an object or a list of many
@@ -266,7 +266,7 @@ _MOMENT = {"half": "half", "gameTime": "gameTime", "position": "ms_time"}
 
 
 def read_match_info(
-    tree: FileTree, names: list[str], report: Report
+    tree: FileTree, names: list[str], report: ReaderReport
 ) -> Mapping[str, Mapping[str, Any]]:
     """The record of each image, by its path in the tree without the ending.
 

@@ -13,7 +13,7 @@ from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import (
     LARGEST_UNIT,
     MATCH_INFO_METADATA,
@@ -41,7 +41,7 @@ _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
 def read_line_files(
     path: Root,
     size: ImageSize,
-    report: Report,
+    report: ReaderReport,
     limits: Limits = DEFAULT_LIMITS,
     *,
     by_folder: bool = False,
@@ -65,7 +65,7 @@ def read_line_files(
         if tree is None:
             return
         names = tree.names()
-        places = _original_frame_paths(read_match_info(tree, names, Report()))
+        places = _original_frame_paths(read_match_info(tree, names, ReaderReport()))
         sizes = _sizes_by_folder(map(_path_without_suffix, names), path.stem) if by_folder else {}
         ours = OwnExportInfo(places, sizes, own_sizes=by_folder)
         yield from read_line_files_of_tree(tree, names, size, report, ours)
@@ -89,7 +89,7 @@ def read_line_files_of_tree(
     tree: FileTree,
     names: Sequence[str],
     size: ImageSize,
-    report: Report,
+    report: ReaderReport,
     ours: OwnExportInfo = _NOTHING,
 ) -> Iterator[LineFile]:
     """The line files among some files of a tree, with the images that lie beside them."""
@@ -143,7 +143,7 @@ def _sizes_by_folder(places: Iterable[str], top: str = "") -> dict[str, ImageSiz
     return {whole: found[1] for whole, found in by_folder.items() if found}
 
 
-def _read_line_documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
+def _read_line_documents(tree: FileTree, name: str, report: ReaderReport) -> list[LineDocument]:
     try:
         return read_line_documents(tree.read_bytes(name), tree.shown(name), report)
     except DatasetFormatError as error:
@@ -169,7 +169,7 @@ def _images_by_stem(names: Iterable[str]) -> dict[str, str]:
 
 
 def lines_from_json(
-    value: Any, size: ImageSize, path: str, report: Report, drawn: ImageSize | None = None
+    value: Any, size: ImageSize, path: str, report: ReaderReport, drawn: ImageSize | None = None
 ) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
     """Lines with geometry, and the others, of one image, in pixels.
 
@@ -227,7 +227,7 @@ def _is_far_outside(point: tuple[float, float]) -> bool:
 
 
 def _points_near_image(
-    line: _Numbered, path: str, name: str, report: Report
+    line: _Numbered, path: str, name: str, report: ReaderReport
 ) -> list[tuple[float, float]]:
     """The points of a line of a normalised file that can be normalised; others are reported."""
     far = [number for number, point in line if _is_far_outside(point)]
@@ -243,7 +243,7 @@ def _describe_left_out_points(numbers: Sequence[int]) -> str:
     return f"points {listed} are left out" if len(numbers) > 1 else f"point {listed} is left out"
 
 
-def _read_points(value: Any, path: str, name: str, report: Report) -> _Numbered:
+def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Numbered:
     """The sound points of a line; they are in no order, so that one less says nothing false."""
     points: _Numbered = []
     bad: list[int] = []
@@ -276,7 +276,7 @@ def _parse_point(item: Any) -> tuple[float, float]:
     return fields.parse_pixel_coordinate(x), fields.parse_pixel_coordinate(y)
 
 
-def _read_marking_name(name: str, path: str, report: Report) -> str | None:
+def _read_marking_name(name: str, path: str, report: ReaderReport) -> str | None:
     """The marking of that name; None (reported unless the format knows it) for any other."""
     found = find_marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
@@ -288,7 +288,7 @@ def _read_marking_name(name: str, path: str, report: Report) -> str | None:
 def read_sn_calibration(
     path: Root,
     size: ImageSize,
-    report: Report,
+    report: ReaderReport,
     *,
     calibration: str = "given",
     limits: Limits = DEFAULT_LIMITS,

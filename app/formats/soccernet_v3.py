@@ -16,7 +16,7 @@ from app.formats.ball_names import is_ball
 from app.formats.fields import find_exact_inverse
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import CORNERS, BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import Media, View
@@ -85,14 +85,14 @@ class MatchFrames:
         report: Takes one problem when the archive is damaged.
     """
 
-    def __init__(self, tree: FileTree, match: str, names: Collection[str], report: Report):
+    def __init__(self, tree: FileTree, match: str, names: Collection[str], report: ReaderReport):
         self._tree, self._match = tree, match
         self._loose = {name for name in names if _is_image(name)}
         self._members: dict[str, str] = {}
         if ARCHIVE in names:
             self._open_archive(report)
 
-    def _open_archive(self, report: Report) -> None:
+    def _open_archive(self, report: ReaderReport) -> None:
         try:
             archive = self._tree.open_nested_zip(self._match + ARCHIVE, report)
         except DatasetFormatError as error:
@@ -158,7 +158,7 @@ class _RecordBuilder:
 
     path: str
     record: str
-    report: Report
+    report: ReaderReport
     lines: dict[str, list[ImagePoint]] = field(default_factory=dict)
     balls: list[BallAnnotation] = field(default_factory=list)
     ball_fields: list[dict[str, Any]] = field(default_factory=list)
@@ -169,7 +169,7 @@ class _RecordBuilder:
         self.report.note(self.path, self.record, where, problem)
 
 
-def record_from_json(value: Any, path: str, record: str, report: Report) -> ImageRecord:
+def record_from_json(value: Any, path: str, record: str, report: ReaderReport) -> ImageRecord:
     """The annotations of one image.
 
     Several balls are all kept. Boxes of people, null and unknown classes go to ``extras`` as they

@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import (
     GAME,
@@ -32,7 +32,7 @@ from app.wording import plural
 
 
 def read_soccernet_v3(
-    root: Root, report: Report, limits: Limits = DEFAULT_LIMITS
+    root: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> Iterator[Group]:
     """The groups of every match below ``root``: each action with its linked replays.
 
@@ -63,7 +63,7 @@ class MatchReader:
         self,
         tree: FileTree,
         names: list[str],
-        report: Report,
+        report: ReaderReport,
         limits: Limits,
         file: str = LABELS,
     ):
@@ -120,7 +120,7 @@ class _MatchLabels:
     """One Labels-v3.json on its way to groups."""
 
     def __init__(
-        self, key: str, labels: dict[str, Any], path: str, frames: MatchFrames, report: Report
+        self, key: str, labels: dict[str, Any], path: str, frames: MatchFrames, report: ReaderReport
     ):
         self.key, self.path, self.frames, self.report = key, path, frames, report
         self.actions = self._image_records(labels, "actions")

@@ -13,7 +13,7 @@ from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
 from app.formats.json_reader import parse_literal
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrames, group_label
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
@@ -96,7 +96,9 @@ class SnTable:
         ]
 
 
-def read_snv3d_table(tree: FileTree, names: list[str], report: Report, limits: Limits) -> SnTable:
+def read_snv3d_table(
+    tree: FileTree, names: list[str], report: ReaderReport, limits: Limits
+) -> SnTable:
     """The table of a tree and its split lists; empty where there is none.
 
     A row that is wrong is reported with its line and left out, an unreadable cell alone is.
@@ -119,7 +121,7 @@ def _read_table(
     tree: FileTree,
     name: str,
     rows: dict[str, dict[str, dict[str, TableRow]]],
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
 ) -> None:
     shown = tree.shown(name)
@@ -138,7 +140,7 @@ def _read_table(
 class _RowCells:
     """The cells of one row."""
 
-    def __init__(self, cells: Mapping[str, str], path: str, line: str, report: Report):
+    def __init__(self, cells: Mapping[str, str], path: str, line: str, report: ReaderReport):
         self._cells, self._path, self._line, self._report = cells, path, line, report
 
     def to_table_row(self) -> TableRow:
@@ -220,7 +222,7 @@ class _RowCells:
 
 
 def _read_split_lists(
-    tree: FileTree, names: list[str], folder: str, report: Report
+    tree: FileTree, names: list[str], folder: str, report: ReaderReport
 ) -> dict[tuple[str, str], str]:
     """Split by (match folder, stem of the image)."""
     found: dict[tuple[str, str], str] = {}
@@ -238,7 +240,7 @@ def _read_split_list(
     name: str,
     split: str,
     found: dict[tuple[str, str], str],
-    report: Report,
+    report: ReaderReport,
 ) -> None:
     shown = tree.shown(name)
     lines = tree.read_bytes(name).decode("utf-8-sig", "replace").splitlines()[:_MAX_LINES]
@@ -272,7 +274,7 @@ COMPUTED = (
 
 def read_soccernet_v3d(
     root: Root,
-    report: Report,
+    report: ReaderReport,
     *,
     calibration: str = "given",
     limits: Limits = DEFAULT_LIMITS,
@@ -308,7 +310,7 @@ def read_soccernet_v3d(
 class _DatasetReader:
     """Brings labels and table together."""
 
-    def __init__(self, table: SnTable, calibration: str, report: Report):
+    def __init__(self, table: SnTable, calibration: str, report: ReaderReport):
         self._table, self._calibration, self._report = table, calibration, report
         self._seen: set[tuple[str, str]] = set()
 

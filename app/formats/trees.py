@@ -15,7 +15,7 @@ from typing import IO
 
 from app.errors import DatasetFormatError, TooLargeError, UnsafePathError
 from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root, read_limited
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import is_hidden, open_regular_file, require_safe_path, resolve_inside
 from app.object_store.path import StoredPath
 from app.object_store.store import StoredObject
@@ -35,7 +35,11 @@ class ZipTree:
     """
 
     def __init__(
-        self, path: Root, report: Report, limits: Limits, archive: zipfile.ZipFile | None = None
+        self,
+        path: Root,
+        report: ReaderReport,
+        limits: Limits,
+        archive: zipfile.ZipFile | None = None,
     ):
         self.path = path
         self._limits = limits
@@ -47,7 +51,7 @@ class ZipTree:
             self._archive.close()
             raise
 
-    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file that is itself a member, read in place.
 
         What the zip files inside hold counts toward the limits of the one around them. A zip
@@ -123,7 +127,7 @@ class ZipTree:
         """Close the zip file."""
         self._archive.close()
 
-    def _checked_members(self, report: Report) -> dict[str, zipfile.ZipInfo]:
+    def _checked_members(self, report: ReaderReport) -> dict[str, zipfile.ZipInfo]:
         members = self._archive.infolist()
         self._check_totals(members)
         if lost := count_truncated(self._archive):
@@ -208,7 +212,7 @@ def _open_zip(path: Root) -> zipfile.ZipFile:
 class FolderTree:
     """The files below a folder."""
 
-    def __init__(self, path: Path, report: Report, limits: Limits):
+    def __init__(self, path: Path, report: ReaderReport, limits: Limits):
         self.path: Path = path
         self._report = report
         self._limits = limits
@@ -280,7 +284,7 @@ class FolderTree:
         """Where a member of a zip file in the folder can be read later."""
         return Media(str(self.path / name), member)
 
-    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file in the folder."""
         return ZipTree(self.path / name, report, self._limits)
 
@@ -291,7 +295,7 @@ class FolderTree:
 class SingleFileTree(FolderTree):
     """One file as if it were alone in its folder."""
 
-    def __init__(self, path: Path, report: Report, limits: Limits):
+    def __init__(self, path: Path, report: ReaderReport, limits: Limits):
         super().__init__(path.parent, report, limits)
         self._name = path.name
 
@@ -311,7 +315,7 @@ class StoreTree:
         NotFoundError, StorageError: The store cannot be asked.
     """
 
-    def __init__(self, path: StoredPath, report: Report, limits: Limits):
+    def __init__(self, path: StoredPath, report: ReaderReport, limits: Limits):
         self.path = path if path.is_dir() else path.parent
         self._limits = limits
         self._found: dict[str, StoredObject] = {}
@@ -322,7 +326,7 @@ class StoreTree:
             if self._is_readable_name(name, report):
                 self._found[name] = stored
 
-    def _is_readable_name(self, name: str, report: Report) -> bool:
+    def _is_readable_name(self, name: str, report: ReaderReport) -> bool:
         if any(map(is_hidden, name.split("/"))):
             return False
         try:
@@ -361,7 +365,7 @@ class StoreTree:
         """Where a member of a zip file in the store can be read later."""
         return Media(self.path.of(self._stored_object(name)).sealed(), member)
 
-    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file in the store, of which no more than its list is fetched."""
         return ZipTree(self.path.of(self._stored_object(name)), report, self._limits)
 
@@ -375,7 +379,7 @@ class StoreTree:
         return stored
 
 
-def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> FileTree | None:
+def open_tree(path: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS) -> FileTree | None:
     """The folder, zip or single file at ``path``; None (and one problem) when it is unreadable.
 
     Members of an archive that are unsafe are left out, with a problem each.
@@ -403,7 +407,7 @@ def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
 
 @contextmanager
 def open_tree_while_read(
-    path: Root, report: Report, limits: Limits = DEFAULT_LIMITS
+    path: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> Iterator[FileTree | None]:
     """``open_tree`` for as long as somebody reads from it."""
     tree = open_tree(path, report, limits)
@@ -411,7 +415,7 @@ def open_tree_while_read(
         yield tree
 
 
-def _open_store_tree(path: StoredPath, report: Report, limits: Limits) -> FileTree | None:
+def _open_store_tree(path: StoredPath, report: ReaderReport, limits: Limits) -> FileTree | None:
     if path.is_dir() or path.suffix.lower() != ".zip":
         return StoreTree(path, report, limits)
     try:

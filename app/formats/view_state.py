@@ -13,7 +13,7 @@ from typing import Any
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.formats import fields
 from app.formats.camera_json import camera_from_json, camera_to_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import BALLS, GAME, IMAGE, RECORD, REST
 from app.geometry.camera import camera_covariance
@@ -338,7 +338,7 @@ class ViewGroups:
     several files. Stations of one key become one, so that a thousand groups share it.
     """
 
-    def __init__(self, report: Report):
+    def __init__(self, report: ReaderReport):
         self._report = report
         self._waiting: dict[str, list[PlacedView]] = {}
         self._shared: dict[str, Station] = {}

@@ -19,7 +19,7 @@ from app.errors import DatasetFormatError
 from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import quoted
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.wording import plural
@@ -89,7 +89,7 @@ def is_viper(tree: FileTree, name: str) -> bool:
 
 
 def read_viper(
-    tree: FileTree, name: str, report: Report, limits: Limits = DEFAULT_LIMITS
+    tree: FileTree, name: str, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
 ) -> list[ViperTrack]:
     """The annotations of one XGTF file, plain or ``.gz``: one track for each source, at least one.
 
@@ -146,7 +146,7 @@ class _LimitedStream:
 class _ViperFileReader:
     """One file on its way to tracks."""
 
-    def __init__(self, shown: str, report: Report):
+    def __init__(self, shown: str, report: ReaderReport):
         self.tracks = [ViperTrack()]
         self._shown, self._report = shown, report
         self._sources = self._entries = self._frames = 0

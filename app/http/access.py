@@ -20,7 +20,7 @@ from starlette.types import Message, Receive, Scope, Send
 from app.db.store import Store
 from app.errors import AccessError, ForbiddenError, NotLoggedInError, StorageError
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.logins import Login, Logins
+from app.features.people.logins import Login, LoginSessions
 from app.features.people.roles import DatasetRoles, require_scope
 from app.features.people.visibility_queries import EVERYTHING, READER, Visibility
 from app.http.headers import read_bearer_token
@@ -32,7 +32,7 @@ from app.http.permissions import (
     needs_database,
     require_allowed,
 )
-from app.http.team import Team
+from app.http.team import TeamLogin
 
 log = structlog.get_logger("touchline.access")
 
@@ -78,7 +78,7 @@ class Access:
         store: Says which dataset something belongs to.
     """
 
-    def __init__(self, team: Team, store: Store):
+    def __init__(self, team: TeamLogin, store: Store):
         self._team, self._store = team, store
         self._threads = CapacityLimiter(THREADS)
         self._touching: dict[tuple[bool, int], asyncio.Task[None]] = {}
@@ -135,11 +135,15 @@ class Access:
         READER.set(login.reader)
         self._note_use(login)
 
-    def while_allowed(self, response: Response, subject: RequestSubject, login: Login) -> Response:
+    def end_when_not_allowed(
+        self, response: Response, subject: RequestSubject, login: Login
+    ) -> Response:
         """An answer without an end, which ends when its reader is logged out, or has other rights."""
         return _WhileAllowed(response, self, subject, login.roles)
 
-    async def still_may(self, scope: Scope, subject: RequestSubject, roles: DatasetRoles) -> bool:
+    async def is_still_allowed(
+        self, scope: Scope, subject: RequestSubject, roles: DatasetRoles
+    ) -> bool:
         """Whether somebody may go on reading, with the rights that they had when they began."""
         try:
             login = await self.log_in(scope)
@@ -186,7 +190,7 @@ class Access:
         except StorageError as error:
             log.warning("the use of a session or token could not be noted", error=str(error))
 
-    def _store_of_login(self, login: Login) -> Logins | AccessTokens:
+    def _store_of_login(self, login: Login) -> LoginSessions | AccessTokens:
         return self._team.logins if login.token is None else self._team.tokens
 
 
@@ -208,7 +212,7 @@ class _WhileAllowed(Response):
             try:
                 while not ended.is_set():
                     await asyncio.sleep(LOOK_SECONDS)
-                    if not await self._access.still_may(scope, self._asked, self._roles):
+                    if not await self._access.is_still_allowed(scope, self._asked, self._roles):
                         return
             finally:
                 ended.set()

@@ -172,7 +172,7 @@ class Services:
         resume_ball_links(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
-        self.jobs.on_leadership(self._start_leading)
+        self.jobs.call_on_leadership(self._start_leading)
         self.jobs.start()
         self.store.subscribe()
         self.upkeep.start()

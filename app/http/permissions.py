@@ -308,7 +308,7 @@ def _names_operator_folder(subject: RequestSubject) -> bool:
 
 def _require_may_make(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
     """What is made where it is not there; whoever cannot know that it is, is not told."""
-    role = roles.everywhere if present is None else roles.role_in(present.dataset)
+    role = roles.everywhere if present is None else roles.find_role_in(present.dataset)
     if role is not Role.NONE or present is None:
         require_permission(role, action, HERE if present is not None and roles.single else ALL)
         return

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.http.access import ASKS
 from app.http.headers import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
-from app.http.team import Team
+from app.http.team import TeamLogin
 from app.soccer.actors import LOCAL_USER
 
 log = structlog.get_logger("touchline.requests")
@@ -76,7 +76,7 @@ class RefusalBound:
 
 def find_client_address(scope: Scope) -> str:
     """Where a request comes from: behind a proxy of ours, the address that it forwards."""
-    team: Team | None = getattr(scope["app"].state, "team", None)
+    team: TeamLogin | None = getattr(scope["app"].state, "team", None)
     if team is not None:
         return team.address(Request(scope))
     client = scope.get("client")

@@ -134,7 +134,7 @@ class Route(APIRoute):
         hidden = partial(access.is_hidden, owned)
         response = await self._answer_once_per_key(gate, request, body, work, hidden)
         if isinstance(response, StreamingResponse) and response.media_type == "text/event-stream":
-            return access.while_allowed(response, asked, login)
+            return access.end_when_not_allowed(response, asked, login)
         return response
 
     async def _answer_once_per_key(

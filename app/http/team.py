@@ -18,8 +18,8 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import ConflictError, NotLoggedInError, TooManyTriesError
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.devices import AttemptWindow, Devices
-from app.features.people.logins import Login, LoginMethod, Logins
+from app.features.people.devices import AttemptWindow, DeviceTokens
+from app.features.people.logins import Login, LoginMethod, LoginSessions
 from app.features.people.passkeys import Passkeys, PasskeySite
 from app.features.people.second_factor import SecondFactors
 from app.features.people.sign_on import SignOn
@@ -110,7 +110,7 @@ class AttemptLimits:
 
 
 @dataclass(frozen=True)
-class Team:
+class TeamLogin:
     """The way in.
 
     Attributes:
@@ -126,7 +126,7 @@ class Team:
         mail: Sends invitations; None: links are shown.
     """
 
-    logins: Logins
+    logins: LoginSessions
     tokens: AccessTokens
     factors: SecondFactors
     passkeys: Passkeys
@@ -134,11 +134,11 @@ class Team:
     url: str | None
     proxies: frozenset[str]
     attempts: AttemptLimits
-    devices: Devices
+    devices: DeviceTokens
     mail: MailServer | None
 
     @staticmethod
-    def of(settings: Settings, store: Store) -> Team | None:
+    def of(settings: Settings, store: Store) -> TeamLogin | None:
         """Of a server of a team; None for one that somebody runs alone.
 
         Raises:
@@ -147,8 +147,8 @@ class Team:
         rules = read_rules(settings)
         if not settings.team:
             return None
-        logins = Logins(store, only=LoginMethod.SIGN_ON if rules and rules.only else None)
-        return Team(
+        logins = LoginSessions(store, only=LoginMethod.SIGN_ON if rules and rules.only else None)
+        return TeamLogin(
             logins,
             AccessTokens(store),
             SecondFactors(store),
@@ -157,7 +157,7 @@ class Team:
             settings.url,
             frozenset(settings.proxies),
             AttemptLimits(store),
-            Devices(store),
+            DeviceTokens(store),
             read_mail_server(settings),
         )
 
@@ -269,13 +269,13 @@ def list_allowed_hosts(settings: Settings) -> list[str]:
     return [*settings.allowed_hosts, *([name] if name else [])]
 
 
-async def get_team(request: Request) -> Team:
+async def get_team(request: Request) -> TeamLogin:
     """The way in.
 
     Raises:
         ConflictError: Somebody runs this server alone.
     """
-    team: Team | None = request.app.state.team
+    team: TeamLogin | None = request.app.state.team
     if team is None:
         raise ConflictError(
             "this server is run by one person alone: it has no accounts",
@@ -284,4 +284,4 @@ async def get_team(request: Request) -> Team:
     return team
 
 
-AppTeam = Annotated[Team, Depends(get_team)]
+AppTeam = Annotated[TeamLogin, Depends(get_team)]

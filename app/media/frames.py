@@ -189,7 +189,7 @@ class Frames:
         data = read_cached_frame(media, width, flipped, self._settings)
         return None if data is None else SentPicture.of(JPEG, data)
 
-    def ask_fetch(self, media: Media) -> PoolTask | None:
+    def request_fetch(self, media: Media) -> PoolTask | None:
         """Have a frame made ready; None where it is: one of a store is brought to this disk, and
         the video of one is indexed.
 
@@ -221,7 +221,7 @@ class Frames:
         ).future.result()
         return made
 
-    def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
+    def request_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
         """Have ``find_neighbouring_frames`` called, which opens videos and archives.
 
         Its future may have ``WorkerEnded``.
@@ -241,7 +241,7 @@ class Frames:
         self._fetchers.close()
         self._videos.close()
 
-    def ask_of(
+    def request_work_on_frame(
         self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
     ) -> PoolTask:
         """Have a function called with a frame, ``work(media, flipped, settings, *arguments)``.

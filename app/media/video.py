@@ -199,7 +199,7 @@ class FrameReader:
             self._next += 1
         return _retrieve_frame(video)
 
-    def approach(self, number: int, most: int) -> bool:
+    def move_closer(self, number: int, most: int) -> bool:
         """Come nearer to a frame, by a jump or by so many frames at most: between two steps others may be asked for.
 
         Returns:

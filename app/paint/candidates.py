@@ -36,7 +36,7 @@ SLACK_M = 4.0
 
 
 @dataclass(frozen=True)
-class Library:
+class CameraLibrary:
     """Where cameras are looked for.
 
     Attributes:
@@ -65,7 +65,7 @@ def _orientation_grid(*axes: tuple[float, ...]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-MAIN = Library(
+MAIN = CameraLibrary(
     "main stand",
     _orientation_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
     (0.6, 5.0),
@@ -73,7 +73,7 @@ MAIN = Library(
 )
 """Main cameras: near the middle line, on the side that is y > 0 by convention."""
 
-WIDE = Library(
+WIDE = CameraLibrary(
     "around the pitch",
     np.vstack(
         [
@@ -96,7 +96,7 @@ WIDE = Library(
 """Replays: any side; the half turn of the pitch makes y >= 0 of every stand."""
 
 
-def make_library_of_known_cameras(known: Sequence[Camera]) -> Library:
+def make_library_of_known_cameras(known: Sequence[Camera]) -> CameraLibrary:
     """Where cameras of the same match stand, and with which lenses.
 
     Args:
@@ -111,7 +111,7 @@ def make_library_of_known_cameras(known: Sequence[Camera]) -> Library:
         focals.append(camera.focal_length[0] / width)
         kappas.append(parameters_from_camera(camera, float(np.hypot(width, height)) / 2)[KAPPA])
     low, high = min(focals) / ZOOM, max(focals) * ZOOM
-    return Library(
+    return CameraLibrary(
         KNOWN,
         np.array(stands),
         (min(max(low, KNOWN_FOCAL[0]), high), max(min(high, KNOWN_FOCAL[1]), low)),
@@ -121,7 +121,7 @@ def make_library_of_known_cameras(known: Sequence[Camera]) -> Library:
 
 
 def candidate_cameras(
-    pieces: FloatArray, library: Library, pitch: Pitch, width: float
+    pieces: FloatArray, library: CameraLibrary, pitch: Pitch, width: float
 ) -> FloatArray:
     """The cameras of a library that lay a marking on one of the pieces.
 

@@ -36,7 +36,7 @@ from app.paint.agreement import (
     measure_clear_agreement,
     measure_explained_strength,
 )
-from app.paint.candidates import KNOWN, MAIN, WIDE, Library, make_library_of_known_cameras
+from app.paint.candidates import KNOWN, MAIN, WIDE, CameraLibrary, make_library_of_known_cameras
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace_visible_markings
 from app.paint.goal import measure_goal_height
 from app.paint.grass import explain_missing_field, find_field_of_play
@@ -209,7 +209,7 @@ def propose_for_frame(
     pitch: Pitch,
     known: Sequence[Camera],
     policy: CalibrationPolicy,
-    libraries: Sequence[Library],
+    libraries: Sequence[CameraLibrary],
 ) -> FrameProposal:
     """As ``propose_camera``, for a frame that is read already.
 
@@ -360,7 +360,7 @@ def _resize_field(frame: SearchedFrame, width: int, height: int) -> BoolArray:
 
 
 def rank_cameras(
-    frame: SearchedFrame, library: Library, pitch: Pitch, policy: CalibrationPolicy
+    frame: SearchedFrame, library: CameraLibrary, pitch: Pitch, policy: CalibrationPolicy
 ) -> list[RankedCamera]:
     """The cameras of a library that lie on the paint of a frame, best first."""
     amount = (SNAPPED, SCOUTED, SEARCHED)
@@ -403,7 +403,11 @@ def _rank_snapped(
 
 
 def _snap_from_search(
-    frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
+    frame: SearchedFrame,
+    start: Camera,
+    library: CameraLibrary,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
 ) -> SnappedCamera:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
     once more with what is known of cameras, or at the position that the match knows."""
@@ -420,7 +424,7 @@ def _snap_from_search(
 
 
 def _move_to_known_position(
-    frame: SearchedFrame, item: RankedCamera, match: Library, pitch: Pitch
+    frame: SearchedFrame, item: RankedCamera, match: CameraLibrary, pitch: Pitch
 ) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
     the markings there as well."""
@@ -443,7 +447,7 @@ def _move_to_known_position(
 
 
 def _move_to_nearest_stand(
-    reading: Reading, camera: Camera, library: Library, pitch: Pitch
+    reading: Reading, camera: Camera, library: CameraLibrary, pitch: Pitch
 ) -> Camera:
     """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
     away = np.linalg.norm(library.stands - camera.position, axis=1)
@@ -460,7 +464,7 @@ def _move_to_nearest_stand(
     return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
 
 
-def _start_covariance(library: Library) -> FloatArray:
+def _start_covariance(library: CameraLibrary) -> FloatArray:
     """Covariance of a start of the search, shape (8, 8)."""
     sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
     return np.diag(sigma**2)

@@ -20,7 +20,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PARAMETERS, ROLL, X, Z, camera_from_parameters
 from app.paint import scoring_kernels as kernels
-from app.paint.candidates import Library, candidate_cameras
+from app.paint.candidates import CameraLibrary, candidate_cameras
 from app.soccer.pitch import MARKINGS, Arc, Pitch
 
 CELL_M = 0.25
@@ -262,7 +262,7 @@ class FoundCamera:
 def search_cameras(
     picture: ScoredPicture,
     pieces: FloatArray,
-    library: Library,
+    library: CameraLibrary,
     pitch: Pitch,
     executor: Executor,
     most: int,
@@ -304,7 +304,7 @@ def search_cameras(
     return _distinct_cameras(rows, score, picture, most)
 
 
-def _library_sigma(library: Library) -> FloatArray:
+def _library_sigma(library: CameraLibrary) -> FloatArray:
     sigma = np.full(PARAMETERS, np.inf)
     sigma[ROLL], sigma[X : Z + 1] = ROLL_SIGMA, library.position_sigma
     sigma[Z + 1], sigma[KAPPA] = FOCAL_SIGMA, KAPPA_SIGMA

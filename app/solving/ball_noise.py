@@ -90,7 +90,7 @@ class RayResidual:
 
 
 @dataclass(frozen=True)
-class Sigma:
+class SigmaEstimate:
     """An estimated standard deviation with its 95 % interval, and what it rests on.
 
     ``value`` is the one with which 95 % ellipsoids hold the truth: of few numbers it is above the
@@ -121,9 +121,9 @@ class BallNoise:
         share_interval: Of the share, 95 %; None where no ball has a diameter.
     """
 
-    click: Sigma | None
+    click: SigmaEstimate | None
     share: float | None
-    given: Sigma | None
+    given: SigmaEstimate | None
     share_interval: tuple[float, float] | None = None
 
 
@@ -232,7 +232,7 @@ def estimate_ball_noise(misses: Sequence[RayResidual], policy: Policy = PAPER) -
 
 def _jackknife_sigma(
     rows: FloatArray, known: _NoisePrior
-) -> tuple[Sigma, float, tuple[float, float]] | None:
+) -> tuple[SigmaEstimate, float, tuple[float, float]] | None:
     """Sigma and share and its interval; intervals are from leaving out one block after the other.
 
     None where no sigma that is tried explains the rows better than the first or the last one.
@@ -261,7 +261,7 @@ def _jackknife_sigma(
     wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)
     interval = max(found - wide, 0.0), found + wide
-    return Sigma(sigma, low, high, len(rows), len(rows) - numbers), found, interval
+    return SigmaEstimate(sigma, low, high, len(rows), len(rows) - numbers), found, interval
 
 
 def _fit_sigma(rows: FloatArray, known: _NoisePrior) -> tuple[float, float, float]:

@@ -99,7 +99,7 @@ def calibrate(
     suspects: tuple[Suspect, ...] = ()
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
-    fit = problem.refine_main(fit, observations)
+    fit = problem.refine_with_main_prior(fit, observations)
     picture = find_picture(problem, fit.parameters, observations)
     found = replace(
         _calibration_of_fit(problem, fit, observations), suspects=suspects, picture=picture
@@ -129,7 +129,7 @@ def calibrate_near(
     left_out = [suspect.marking for suspect in alone.suspects]
     observations = observations_of_lines(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
-    shared = problem.refine_near(fit, observations, near)
+    shared = problem.refine_with_match_position(fit, observations, near)
     if shared is fit:
         return alone
     found = _calibration_of_fit(problem, shared, observations)

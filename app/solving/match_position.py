@@ -153,14 +153,14 @@ def find_pan(calibration: Calibration) -> float | None:
     return float(parameters_from_camera(calibration.camera, 1.0)[PAN])
 
 
-class Places:
+class FramePlaces:
     """Places of some frames, side by side, to take one out and look at the others."""
 
     def __init__(self, places: Sequence[FramePlace]):
         self._equations = PlaceEquations(places, WANDER_M)
         self._left_out: int | None = None
 
-    def without(self, index: int) -> Places:
+    def without(self, index: int) -> FramePlaces:
         """The same but for one of them; what they hold is shared, so a match costs it once."""
         rest = copy(self)
         rest._left_out = index
@@ -186,12 +186,12 @@ class Places:
         return self._equations.fit(rest) if rest.sum() >= MIN_OTHERS else None
 
 
-NO_PLACES = Places(())
+NO_PLACES = FramePlaces(())
 
 
 def share_position(
     alone: Calibration,
-    others: Places,
+    others: FramePlaces,
     lines: Lines,
     pitch: Pitch,
     size: ImageSize,

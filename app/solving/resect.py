@@ -226,7 +226,7 @@ class ResectionProblem:
         )
         return Resection(choose_best_starts(fit, 1)[0], float(fit.cost.min()))
 
-    def refine_main(self, fit: Resection, observations: Observations) -> Resection:
+    def refine_with_main_prior(self, fit: Resection, observations: Observations) -> Resection:
         """The camera once more with what is known of main cameras, where it stands like one.
 
         Where the lines determine the camera this changes nothing; where they leave a direction
@@ -236,7 +236,7 @@ class ResectionProblem:
             return fit
         return self._refine_near(fit, observations, STADIUM)
 
-    def refine_near(
+    def refine_with_match_position(
         self, alone: Resection, observations: Observations, near: PositionPrior
     ) -> Resection:
         """The camera once more with what other frames of its match say of the position.

@@ -29,7 +29,7 @@ from app.geometry.resection import (
     projection_jacobians,
 )
 from app.paint.agreement import PaintAgreement, measure_agreement
-from app.paint.candidates import MAIN, WIDE, Library
+from app.paint.candidates import MAIN, WIDE, CameraLibrary
 from app.paint.propose import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
@@ -253,7 +253,7 @@ class Follower:
             is_key=True,
         )  # fmt: skip
 
-    def _libraries(self) -> tuple[Library, ...]:
+    def _libraries(self) -> tuple[CameraLibrary, ...]:
         """Where a camera is sought besides the positions that are known: a tripod stays where it is.
 
         The farther off, the more seldom: to look everywhere costs ten times what a frame may.

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.paint.candidates import Library
+from app.paint.candidates import CameraLibrary
 from app.paint.evidence import Image, Reading, read_picture
 from app.paint.grass import find_field_of_play
 from app.paint.propose import (
@@ -126,7 +126,7 @@ def propose_in_picture(
     pitch: Pitch,
     known: Sequence[Camera],
     policy: CalibrationPolicy,
-    libraries: Sequence[Library],
+    libraries: Sequence[CameraLibrary],
 ) -> FrameProposal:
     """As ``propose_for_frame``, for a picture of a clip."""
     frame = prepare_frame_to_search(picture.image, picture.field, picture.strength, picture.reading)

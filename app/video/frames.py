@@ -92,7 +92,7 @@ class RecordingReader:
             NotFoundError, ImageError: As ``read_frames`` does.
         """
         if not self.has(number):
-            if not self._reader.approach(number, most):
+            if not self._reader.move_closer(number, most):
                 return False
             self.read(number)
         return True

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
@@ -327,7 +327,7 @@ class Click:
 def issia(data: Path) -> tuple[list[Click], dict[str, Camera], dict[str, Camera]]:
     """Clicks on the ball, the cameras as given, and those adjusted together."""
     options = IssiaOptions(lines=data / "issia-lines")
-    every = list(open_issia(data / "issia", options, Report()).groups())
+    every = list(open_issia(data / "issia", options, ReaderReport()).groups())
     clicks = [
         Click(int(group.key), view.station.key, view.ball.center)
         for group in every

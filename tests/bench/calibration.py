@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.evaluation.cameras import measure_error_without_marking, score_frame, score_frames
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
@@ -59,7 +59,7 @@ class Run:
 
 def bench_calibration(data: Path) -> None:
     """Accuracy, left-out markings, planted swaps and time on the frames of ``sn22-dev``."""
-    files = read_line_files(data / "sn22-dev" / "lines.zip", SIZE, Report())
+    files = read_line_files(data / "sn22-dev" / "lines.zip", SIZE, ReaderReport())
     frames = {file.stem: file.lines for file in files}
     runs = {name: _run(frames, policy) for name, policy in POLICIES.items()}
     rows = [[f"Touchline, labels {name}", *_scores(frames, run)] for name, run in runs.items()]

@@ -30,7 +30,7 @@ from app.features.imports.ingest import import_groups
 from app.features.paint.service import read_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
@@ -256,7 +256,7 @@ def _decoded(file: Path, frames: int, clicked: Collection[int]) -> Iterator[tupl
 def _lines(file: Path, image: np.ndarray) -> Lines:
     """Clicked lines without goals, but for the crossbars."""
     value = json.loads(file.read_text(encoding="utf-8"))
-    return lines_from_json(value, _size(image), file.stem, Report())[0]
+    return lines_from_json(value, _size(image), file.stem, ReaderReport())[0]
 
 
 def _size(image: np.ndarray) -> ImageSize:

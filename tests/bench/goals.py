@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from app.evaluation.cameras import measure_error_without_marking
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -36,7 +36,7 @@ POLICIES = {
 
 def bench_goals(data: Path, every: int = 1) -> None:
     """Print the table."""
-    files = read_line_files(data / "sn22-dev" / "lines.zip", SIZE, Report())
+    files = read_line_files(data / "sn22-dev" / "lines.zip", SIZE, ReaderReport())
     frames = [file.lines for file in [*files][DEV_HALF]]
     frames = [lines for lines in frames if not lines.keys().isdisjoint(GOAL_PARTS)][::every]
     rows: list[list[object]] = []

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from app.errors import DegenerateGeometryError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import curve_residuals
@@ -89,7 +89,7 @@ def bench_line_coverage(data: Path, every: int = EVERY) -> None:
     """Print the tables: real frames where there are any, and generated ones."""
     path = data / "sn22-dev" / "lines.zip"
     if path.is_file():
-        frames = [file.lines for file in read_line_files(path, SIZE, Report())][::every]
+        frames = [file.lines for file in read_line_files(path, SIZE, ReaderReport())][::every]
         _bench(f"{len(frames)} real frames", frames, SIZE)
     else:
         print(f"\nLeft-out markings of real frames: no data in {data}, left out")

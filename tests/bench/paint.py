@@ -21,7 +21,7 @@ from app.features.imports.ingest import import_groups
 from app.features.paint.service import get_paint, read_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
@@ -356,7 +356,7 @@ def _print_real(folder: Path) -> None:
             continue
         size = ImageSize(image.shape[1], image.shape[0])
         value = json.loads(file.read_text(encoding="utf-8"))
-        lines, _ = lines_from_json(value, size, file.stem, Report())
+        lines, _ = lines_from_json(value, size, file.stem, ReaderReport())
         found = calibrate(lines, PITCH, size, PAPER.calibration)
         if found.camera is None:
             continue

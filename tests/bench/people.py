@@ -10,7 +10,7 @@ import numpy as np
 
 from app.formats.issia import MIRRORED, locate_people_on_grass, mirror_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from tests.bench.table import print_table
 
 CAMERAS = ((1, 2), (5, 6), (3, 4), (2, 3), (2, 4), (3, 6), (4, 6))
@@ -20,7 +20,7 @@ EVERY = 5
 
 def bench_people(data: Path, every: int = EVERY) -> None:
     """Print the table: people as an import brings them, and as the files hold them."""
-    folder = open_issia(data / "issia", IssiaOptions(), Report())
+    folder = open_issia(data / "issia", IssiaOptions(), ReaderReport())
     rows: list[list[object]] = []
     for one, other in CAMERAS:
         found = apart(folder, one, other, every)

@@ -27,7 +27,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.tracks.follow import follow_view
 from app.formats.issia import DEFAULT_SIZE
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.media.frames import Frames
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
@@ -104,7 +104,7 @@ def painted_groups(
         The groups, where the ball is in each frame, and the stretches.
     """
     key, truth = f"cam{camera}", dict[int, ImagePoint]()
-    groups = list(open_issia(data, IssiaOptions(), Report()).groups())
+    groups = list(open_issia(data, IssiaOptions(), ReaderReport()).groups())
     for group in groups:
         view = group.view(key)
         if view is not None and view.ball is not None and view.ball.center is not None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station
@@ -39,7 +39,7 @@ BLOCK = 50
 def bench_rigs(data: Path) -> None:
     """Print the table."""
     options = IssiaOptions(lines=data / "issia-lines")
-    every = list(open_issia(data / "issia", options, Report()).groups())
+    every = list(open_issia(data / "issia", options, ReaderReport()).groups())
     pairs = [group for group in every if sum(view.ball is not None for view in group.views) == 2]
     groups = [without_lines(group) for group in pairs]
     learnt, judged = ([one for one in groups if _odd(one) == odd] for odd in (False, True))

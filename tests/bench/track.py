@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.stats import chi2
 
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.polyline import distance_to_polyline
@@ -129,7 +129,7 @@ def clicked(clip: Clip, name: str, lines: Path) -> dict[int, Lines]:
     """Clicked lines of a clip by number of their frame, pixels of the video."""
     return {
         int(file.stem.rpartition("_f")[2]): lines_from_json(
-            json.loads(file.read_text(encoding="utf-8")), clip.size, file.stem, Report()
+            json.loads(file.read_text(encoding="utf-8")), clip.size, file.stem, ReaderReport()
         )[0]
         for file in sorted(lines.glob(f"{name}_f*.json"))
     }

@@ -37,7 +37,7 @@ from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Limits
 from app.formats.guess_format import guess_format
 from app.formats.output import open_output_folder
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import json_text
 from app.media.files import read_frame
 from app.soccer.choices import ImportFormat
@@ -154,7 +154,7 @@ class Readers:
 
 
 def _groups_of(source: ImportSource, settings: Settings) -> Iterator[Group]:
-    report = Report()
+    report = ReaderReport()
     if source.format in STATIC:
         return _open_static_folder(source, report, LIMITS).groups()
     return _read_groups(source, settings, report, LIMITS)
@@ -174,7 +174,7 @@ def _use(groups: list[Group]) -> None:
             write_format(root, records, WriteOptions(name, everything=True))
 
 
-def _require_said(report: Report) -> None:
+def _require_said(report: ReaderReport) -> None:
     for problem in report.problems:
         if not problem.path or not problem.problem:
             raise AssertionError(f"a problem without a file or a sentence: {problem!r}")

@@ -18,7 +18,7 @@ from app.config import Settings
 from app.features.exports.source import ExportImages
 from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _read_frame
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.media.files import decode_frame, read_frame, read_picture_header, read_pixels
 from app.media.frames import Frames, make_picture
 from app.soccer.frames import ImageSize
@@ -65,7 +65,7 @@ def exported(path: Path, images: str, settings: Settings) -> np.ndarray:
 
 def of_files(path: Path, settings: Settings) -> np.ndarray:
     """As commands read folders of pictures: paint, snap, agree and propose."""
-    (found,) = read_pictures([path], settings, Report())
+    (found,) = read_pictures([path], settings, ReaderReport())
     assert found.image is not None
     return found.image
 

@@ -51,9 +51,9 @@ from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
 from app.features.tracks.service import get_track
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.webhooks.messages import Kind
+from app.features.webhooks.messages import MessageKind
 from app.features.webhooks.service import make_webhook, send_ping
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
 from app.tracking.ball_run import BallClick
@@ -111,7 +111,9 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         webhooks=[HOOK],
     )
     store = Store.open(chosen)
-    import_groups(store, "small", read_soccernet_v3(tree, Report()), source="tree", actor="local")
+    import_groups(
+        store, "small", read_soccernet_v3(tree, ReaderReport()), source="tree", actor="local"
+    )
     solve_dataset(store, "small")
     app = create_app(chosen)
     services = app.state.services
@@ -129,7 +131,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
     add_evaluations(store)
     freeze_dataset(store, "small", FreezeRequest("v1", groups="passing"), actor="local")
     for _ in range(2):
-        webhook, _secret = make_webhook(store, "small", HOOK, [Kind.JUDGED], actor="local")
+        webhook, _secret = make_webhook(store, "small", HOOK, [MessageKind.JUDGED], actor="local")
         send_ping(store, "small", webhook.id, actor="local")
     for name in ("kept", "deleted"):
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")

@@ -33,7 +33,7 @@ from app.features.recordings.service import add_recording
 from app.features.recordings.shots import Shot, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.webhooks.messages import Kind
+from app.features.webhooks.messages import MessageKind
 from app.features.webhooks.service import make_webhook, send_ping
 from app.http.server import make_server, open_listening_socket
 from app.main import create_app
@@ -92,7 +92,7 @@ def fill(store: Store, home: Path) -> None:
         request = EvaluationRequest(predictions=found.id, groups="all")
         run_evaluation(store, "small", request, actor="local")
         freeze_dataset(store, "small", FreezeRequest(f"v{number}", groups="passing"), actor="local")
-        make_webhook(store, "small", HOOK, [Kind.JUDGED], actor="local")
+        make_webhook(store, "small", HOOK, [MessageKind.JUDGED], actor="local")
         send_ping(store, "small", 1, actor="local")
         batch = NewBatch(f"b{number}", annotators=["admin"], skip_given=False)
         make_batch(store, "small", batch, actor="local")

@@ -14,7 +14,7 @@ from app.features.imports.ingest import import_groups
 from app.features.predictions.frames import read_live_truth
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.split import TEST_CAMERAS
 from tests.paper.simulated import SimulatedDetector
 
@@ -48,7 +48,7 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
     import_groups(
         store,
         DATASET,
-        open_issia(folder, IssiaOptions(), Report()).groups(),
+        open_issia(folder, IssiaOptions(), ReaderReport()).groups(),
         source="ISSIA",
         actor="study",
     )

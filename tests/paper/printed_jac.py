@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
@@ -91,7 +91,7 @@ def both_directions(lines: Path = LINES) -> Directions | None:
     if not lines.is_file():
         return None
     gamma, rows = 0.005 * SIZE.diagonal, []
-    for file in read_line_files(lines, SIZE, Report()):
+    for file in read_line_files(lines, SIZE, ReaderReport()):
         camera = calibrate(file.lines, PITCH, SIZE, CalibrationPolicy()).camera
         if camera is not None:
             public = camera_jaccard(camera, file.lines, PITCH, SIZE, (gamma,))[0]

@@ -11,7 +11,7 @@ import pytest
 
 from app.evaluation.cameras import score_frame, score_frames
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
@@ -31,7 +31,7 @@ EVERY = 4
 
 @pytest.fixture(scope="module")
 def frames():
-    files = list(read_line_files(LINES, SIZE, Report()))
+    files = list(read_line_files(LINES, SIZE, ReaderReport()))
     return {file.stem: file.lines for file in files[::EVERY]}
 
 
@@ -65,7 +65,7 @@ class TestCalibrate:
 class TestGoals:
     def test_their_middle_predicts_left_out_grass_better_than_their_inner_edges(self):
         """Of the dev half 83.2, 86.7 and, lines by the Laws, 88.6 % lie within 5.5 px."""
-        files = [*read_line_files(LINES, SIZE, Report())][::2]
+        files = [*read_line_files(LINES, SIZE, ReaderReport())][::2]
         few = [file.lines for file in files if not file.lines.keys().isdisjoint(GOAL_PARTS)][::8]
         shares, clicks = [], []
         for policy in (CalibrationPolicy(), CLICKED, replace(CLICKED, goal="laws")):
@@ -80,13 +80,13 @@ class TestGoals:
 
 class TestScore:
     def test_gives_cameras_of_others_the_numbers_of_the_public_evaluator(self):
-        report = Report()
+        report = ReaderReport()
         cameras = read_cameras(PNLCALIB, report)
         total = score_frames(
             score_frame(cameras[file.stem], file.lines, Pitch(), SIZE)
             if file.stem in cameras
             else None
-            for file in read_line_files(LINES, SIZE, Report())
+            for file in read_line_files(LINES, SIZE, ReaderReport())
         )
         assert report.problems == []
         assert (total.frames, total.calibrated) == (727, 712)

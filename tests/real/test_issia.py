@@ -19,7 +19,7 @@ from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_ids
 from app.features.solutions.service import solve_dataset
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
 from tests.bench.people import apart as people_apart
@@ -93,7 +93,7 @@ class TestPeople:
 
     @pytest.mark.parametrize("cameras", [(1, 2), (5, 6), (2, 4), (4, 6), (3, 4)])
     def test_the_same_person_stands_at_one_place_in_two_cameras(self, cameras):
-        report = Report()
+        report = ReaderReport()
         apart = people_apart(open_issia(DATA, IssiaOptions(), report), *cameras, 20)
         assert len(apart) > 50
         assert np.median(apart) < 2.0

@@ -10,7 +10,7 @@ import pytest
 
 from app.evaluation.cameras import measure_error_without_marking
 from app.features.file_tools.matches import match_shares
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -33,7 +33,7 @@ MIDDLE = ("Middle line", "Circle central")
 
 @pytest.fixture(scope="module")
 def files():
-    return sorted(read_line_files(LINES, SIZE, Report()), key=lambda file: file.stem)[:FRAMES]
+    return sorted(read_line_files(LINES, SIZE, ReaderReport()), key=lambda file: file.stem)[:FRAMES]
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
@@ -32,7 +32,7 @@ EVERY = 10
 @pytest.fixture(scope="module")
 def groups() -> list[Group]:
     options = IssiaOptions(lines=DATA / "issia-lines")
-    return list(open_issia(DATA / "issia", options, Report()).groups())
+    return list(open_issia(DATA / "issia", options, ReaderReport()).groups())
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.split import Split
 from tests.homes import copy_home
 
@@ -58,14 +58,14 @@ def homes(tmp_path_factory: pytest.TempPathFactory):
     one, two = (
         Store.open(Settings(home=tmp_path_factory.mktemp(name) / "home")) for name in ("a", "b")
     )
-    groups = open_issia(DATA, IssiaOptions(), Report()).groups()
+    groups = open_issia(DATA, IssiaOptions(), ReaderReport()).groups()
     some = (group for group in groups if int(group.key) % EVERY == 0)
     import_groups(one, "issia", some, source="x", actor="ann")
     solve_dataset(one, "issia")
     reject(one)
     carried = tmp_path_factory.mktemp("carried") / "issia.zip"
     export_dataset(one, "issia", "touchline", carried)
-    report = Report()
+    report = ReaderReport()
     merge_edits(two, "other", carried, report, DEFAULT_LIMITS, source="a", actor="ben")
     assert report.problems == []
     solve_dataset(two, "other")

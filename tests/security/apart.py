@@ -21,7 +21,7 @@ from app.db.store import Store
 from app.features.imports.ingest import import_groups
 from app.features.people import links
 from app.features.people import links as passwords
-from app.features.people.logins import Logins
+from app.features.people.logins import LoginSessions
 from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Role
 from app.features.people.service import give_role, invite
@@ -125,7 +125,7 @@ class Apart:
         links.set_password_by_link(self.store, link.token, SECRET)
         for dataset, role in single.items():
             give_role(self.store, dataset, person.id, role, actor="local")
-        token = Logins(self.store).log_in(name, SECRET)
+        token = LoginSessions(self.store).log_in(name, SECRET)
         self.cookies[name] = f"touchline_session={token}"
 
     def ask(self, name: str, method: str, target: str, body: Any = None, **headers: str) -> Any:

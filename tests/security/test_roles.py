@@ -15,12 +15,12 @@ import structlog
 from limits import parse
 
 from app.config import Settings
-from app.db.log import Entry, append_entries, read_log
+from app.db.log import NewLogEntry, append_entries, read_log
 from app.db.session import now
 from app.db.store import Store
 from app.features.imports.ingest import ensure_dataset
 from app.features.people import links
-from app.features.people.devices import LASTS, Devices
+from app.features.people.devices import LASTS, DeviceTokens
 from app.features.people.roles import LEAST, Role, Scope
 from app.features.people.service import change_person, find_person, give_role, renew_link
 from app.http import access
@@ -177,7 +177,7 @@ class TestSessions:
         assert "secure" not in said, "there is no TLS on loopback"
 
     def test_behind_tls_it_is_secure_and_bound_to_its_name(self, tmp_path: Path) -> None:
-        from app.http.team import Team as Way
+        from app.http.team import TeamLogin as Way
 
         settings = Settings(home=tmp_path, team=True, url="https://touchline.example.org")
         with closing(Store.open(settings)) as store:
@@ -312,7 +312,7 @@ class TestSessions:
         team.forget_attempts()
         devices = team.app.state.team.devices
         assert devices.recognise("guessed", token)
-        late = Devices(team.store, lambda: datetime.now(UTC) + LASTS + timedelta(seconds=1))
+        late = DeviceTokens(team.store, lambda: datetime.now(UTC) + LASTS + timedelta(seconds=1))
         assert late.recognise("guessed", token) is None
         _, link = renew_link(team.store, find_person(team.store, "guessed").id, actor="local")
         links.set_password_by_link(team.store, link.token, "three other words")
@@ -426,7 +426,7 @@ class TestStreams:
         elif ends == "logged out":
             team.ask("DELETE", f"{API}/session", role=name)
         else:
-            monkeypatch.setattr(access.Access, "still_may", None)
+            monkeypatch.setattr(access.Access, "is_still_allowed", None)
         # It says every now and then that it is still there.
         until = time.monotonic() + SECONDS
         while answer.read1(1000):
@@ -456,7 +456,7 @@ class TestStreams:
         def say(who: str) -> None:
             with team.store.write() as session:
                 for key in ids[::-1]:
-                    append_entries(session, [Entry("policy", who, now(), {}, dataset_id=key)])
+                    append_entries(session, [NewLogEntry("policy", who, now(), {}, dataset_id=key)])
 
         def heard(answer: http.client.HTTPResponse) -> bytes:
             line = b":"

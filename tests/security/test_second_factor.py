@@ -20,7 +20,7 @@ from app.features.people.passkeys import PasskeySite
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
 from app.features.people.service import find_person
-from app.http.team import Team as WayIn
+from app.http.team import TeamLogin as WayIn
 from tests.authenticator import Authenticator
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, GUARDED, SECRET, Team, asked, cookie_in

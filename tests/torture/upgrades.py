@@ -27,7 +27,7 @@ from app.config import Settings
 from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
 from app.db.json_columns import compress_json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.migrate import (
     KNOWN_REVISIONS,
     find_migrations_folder,
@@ -77,7 +77,7 @@ def _fill(connection: Session) -> None:
     """One row in each table, whose references lead to each other's."""
     schema = MetaData()
     schema.reflect(connection)
-    append_entries(connection, [Entry("dataset", "ann", now(), {}, 1)])
+    append_entries(connection, [NewLogEntry("dataset", "ann", now(), {}, 1)])
     # What belongs to a version is filled before that is there, and not later.
     connection.execute(text("PRAGMA defer_foreign_keys = ON"))
     for table in sorted(schema.sorted_tables, key=lambda table: table.name != "version_group"):

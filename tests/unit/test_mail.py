@@ -11,11 +11,13 @@ from structlog.testing import capture_logs
 from app import mail
 from app.config import Settings
 from app.errors import InputError
-from app.mail import Letter, MailServer, parse_mail_address, read_mail_server
+from app.mail import MailMessage, MailServer, parse_mail_address, read_mail_server
 from tests.certificates import write_keys
 from tests.smtp import MailBox, serving
 
-LETTERS = [Letter(f"{name}@example.org", "Hello", f"Dear {name}\n") for name in ("anna", "ben")]
+LETTERS = [
+    MailMessage(f"{name}@example.org", "Hello", f"Dear {name}\n") for name in ("anna", "ben")
+]
 ACCOUNT = {"smtp_user": "box", "smtp_password": "three plain words"}
 
 
@@ -47,7 +49,7 @@ class TestSend:
     def test_a_long_link_stays_in_one_line(self, tmp_path: Path) -> None:
         link = f"https://touchline.example.org/join#{'x' * 300}"
         with serving(MailBox()) as box:
-            server_of(tmp_path, box).send([Letter("anna@example.org", "Hello", f"{link}\n")])
+            server_of(tmp_path, box).send([MailMessage("anna@example.org", "Hello", f"{link}\n")])
         assert box.letters[0]["Content-Transfer-Encoding"] == "7bit"
         assert link in box.letters[0].get_content().splitlines()
 
@@ -90,7 +92,7 @@ class TestSend:
         values = {"to": "anna@example.org", "subject": "Hello", "text": "x\n"}
         values[field] += "\r\nBcc: eve@example.org"
         with serving(MailBox()) as box, pytest.raises(ValueError, match="linefeed"):
-            server_of(tmp_path, box).send([Letter(**values)])
+            server_of(tmp_path, box).send([MailMessage(**values)])
         assert box.letters == []
 
     def test_the_log_names_no_address(self, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app import zip_file as module
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
 from app.zip_file import count_truncated, list_first_member_names
 
@@ -93,7 +93,7 @@ class TestCountTruncated:
         content = bytearray(path.read_bytes())
         content[content.index(b"PK\1\2") + 32] = 60  # The length of the first one's comment.
         path.write_bytes(content)
-        report = Report()
+        report = ReaderReport()
         tree = open_tree(path, report)
         assert tree is not None and tree.names() == ["a.json"]
         (problem,) = report.problems

@@ -39,7 +39,7 @@ RESTORE_SERVER = (
 
 
 @dataclass(frozen=True)
-class Anchor:
+class DatabaseAnchor:
     """What the home knows of its database.
 
     Attributes:
@@ -66,7 +66,7 @@ def anchor_file(database: Path) -> Path:
     return database.with_name("home.json")
 
 
-def read_anchor(database: Path) -> Anchor | None:
+def read_anchor(database: Path) -> DatabaseAnchor | None:
     """The anchor of a database, or None where there is none.
 
     Raises:
@@ -78,10 +78,10 @@ def read_anchor(database: Path) -> Anchor | None:
     return _read_anchor_file(database)
 
 
-def _read_anchor_file(database: Path) -> Anchor | None:
+def _read_anchor_file(database: Path) -> DatabaseAnchor | None:
     path = anchor_file(database)
     try:
-        return Anchor(**json.loads(path.read_bytes()))
+        return DatabaseAnchor(**json.loads(path.read_bytes()))
     except FileNotFoundError:
         return None
     except (ValueError, TypeError) as error:
@@ -91,12 +91,12 @@ def _read_anchor_file(database: Path) -> Anchor | None:
         ) from error
 
 
-def make_anchor(database: Path, anchor: Anchor) -> None:
+def make_anchor(database: Path, anchor: DatabaseAnchor) -> None:
     """Write an anchor so that it is there after a power cut."""
     replace_file(anchor_file(database), anchor.to_bytes())
 
 
-def move_anchor(database: Path, anchor: Anchor) -> None:
+def move_anchor(database: Path, anchor: DatabaseAnchor) -> None:
     """Write an anchor over the one that is there; one that was taken away stays away."""
     try:
         handle = os.open(anchor_file(database), os.O_WRONLY)
@@ -114,7 +114,7 @@ def sync_anchor(database: Path) -> None:
         sync_to_disk(anchor_file(database))
 
 
-def read_anchor_of_database(connection: Connection) -> Anchor | None:
+def read_anchor_of_database(connection: Connection) -> DatabaseAnchor | None:
     """The anchor that a database should have; None before it had an installation id."""
     tables = inspect(connection).get_table_names()
     if "installation" not in tables:
@@ -126,7 +126,7 @@ def read_anchor_of_database(connection: Connection) -> Anchor | None:
             " LEFT JOIN log ON log.id = (SELECT max(id) FROM log)"
         )
     ).one()
-    return Anchor(key, created, schema, entries, last or "")
+    return DatabaseAnchor(key, created, schema, entries, last or "")
 
 
 def require_own_database(engine: Engine, settings: Settings) -> None:
@@ -167,11 +167,13 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
         make_anchor(settings.database_file, anchor)
 
 
-def _anchor_without_log_end(anchor: Anchor) -> Anchor:
+def _anchor_without_log_end(anchor: DatabaseAnchor) -> DatabaseAnchor:
     return replace(anchor, entries=0, hash="")
 
 
-def _require_anchored(connection: Connection, anchor: Anchor, database: str, hint: str) -> None:
+def _require_anchored(
+    connection: Connection, anchor: DatabaseAnchor, database: str, hint: str
+) -> None:
     tables = inspect(connection).get_table_names()
     if "log" not in tables:
         raise DamagedError(

@@ -10,7 +10,7 @@ from typing import Any
 import structlog
 
 from app.db.json_columns import compress_json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, ReviewError, StorageError
@@ -155,7 +155,7 @@ def set_limits(
     with store.write() as session:
         put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})
         append_entries(
-            session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)]
+            session, [NewLogEntry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)]
         )
         session.respond(limits)
     return limits
@@ -328,7 +328,7 @@ def adopt_and_decide(
         complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
             complete_group_in_batch(session, batch_id, group_id, actor=actor, at=at)
-        append_entries(session, [Entry(KIND, actor, at, body, dataset, group_id)])
+        append_entries(session, [NewLogEntry(KIND, actor, at, body, dataset, group_id)])
         if judge:
             note = f"as {taken.person} judged it"
             copy_verdict_to_original(session, taken, actor=actor, note=note)

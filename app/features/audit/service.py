@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from app.db.log import Entry, append_entries, iterate_single_edits
+from app.db.log import NewLogEntry, append_entries, iterate_single_edits
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
@@ -43,7 +43,7 @@ def add_audit_event(
         dataset_id: Of which dataset; None: of none.
         what: What tells it from others of its kind; nothing secret.
     """
-    append_entries(session, [Entry(DEED, actor, now(), {"did": did, **what}, dataset_id)])
+    append_entries(session, [NewLogEntry(DEED, actor, now(), {"did": did, **what}, dataset_id)])
 
 
 def log_job_request(
@@ -51,7 +51,7 @@ def log_job_request(
 ) -> None:
     """Write into the log who asked for a job."""
     body = {"job": job, "kind": kind, "title": title}
-    append_entries(session, [Entry(JOB, actor, now(), body, dataset_id)])
+    append_entries(session, [NewLogEntry(JOB, actor, now(), body, dataset_id)])
 
 
 def record_audit_event(
@@ -90,7 +90,7 @@ def assign_local_work(store: Store, person_id: int, *, actor: str) -> str:
             )
         at = now()
         body = {"person": person.name, "did": "adopted", "role": person.role, "from": LOCAL_USER}
-        append_entries(session, [Entry(PERSON, actor, at, body)])
+        append_entries(session, [NewLogEntry(PERSON, actor, at, body)])
         insert_alias(session, LOCAL_USER, person_id, person.name, at, actor)
         return str(person.name)
 

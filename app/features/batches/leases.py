@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, HeldGroupError, NotFoundError
@@ -223,7 +223,7 @@ class Leases:
             )
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
-            append_entries(session, [Entry(WORK, actor, self._now(), body)])
+            append_entries(session, [NewLogEntry(WORK, actor, self._now(), body)])
             return self._ended_lease(session, batch_id, group, worker)
 
     def return_group(

@@ -254,7 +254,7 @@ class BatchMembers:
         """Them, in a dataset."""
         if self.login is None:
             return BatchMember(LOCAL_USER, alone=True)
-        role = self.login.roles.role_in(dataset_id)
+        role = self.login.roles.find_role_in(dataset_id)
         annotates, reviews = (role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
         return BatchMember(self.login.name, annotates, reviews)
 

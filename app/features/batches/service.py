@@ -9,7 +9,7 @@ from datetime import date
 from enum import StrEnum
 from typing import Any, Literal
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -499,4 +499,4 @@ def _log_change(session: Session, batch: Batch, did: str, actor: str) -> None:
         "annotators": batch.annotators,
         "reviewers": batch.reviewers,
     }
-    append_entries(session, [Entry(WORK, actor, now(), body)])
+    append_entries(session, [NewLogEntry(WORK, actor, now(), body)])

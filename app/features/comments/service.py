@@ -9,10 +9,10 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from app.db.check import Check, compare_records
+from app.db.check import CheckResult, compare_records
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import report_damaged_values
-from app.db.log import Entry, LogEntry, append_entries, iterate_entries_of_kinds
+from app.db.log import LogEntry, NewLogEntry, append_entries, iterate_entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, StorageError
@@ -261,7 +261,7 @@ def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) 
         row = find_person_by_name(session, name)
         if row is not None and not row.disabled:
             roles = read_roles(session, row.id, Role(row.role))
-            if roles.role_in(group.dataset_id) is not Role.NONE:
+            if roles.find_role_in(group.dataset_id) is not Role.NONE:
                 found[name] = row.id
     return found
 
@@ -275,7 +275,9 @@ def _log_comment(
     session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any
 ) -> None:
     body = {name: value for name, value in fields.items() if value is not None}
-    append_entries(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
+    append_entries(
+        session, [NewLogEntry(COMMENT, actor, time, body, group.dataset_id, group.group_id)]
+    )
 
 
 def _checked_comment(text: str) -> str:
@@ -320,7 +322,7 @@ def _require_own_comment(
     raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")
 
 
-def examine_threads(store: Store) -> Check:
+def examine_threads(store: Store) -> CheckResult:
     """Compare every thread and comment with the log.
 
     When a thread began and whom it mentions stands in the tables alone.
@@ -329,14 +331,14 @@ def examine_threads(store: Store) -> Check:
         return _compare_with_log(session, dialect_in(session).restoring)
 
 
-def _compare_with_log(session: Session, restore: str) -> Check:
+def _compare_with_log(session: Session, restore: str) -> CheckResult:
     try:
         with report_damaged_values():
             logged = threads_from_log(
                 iterate_entries_of_kinds(session, (COMMENT, "dataset_deleted"))
             )
     except StorageError as error:
-        return Check("threads", False, error.message, error.hint or restore)
+        return CheckResult("threads", False, error.message, error.hint or restore)
     present = read_all_threads(session)
     keys = sorted(logged.keys() | present.keys())
     apart = [str(key) for key in keys if logged.get(key) != present.get(key)]

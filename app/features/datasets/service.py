@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from app.db.idempotency import without_response
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -180,7 +180,7 @@ def insert_dataset(
     if copies is not None:
         insert_copy_dataset(session, identity, copies)
         body["copies"] = vars(copies)
-    append_entries(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
+    append_entries(session, [NewLogEntry("dataset", actor, at, body, dataset_id=identity)])
     return identity
 
 
@@ -256,7 +256,7 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
     """Judge a dataset by another policy; what that leaves without a solution is stale."""
     update_policy(session, dataset_id, policy)
     body = {"policy": policy_to_json(policy)}
-    append_entries(session, [Entry("policy", actor, now(), body, dataset_id=dataset_id)])
+    append_entries(session, [NewLogEntry("policy", actor, now(), body, dataset_id=dataset_id)])
     refresh_queue(session, group_ids(session, dataset_id))
 
 
@@ -396,7 +396,7 @@ def delete_dataset(
         removal.record_used_ids(session)
         heir = None if afresh is None else removal.move_access(session, identity)
         body = {"name": contents.name, "counts": contents.counts, "heir": heir}
-        append_entries(session, [Entry(KIND, actor, now(), body, identity)])
+        append_entries(session, [NewLogEntry(KIND, actor, now(), body, identity)])
         removal.delete_rows(session, identity)
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir

@@ -491,7 +491,7 @@ class _ExportRun:
         # A frame without its label would teach that it shows no ball: it stays out as well.
         chosen = self._options.format == "yolo" and not self._options.every_view
         for place, (found, facts) in enumerate(self._source.items(), 1):
-            record = found.for_training() if chosen else found
+            record = found.keep_training_views() if chosen else found
             if record.group.views:
                 self._licences.add(find_licence(record.group.match))
                 names = self._names.of(record.group, record.splits)

@@ -25,7 +25,7 @@ from app.features.file_tools.matches import (
 )
 from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
@@ -45,7 +45,7 @@ from app.solving.calibration_findings import (
     find_pitch_findings_of_lone_frame,
 )
 from app.solving.lone_frame import LoneFrame
-from app.solving.match_position import FramePlace, Places, find_camera_place, share_position
+from app.solving.match_position import FramePlace, FramePlaces, find_camera_place, share_position
 from app.solving.solve import warm_up_solver
 
 CHUNK = 16
@@ -111,7 +111,7 @@ def calibrate_files(
         InputError: There is no line file, or ``out`` cannot hold the result.
     """
     began = time.perf_counter()
-    report = Report()
+    report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
         raise report.refusal(f"{source} holds no line files")
@@ -204,7 +204,7 @@ def _calibrate_file(
 def _calibrate_with_shared_position(
     file: LineFile,
     frame: CalibratedFrame,
-    others: Places,
+    others: FramePlaces,
     size: ImageSize,
     policy: CalibrationPolicy,
     with_leave_one_out: bool,
@@ -268,7 +268,9 @@ def _frame_in_picture(
     )
 
 
-def _make_summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
+def _make_summary(
+    frames: list[CalibratedFrame], report: ReaderReport, seconds: float
+) -> dict[str, Any]:
     times = [frame.milliseconds for frame in frames]
     failed = [
         {"frame": frame.stem, "reason": frame.reason} for frame in frames if frame.camera is None
@@ -349,7 +351,7 @@ def score_files(
     Raises:
         InputError: There is no line file, or no camera at all.
     """
-    report, camera_report = Report(), Report()
+    report, camera_report = ReaderReport(), ReaderReport()
     found = _cameras_by_frame(read_cameras(cameras, camera_report))
     if not found:
         raise camera_report.refusal(f"{cameras} holds no camera files")

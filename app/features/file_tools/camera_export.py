@@ -20,7 +20,7 @@ from app.formats.opentrackio_writer import (
     estimate_frame_rate,
     find_opentrackio_problem,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.soccer.frames import ImageSize
@@ -46,7 +46,7 @@ def export_cameras(
         InputError: There is no camera of a frame, or no size.
         DatasetFormatError: A camera is none that the format can say.
     """
-    report = Report()
+    report = ReaderReport()
     sizes: dict[str, ImageSize] = {}
     found = read_cameras(source, report, sizes=sizes)
     cameras = key_by_frame_number(found)

@@ -18,7 +18,7 @@ from app.formats.cameras import camera_file_name, camera_file_text
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file, resolve_inside
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
@@ -31,7 +31,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.solving.match_position import NO_PLACES, FramePlace, Places, guess_matches
+from app.solving.match_position import NO_PLACES, FramePlace, FramePlaces, guess_matches
 from app.solving.pitch_size import PitchFrame, estimate_pitch
 
 ONE = "one"
@@ -43,7 +43,7 @@ class MatchShare:
     """What a frame gets from the others of its match: their places. ``match`` is its name."""
 
     match: str
-    others: Places
+    others: FramePlaces
 
 
 def read_matches(path: Path) -> dict[str, str]:
@@ -93,7 +93,7 @@ def match_shares(
         if not name:
             continue
         known = {index: place for index in indices if (place := places[index]) is not None}
-        all_ = Places(list(known.values()))
+        all_ = FramePlaces(list(known.values()))
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
             others = all_.without(row[index]) if index in row else all_
@@ -108,7 +108,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
         InputError: There is no line file.
         DegenerateGeometryError: Too few show enough markings.
     """
-    report = Report()
+    report = ReaderReport()
     frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
     if not frames:
         raise report.refusal(f"{source} holds no line files")
@@ -130,7 +130,7 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
         InputError: There is no line file.
         DegenerateGeometryError: Too few show enough markings.
     """
-    report = Report()
+    report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
         raise report.refusal(f"{source} holds no line files")

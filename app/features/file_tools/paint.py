@@ -20,7 +20,7 @@ from app.features.file_tools.matches import DrawnFrame, share_tripods
 from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
 from app.formats.file_tree import Limits
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration import LineFile, read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
@@ -81,7 +81,7 @@ class PictureFile:
 
 
 def read_pictures(
-    sources: Sequence[Path], settings: Settings, report: Report
+    sources: Sequence[Path], settings: Settings, report: ReaderReport
 ) -> Iterator[PictureFile]:
     """Every picture of some folders, zips and files, in the order of their names.
 
@@ -113,7 +113,7 @@ def list_picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]
     """Stems of every picture of some folders, zips and files; nothing is decoded."""
     stems: list[str] = []
     for source in sources:
-        with open_tree_while_read(source, Report(), Limits.of(settings)) as tree:
+        with open_tree_while_read(source, ReaderReport(), Limits.of(settings)) as tree:
             if tree is None:
                 continue
             places = [PurePosixPath(name) for name in tree.names()]
@@ -157,7 +157,7 @@ def snap_files(
     Raises:
         InputError: No picture has a line file, or ``out`` cannot be written.
     """
-    report = Report()
+    report = ReaderReport()
     values = _read_line_values(lines, settings, report)
     match = _FileByPicture(values, images, settings)
     rows: list[dict[str, Any]] = []
@@ -196,7 +196,7 @@ def measure_paint_agreement_of_files(
     Raises:
         InputError: No picture has a camera.
     """
-    report = Report()
+    report = ReaderReport()
     found = read_cameras(cameras, report)
     match = _FileByPicture(found, images, settings)
     rows: list[dict[str, Any]] = []
@@ -224,7 +224,7 @@ class _FileByPicture:
         places = list_picture_stems(images, settings)
         self._stems = Counter(PurePosixPath(stem).name for stem in places)
 
-    def pictures(self, report: Report) -> Iterator[tuple[PictureFile, str, str]]:
+    def pictures(self, report: ReaderReport) -> Iterator[tuple[PictureFile, str, str]]:
         """Each picture that has a file, with the name of its frame and the key of its file."""
         names = UniqueNames()
         for picture in read_pictures(self._images, self._settings, report):
@@ -240,7 +240,7 @@ class _FileByPicture:
         return keys[0] if len(keys) == 1 and self._stems[bare] == 1 else None
 
 
-def _read_line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
+def _read_line_values(lines: Path, settings: Settings, report: ReaderReport) -> dict[str, Any]:
     """The lines of each image, by stem with folders; an error where they cannot be read."""
     values: dict[str, Any] = {}
     with open_tree_while_read(lines, report, Limits.of(settings)) as tree:
@@ -265,7 +265,7 @@ def _read_line_values(lines: Path, settings: Settings, report: Report) -> dict[s
 
 
 def _snap_picture(
-    picture: PictureFile, frame: str, value: Any, report: Report
+    picture: PictureFile, frame: str, value: Any, report: ReaderReport
 ) -> tuple[dict[str, Any], str | None, SnappedCamera | None]:
     """The row of a picture, the text of its camera's file, and how it lies on the paint."""
     if picture.image is None:

@@ -17,7 +17,7 @@ from app.errors import GeometryError, InputError
 from app.features.file_tools.matches import DrawnFrame, share_tripods
 from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
 from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
@@ -64,7 +64,7 @@ def propose_files(
     Raises:
         InputError: There is no picture, no known camera, or ``out`` cannot hold the result.
     """
-    report = Report()
+    report = ReaderReport()
     cameras = _read_known_cameras(known)
     rows: list[dict[str, Any]] = []
     names = UniqueNames()
@@ -81,7 +81,7 @@ def propose_files(
         raise InputError(f"no picture (jpg, png or webp) can be read{why}")
     pitches = _pitches_shown_by_films(seen)
     if pitches:
-        for at, picture in enumerate(read_pictures(sources, settings, Report())):
+        for at, picture in enumerate(read_pictures(sources, settings, ReaderReport())):
             if at in pitches:
                 again = _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
                 seen[at] = again or seen[at]
@@ -212,7 +212,7 @@ def _result_row(frame: str, found: FrameProposal, milliseconds: float) -> dict[s
 
 
 def _read_known_cameras(paths: Sequence[Path]) -> list[Camera]:
-    report = Report()
+    report = ReaderReport()
     cameras = [camera for path in paths for camera in read_cameras(path, report).values()]
     if paths and not cameras:
         why = f": {report.problems[0].message}" if report.problems else ""

@@ -20,7 +20,7 @@ from app.features.file_tools.camera_export import key_by_frame_number
 from app.formats.cameras import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import json_text
 from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, ball_rays
@@ -128,7 +128,7 @@ def link_files(
         InputError: A folder holds no cameras, no ball, or none of the same frames.
         DatasetFormatError: ``ball.csv`` is another file.
     """
-    report = Report()
+    report = ReaderReport()
     made = find_time_map(_read_view(live, report), _read_view(replay, report), hints)
     result = {
         **_link_values(made),
@@ -174,7 +174,7 @@ def _link_values(made: TimeMap) -> dict[str, Any]:
     }
 
 
-def _read_view(folder: Path, report: Report) -> BallRays:
+def _read_view(folder: Path, report: ReaderReport) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
@@ -207,7 +207,7 @@ def _read_view(folder: Path, report: Report) -> BallRays:
 
 
 def read_ball(
-    path: Path, name: str, report: Report
+    path: Path, name: str, report: ReaderReport
 ) -> list[tuple[int, float, tuple[float, float]]]:
     """Frame, time in seconds and pixel of each row with a ball of a ``ball.csv``.
 

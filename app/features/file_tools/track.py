@@ -14,7 +14,7 @@ import numpy as np
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
 from app.formats.cameras import camera_file_name, camera_file_text
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.resection import LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Z
@@ -109,7 +109,7 @@ def track_video(
         shown: Their names.
         send: Called with frames done.
     """
-    opened, report = Clip.open(clip), Report()
+    opened, report = Clip.open(clip), ReaderReport()
     lines = {
         number: _parse_lines(content, shown[number], opened.size, report)
         for number, content in contents.items()
@@ -117,7 +117,7 @@ def track_video(
     return track_clip(opened, lines, tell=send)
 
 
-def _parse_lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:
+def _parse_lines(content: bytes, shown: str, size: ImageSize, report: ReaderReport) -> Lines:
     documents = read_line_documents(content, shown, report)
     if len(documents) != 1:
         raise InputError(

@@ -25,7 +25,7 @@ from sqlalchemy import cast as cast_to
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.json_columns import parse_json_column, report_damaged_values
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
 from app.features.groups.insert_queries import find_next_row_id
@@ -358,7 +358,7 @@ def insert_dismissal(
     actor, at = brought or (dismissal.actor, dismissal.at)
     if brought is not None:
         body |= {"actor": dismissal.actor, "at": dismissal.at}
-    append_entries(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
+    append_entries(session, [NewLogEntry(DISMISSAL, actor, at, body, dataset_id, group_id)])
     return identity
 
 

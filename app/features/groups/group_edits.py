@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries, iterate_single_edits, read_entries_of
+from app.db.log import NewLogEntry, append_entries, iterate_single_edits, read_entries_of
 from app.db.session import Session, now
 from app.features.datasets.queries import group_ids
 from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, need_view
@@ -56,7 +56,7 @@ def edit_groups(
     """
     at, count = now(), 0
     for start in range(0, len(ids), _BATCH):
-        entries, changed = list[Entry](), list[int]()
+        entries, changed = list[NewLogEntry](), list[int]()
         some = read_groups(session, ids[start : start + _BATCH])
         for number, edit in edits_of(some).items():
             stored = some[number]
@@ -65,7 +65,9 @@ def edit_groups(
                 continue
             save_revision(session, stored, make_next_revision(stored, group, at))
             step = edit_and_inverse_to_json(edit, edit.inverse(stored.group))
-            entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, number))
+            entries.append(
+                NewLogEntry(kind, actor, at, {**(body or {}), **step}, dataset_id, number)
+            )
             changed.append(number)
         append_entries(session, entries)
         refresh_queue(session, changed)
@@ -97,7 +99,7 @@ def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, act
     before = read_factors(session, dataset_id)
     write_factors(session, dataset_id, factors)
     body = {"factors": factors_to_json(factors), "before": factors_to_json(before)}
-    append_entries(session, [Entry(NOISE, actor, now(), body, dataset_id)])
+    append_entries(session, [NewLogEntry(NOISE, actor, now(), body, dataset_id)])
     ids = group_ids(session, dataset_id)
 
     def noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from app.db.log import Entry, append_entries, list_station_entries
+from app.db.log import NewLogEntry, append_entries, list_station_entries
 from app.db.session import Session, now
 from app.features.findings.queries import find_station_finding, replace_station_finding
 from app.features.groups.insert_queries import NewRows
@@ -248,5 +248,7 @@ class SharedStations:
             "base": None if same else station_to_json(followed.base),
             "kept": kept,
         }
-        entry = Entry("station", self._actor, now(), body, self._dataset_id, station_id=station_id)
+        entry = NewLogEntry(
+            "station", self._actor, now(), body, self._dataset_id, station_id=station_id
+        )
         append_entries(self._session, [entry])

@@ -169,7 +169,7 @@ def list_groups(
         # A forged cursor can hold what the database cannot.
         raise foreign_cursor_error() from error
     login = get_current_login(request.scope)
-    judges = login is None or role_allows(login.roles.role_in(found), Action.REVIEW)
+    judges = login is None or role_allows(login.roles.find_role_in(found), Action.REVIEW)
     items = [GroupRow.of(row, judges) for row in page.items]
     return GroupPage(items=items, next=page.next, total=page.total)
 

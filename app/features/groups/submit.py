@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import NotFoundError, SharedStationError
@@ -372,10 +372,12 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     stored = after.stored
     save_revision(session, outcome.before.stored, stored)
     where = stored.dataset_id, stored.id
-    entries = [Entry(change.kind, actor, stored.changed, change.body, *where)]
+    entries = [NewLogEntry(change.kind, actor, stored.changed, change.body, *where)]
     if outcome.painted is not change.group:
         insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
-        entries.append(Entry(PAINT, actor, stored.changed, _paint_entry_body(outcome), *where))
+        entries.append(
+            NewLogEntry(PAINT, actor, stored.changed, _paint_entry_body(outcome), *where)
+        )
     append_entries(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
     if after.dismissals.last:

@@ -67,7 +67,7 @@ class ViewPaintRequest:
     def request_paint(self, frames: Frames) -> PoolTask:
         """Have the paint read near the camera; the result is a ``ViewPaint``."""
         station = self.view.station
-        return frames.ask_of(
+        return frames.request_work_on_frame(
             self.media, station.flipped, read_paint,
             station.size, self.start, self.group.pitch, self.policy, self.view.extras.places,
         )  # fmt: skip
@@ -75,7 +75,7 @@ class ViewPaintRequest:
     def request_proposal(self, frames: Frames) -> PoolTask:
         """Have lines proposed; the result is a ``ViewProposal``."""
         station = self.view.station
-        return frames.ask_of(
+        return frames.request_work_on_frame(
             self.media, station.flipped, propose_undrawn_lines,
             station.size, self.known, self.group.pitch, self.policy, self.drawn,
         )  # fmt: skip

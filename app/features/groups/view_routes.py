@@ -231,12 +231,12 @@ async def _read_neighbour_frames(
         return {}
     try:
         if view.media.frame is not None:
-            indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
+            indexing = await to_thread.run_sync(frames.request_fetch, view.media)
             if indexing is not None and not await indexing.result_unless_client_gone(
                 request.is_disconnected
             ):
                 return None
-        task = frames.ask_neighbours(view.media, view.group_key, view.static)
+        task = frames.request_neighbours(view.media, view.group_key, view.static)
         found: dict[int, Media] | None = await task.result_unless_client_gone(
             request.is_disconnected
         )
@@ -267,7 +267,7 @@ async def _read_picture(
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
-        fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
+        fetching = await to_thread.run_sync(frames.request_fetch, view.media)
         if fetching is not None and not await fetching.result_unless_client_gone(
             request.is_disconnected
         ):

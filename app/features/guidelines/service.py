@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
@@ -120,7 +120,7 @@ def write_guidelines(
             insert_guideline(session, dataset_id, newest + 1, text, actor)
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
-            append_entries(session, [Entry(GUIDELINE, actor, now(), body, dataset_id)])
+            append_entries(session, [NewLogEntry(GUIDELINE, actor, now(), body, dataset_id)])
         written = _read_version(session, dataset_id)
         session.respond(written)
         return written

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.features.findings.queries import (
     add_group_findings,
@@ -22,7 +22,7 @@ from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChains
 from app.features.imports.queries import list_known_groups
 from app.features.queue.refresh_queries import refresh_queue
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import Lines
 from app.soccer.codec import group_without_views_to_json, view_to_json
 from app.soccer.group import Group, View
@@ -97,7 +97,7 @@ def save_gone_findings(
         base = chains[number].base
         save_group(session, item, item.group, at=at, source=base)
         body = _gone_entry_body(item, base, source, list_group_findings(session, number))
-        entries.append(Entry("import", actor, at, body, dataset_id, number))
+        entries.append(NewLogEntry("import", actor, at, body, dataset_id, number))
     if entries:
         append_entries(session, entries)
         add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
@@ -133,7 +133,7 @@ class GroupLimits:
         report: Hears of each group and each marking that is left out.
     """
 
-    def __init__(self, source: str, report: Report):
+    def __init__(self, source: str, report: ReaderReport):
         self._source, self._report = source, report
         self._told: set[str] = set()
         """Static cameras whose markings are told already: every group brings them again."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
@@ -212,7 +212,9 @@ def attach_cameras(
         body = {"source": source, "given": shown}
         if given.covariance is not None:
             body["covariance"] = covariance_to_json(given.covariance)
-        entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))
+        entries.append(
+            NewLogEntry("camera", actor, at, body, dataset_id, place.group, place.station)
+        )
         if place.group is not None:
             bump_group_revisions(session, [place.group], at)
         touched.update(list_groups_of_station(session, place.station))

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.db.json_columns import compress_json, decompress_json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
@@ -50,7 +50,7 @@ from app.features.pitches.service import set_pitch_of_groups
 from app.features.policies.service import choose_first_policy
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.issia import FramePersons
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.object_store.path import is_address
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
@@ -105,7 +105,7 @@ def import_groups(
     progress: ReportProgress | None = None,
     dry_run: bool = False,
     policy: Policy | None = PAPER,
-    limit_report: Report | None = None,
+    limit_report: ReaderReport | None = None,
     lines_left: bool = False,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
@@ -127,7 +127,7 @@ def import_groups(
         limit_report: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """
     report, seen, done = IngestReport(), set[str](), 0
-    limits = GroupLimits(source, Report() if limit_report is None else limit_report)
+    limits = GroupLimits(source, ReaderReport() if limit_report is None else limit_report)
     sound, stations = _storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
@@ -291,7 +291,7 @@ def insert_new_groups(
         identity = rows.add_group(group, digest, at, shared)
         places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
         body = import_body(group, None, origin.source, digest, places)
-        entries.append(Entry("import", origin.actor, at, body, origin.dataset_id, identity))
+        entries.append(NewLogEntry("import", origin.actor, at, body, origin.dataset_id, identity))
         ids.append(identity)
     rows.insert()
     append_entries(session, entries)
@@ -339,7 +339,9 @@ def _update_group(
         followed.group, followed.base, origin.source, digest, collect_view_and_station_ids(after)
     )
     body["kept"] = [[item.view, item.sentence] for item in kept]
-    append_entries(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
+    append_entries(
+        session, [NewLogEntry("import", origin.actor, at, body, origin.dataset_id, group_id)]
+    )
     refresh_queue(session, [group_id])
     report.changed += 1
     report.findings += len(followed.kept)
@@ -452,4 +454,4 @@ def _write_unassigned(
     upsert_unassigned_frames(session, dataset_id, fresh)
     frames = [[camera, frame, decompress_json(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
-    append_entries(session, [Entry("spare", actor, now(), body, dataset_id)])
+    append_entries(session, [NewLogEntry("spare", actor, now(), body, dataset_id)])

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TypeVar
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import DatasetFormatError, InputError
@@ -57,7 +57,7 @@ from app.features.imports.merge_parse import (
 from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree_while_read
 from app.progress import ReportProgress
 from app.soccer.codec import station_digest, station_to_json
@@ -178,7 +178,9 @@ def _log_station(
         "kept": sentence,
         "carried": exported,
     }
-    entry = Entry("station", origin.actor, now(), body, origin.dataset_id, station_id=stored.id)
+    entry = NewLogEntry(
+        "station", origin.actor, now(), body, origin.dataset_id, station_id=stored.id
+    )
     append_entries(session, [entry])
 
 
@@ -219,7 +221,7 @@ def merge_edits(
     store: Store,
     dataset: str,
     path: Root,
-    report: Report,
+    report: ReaderReport,
     limits: Limits,
     *,
     source: str,
@@ -256,7 +258,7 @@ def merge_edits(
 
 
 def _merge_tree(
-    run: _MergeRun, tree: FileTree, report: Report, progress: ReportProgress | None
+    run: _MergeRun, tree: FileTree, report: ReaderReport, progress: ReportProgress | None
 ) -> None:
     stations = {
         item.station.key: item for item in _parse_records(tree, STATIONS, report, parse_station)
@@ -282,7 +284,7 @@ def _merge_tree(
 
 
 def _parse_records(
-    tree: FileTree, name: str, report: Report, parse: Callable[[Json], T]
+    tree: FileTree, name: str, report: ReaderReport, parse: Callable[[Json], T]
 ) -> Iterator[T]:
     for place, value in read_lines(tree, name, report):
         try:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.features.findings.queries import (
     insert_dismissal,
@@ -98,7 +98,9 @@ def merge_group(
     )
     body["kept"] = [[item.view, item.sentence] for item in noticed]
     body["carried"] = list(exported.log)
-    append_entries(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
+    append_entries(
+        session, [NewLogEntry("import", origin.actor, at, body, origin.dataset_id, stored.id)]
+    )
     if pitch in (FOLLOW, UPSTREAM):
         # An edit of its own: the size before can be had back here, too.
         set_pitch_of_groups(

@@ -18,7 +18,7 @@ from app.features.policies.service import CUSTOM, policy_to_values, policy_with
 from app.features.verdicts.service import STATES
 from app.formats.file_tree import BROKEN, FileTree
 from app.formats.json_reader import read_json
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.json_text import json_text
 from app.soccer.annotation import Extras
 from app.soccer.codec import extras_from_json, policy_from_json, station_from_json
@@ -96,7 +96,7 @@ def read_merge_header(tree: FileTree) -> MergeHeader:
         raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
 
 
-def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str, Json]]:
+def read_lines(tree: FileTree, name: str, report: ReaderReport) -> Iterator[tuple[str, Json]]:
     """The records of a file of lines with their places; a broken line is skipped and told."""
     if name not in tree.names():
         return

@@ -12,7 +12,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.features.datasets.queries import find_dataset
 from app.features.findings.queries import replace_shape_findings
 from app.features.queue.refresh_queries import refresh_queue
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.media.files import read_picture_header, read_video_length, read_video_times
 from app.media.images import SIDEWAYS, ImageHeader
 from app.paint.view_paint import SHAPES_APART
@@ -61,7 +61,7 @@ class PictureCheck:
         beyond: Views whose video has no frame of their number.
     """
 
-    report: Report
+    report: ReaderReport
     settings: Settings
     progress: ReportProgress | None = None
     shapes: list[str] = field(default_factory=list)

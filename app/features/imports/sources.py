@@ -28,7 +28,7 @@ from app.formats.guess_format import guess_format, guess_from_content, holds_onl
 from app.formats.issia_3d import open_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.parquet import read_parquet
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import DEFAULT_SIZE
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.formats.soccernet_v3_reader import read_soccernet_v3
@@ -190,7 +190,7 @@ class ImportResult:
     """What the files held (``report``) and what became of it (``result``)."""
 
     source: ImportSource
-    report: Report
+    report: ReaderReport
     result: IngestReport
 
     @property
@@ -307,7 +307,7 @@ def import_source(
         InputError: The format does not use one of the options.
     """
     source.check()
-    report, limits = Report(), Limits.of(settings)
+    report, limits = ReaderReport(), Limits.of(settings)
     if source.format == "cameras":
         sizes: dict[str, ImageSize] = {}
         covariances: dict[str, Any] = {}
@@ -382,7 +382,7 @@ def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
 
 
 def _read_groups(
-    source: ImportSource, settings: Settings, report: Report, limits: Limits
+    source: ImportSource, settings: Settings, report: ReaderReport, limits: Limits
 ) -> Iterator[Group]:
     path, calibration = source.path, source.calibration or "given"
     match source.format:
@@ -410,7 +410,7 @@ def _read_groups(
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
 
 
-def _open_static_folder(source: ImportSource, report: Report, limits: Limits) -> IssiaFolder:
+def _open_static_folder(source: ImportSource, report: ReaderReport, limits: Limits) -> IssiaFolder:
     options = IssiaOptions(
         frame_offset=source.frame_offset,
         flipped=source.flipped,
@@ -423,7 +423,7 @@ def _open_static_folder(source: ImportSource, report: Report, limits: Limits) ->
 
 
 def _report_contradicted(
-    folder: IssiaFolder, dataset: str, source: ImportSource, report: Report
+    folder: IssiaFolder, dataset: str, source: ImportSource, report: ReaderReport
 ) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
     from app.features.solutions.service import describe_contradiction, find_contradicted_cameras

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
@@ -96,7 +96,9 @@ def adopt_annotation(
         at = now()
         update_annotation(session, annotation_id, settled=at)
         body = {"take": annotation_id, "person": annotation.person, "did": "adopted"}
-        append_entries(session, [Entry(KIND, actor, at, body, original.dataset_id, original.id)])
+        append_entries(
+            session, [NewLogEntry(KIND, actor, at, body, original.dataset_id, original.id)]
+        )
         if also is not None:
             also(session)
         refresh_queue(session, [original.id])
@@ -192,7 +194,7 @@ def _adopt_stations(
             body = edit_and_inverse_to_json(edit, edit.inverse(station))
             station = edit.apply(station)
             where = {"dataset_id": original.dataset_id, "station_id": held.id}
-            append_entries(session, [Entry("station_edit", person, now(), body, **where)])
+            append_entries(session, [NewLogEntry("station_edit", person, now(), body, **where)])
             save_station(session, held, station)
             held = replace(held, station=station, revision=held.revision + 1)
         if edits:
@@ -295,7 +297,7 @@ def log_return(
     if batch is not None:
         body["batch"] = batch
     at = now()
-    append_entries(session, [Entry(kind, actor, at, body, group.dataset_id, group_id)])
+    append_entries(session, [NewLogEntry(kind, actor, at, body, group.dataset_id, group_id)])
     _announce_return(session, group, person, actor=actor, at=at, batch=batch)
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"

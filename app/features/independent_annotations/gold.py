@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -163,7 +163,7 @@ def mark_gold_group(store: Store, group_id: int, start: str, *, actor: str) -> G
         insert_gold(session, group_id, state.dataset_id, start, _truth_values(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
-        append_entries(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
+        append_entries(session, [NewLogEntry(KIND, actor, now(), body, state.dataset_id)])
         _, marked = _require_gold(session, group_id)
         session.respond(marked)
     return marked
@@ -185,7 +185,7 @@ def set_gold_start(store: Store, group_id: int, start: str, *, actor: str) -> Go
         if changed != gold:
             update_gold_start(session, group_id, start)
             body = {"group": group_id, "did": "changed", "start": start}
-            append_entries(session, [Entry(KIND, actor, now(), body, dataset_id)])
+            append_entries(session, [NewLogEntry(KIND, actor, now(), body, dataset_id)])
         session.respond(changed)
     return changed
 
@@ -200,7 +200,7 @@ def unmark_gold_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
         dataset_id, gone = _require_gold(session, group_id)
         delete_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
-        append_entries(session, [Entry(KIND, actor, now(), body, dataset_id)])
+        append_entries(session, [NewLogEntry(KIND, actor, now(), body, dataset_id)])
         session.respond(gone)
     return gone
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
@@ -114,7 +114,7 @@ def mark_groups_with_known_truth(
             insert_gold(session, group_id, number, choice.start, truth, actor)
         body: Json = {"did": "marked", "start": choice.start, "source": str(choice.source)}
         body |= {"groups": [*truths], "version": choice.version}
-        append_entries(session, [Entry(KIND, actor, now(), body, number)])
+        append_entries(session, [NewLogEntry(KIND, actor, now(), body, number)])
         session.respond(chosen)
     return chosen
 

@@ -194,7 +194,7 @@ def list_independent_annotations(
         store,
         dataset,
         lambda dataset_id: (
-            login is None or role_allows(login.roles.role_in(dataset_id), Action.LEAD)
+            login is None or role_allows(login.roles.find_role_in(dataset_id), Action.LEAD)
         ),
         person=actor,
     )

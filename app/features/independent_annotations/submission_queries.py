@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries, read_entries_of
+from app.db.log import NewLogEntry, append_entries, read_entries_of
 from app.db.session import Session
 from app.errors import ConflictError, ForbiddenError
 from app.features.agreement.queries import delete_open_agreement
@@ -79,7 +79,7 @@ def submit_copy(
         "inputs_hash": stored.inputs_hash,
         "submitted": group_to_json(stored.group),
     }
-    append_entries(session, [Entry(KIND, actor, at, body, stored.dataset_id, stored.id)])
+    append_entries(session, [NewLogEntry(KIND, actor, at, body, stored.dataset_id, stored.id)])
 
 
 def record_copy_verdict(session: Session, copy_id: int, state: str, *, actor: str, at: str) -> None:

@@ -16,7 +16,7 @@ import cv2
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.db.check import Check, compare_records, compare_with_log
+from app.db.check import CheckResult, compare_records, compare_with_log
 from app.db.dialects.dialect import dialect_in
 from app.db.dialects.sqlite import MIN_SQLITE
 from app.db.home import find_leftovers, make_home, open_to_others
@@ -63,7 +63,7 @@ from app.soccer.codec import group_inputs_hash, paint_to_json, station_digest, v
 from app.wording import plural
 
 
-def examine_guidelines(session: Session, restore: str) -> Check:
+def examine_guidelines(session: Session, restore: str) -> CheckResult:
     """Compare every version of every dataset's guidelines with the digest in the log.
 
     Args:
@@ -110,7 +110,7 @@ KEPT = {
 """Parts that it leaves as they are."""
 
 
-def examine_database(store: Store) -> list[Check]:
+def examine_database(store: Store) -> list[CheckResult]:
     """Look at the file, the log's hash chain, the tables and everything that was computed.
 
     Nothing is changed. The tables are compared with what follows from the log alone, unless the
@@ -123,9 +123,9 @@ def examine_database(store: Store) -> list[Check]:
         try:
             logged = replay_log(session)
         except StorageError as error:
-            checks.append(Check("log", False, error.message, error.hint or restore))
+            checks.append(CheckResult("log", False, error.message, error.hint or restore))
         else:
-            checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
+            checks.append(CheckResult("log", True, f"{entries:,} entries, each as it was written"))
             checks.append(_check_texts(session))
             checks += _check_tables_against_log(session, logged, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
@@ -135,39 +135,43 @@ def examine_database(store: Store) -> list[Check]:
     return [*checks, *_check_solutions(store)]
 
 
-def _check_file(session: Session, restore: str) -> Check:
+def _check_file(session: Session, restore: str) -> CheckResult:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
     dialect = dialect_in(session)
     faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
     if faults:
-        return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
+        return CheckResult("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
     if lost:
-        return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
-    return Check("file", True, dialect.no_fault)
+        return CheckResult("file", False, f"{lost} rows refer to rows that are gone", restore)
+    return CheckResult("file", True, dialect.no_fault)
 
 
-def _check_texts(session: Session) -> Check:
+def _check_texts(session: Session) -> CheckResult:
     """Texts from before U+0000 was refused: no fault here, and nothing that PostgreSQL can keep."""
     found = find_null_characters(session)
     if not found:
-        return Check("texts", True, "SQLite and PostgreSQL can keep each")
+        return CheckResult("texts", True, "SQLite and PostgreSQL can keep each")
     sentence = (
         f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {list_null_characters(found)}"
     )
-    return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
+    return CheckResult(
+        "texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there."
+    )
 
 
-def _check_tables_against_log(session: Session, logged: StateSnapshot, restore: str) -> list[Check]:
+def _check_tables_against_log(
+    session: Session, logged: StateSnapshot, restore: str
+) -> list[CheckResult]:
     try:
         present = read_state_snapshot(session)
     except StorageError as error:
-        return [Check("tables", False, error.message, REBUILD)]
+        return [CheckResult("tables", False, error.message, REBUILD)]
     checks = _check_tables(logged, present, restore)
     # Of a row that is not what was said, the digest says nothing.
     return [*checks, _check_digests(session)] if all(check.ok for check in checks) else checks
 
 
-def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[Check]:
+def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[CheckResult]:
     return [
         compare_with_log(words, getattr(logged, name), getattr(present, name), mend)
         for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
@@ -175,7 +179,7 @@ def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -
     ]
 
 
-def _check_digests(session: Session) -> Check:
+def _check_digests(session: Session) -> CheckResult:
     """Whether cameras, views and groups have the digests by which solutions and edits know them."""
     count, apart = 0, list[str]()
     for station in iterate_stations(session):
@@ -193,25 +197,25 @@ def _check_digests(session: Session) -> Check:
     return compare_records("digests", whole, apart, "not of what was said", REBUILD)
 
 
-def _check_queue(session: Session, mend: str) -> Check:
+def _check_queue(session: Session, mend: str) -> CheckResult:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
         count, apart = find_outdated_rows(session)
     except StorageError as error:
-        return Check("queue", False, error.message, mend)
+        return CheckResult("queue", False, error.message, mend)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"
     wrong = "not as groups, verdicts and solutions say"
     return compare_records("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
-def _check_solutions(store: Store) -> list[Check]:
+def _check_solutions(store: Store) -> list[CheckResult]:
     """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
     checks = []
     for item in list_datasets(store):
         waiting = len(list_stale_groups(store, item.id))
         mend = f'touchline solve --dataset "{item.name}"' if waiting else None
         sentence = f"{waiting:,} of {item.groups:,} groups wait to be solved"
-        checks.append(Check(f"solutions of {item.name}", True, sentence, mend))
+        checks.append(CheckResult(f"solutions of {item.name}", True, sentence, mend))
     return checks
 
 
@@ -226,12 +230,12 @@ _NO_CONTENT = '"touchline-asks-for-no-content"'
 """What no store calls any content."""
 
 
-def examine_stores(settings: Settings) -> list[Check]:
+def examine_stores(settings: Settings) -> list[CheckResult]:
     """Ask every configured store for what the service needs of it."""
     return [_check_store(settings, name) for name in sorted(settings.stores)]
 
 
-def _check_store(settings: Settings, name: str) -> Check:
+def _check_store(settings: Settings, name: str) -> CheckResult:
     title, done = f"store {name}", list[str]()
     try:
         store = open_store(settings, name)
@@ -241,15 +245,15 @@ def _check_store(settings: Settings, name: str) -> Check:
             store.read(found.key, 0, 1, found.etag)
             done.append("reads")
             if not _refuses_other_content(store, found.key):
-                return Check(title, False, _UNCONDITIONAL, CONDITIONS)
+                return CheckResult(title, False, _UNCONDITIONAL, CONDITIONS)
         if store.settings.exports:
             _write_probe(store)
             done.append("writes")
     except ReviewError as error:
         can = f"; it {' and '.join(done)}" if done else ""
-        return Check(title, False, f"{error.message}{can}", KEYS)
+        return CheckResult(title, False, f"{error.message}{can}", KEYS)
     empty = "" if found is not None else ", and nothing is in it"
-    return Check(title, True, f"{', '.join(done)}{empty}")
+    return CheckResult(title, True, f"{', '.join(done)}{empty}")
 
 
 def _refuses_other_content(store: ObjectStore, key: str) -> bool:
@@ -273,7 +277,7 @@ _PREFIX = "TOUCHLINE_"
 _FORMATS = (".jpg", ".png", ".webp")
 
 
-def examine_home(settings: Settings) -> list[Check]:
+def examine_home(settings: Settings) -> list[CheckResult]:
     """What can be said of a home without its database."""
     examined = (
         _check_settings,
@@ -290,7 +294,7 @@ def examine_home(settings: Settings) -> list[Check]:
     ]
 
 
-def examine_surroundings(store: Store) -> list[Check]:
+def examine_surroundings(store: Store) -> list[CheckResult]:
     """What lies around the tables of a database that can be opened."""
     settings, admins = store.settings, _check_linked_admins(store)
     with store.read() as session:
@@ -304,49 +308,53 @@ def examine_surroundings(store: Store) -> list[Check]:
         ]
 
 
-def _check_settings(settings: Settings) -> Check:
+def _check_settings(settings: Settings) -> CheckResult:
     known = {_PREFIX + name.upper() for name in Settings.model_fields}
     unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
     gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
     if unknown:
         sentence = f"{', '.join(unknown)} is not a setting and is ignored"
-        return Check("settings", False, sentence, "app/config.py lists all; correct or unset it.")
+        return CheckResult(
+            "settings", False, sentence, "app/config.py lists all; correct or unset it."
+        )
     if gone:
         sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is not a folder"
-        return Check("settings", False, sentence, "Make the folder, or take it out.")
-    return Check("settings", True, f"home {settings.home}")
+        return CheckResult("settings", False, sentence, "Make the folder, or take it out.")
+    return CheckResult("settings", True, f"home {settings.home}")
 
 
-def _check_sign_on(settings: Settings) -> Check:
+def _check_sign_on(settings: Settings) -> CheckResult:
     """Whether single sign-on is set up whole, and its provider answers."""
     name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
     try:
         # Whether it is a team that is served, serve is told on its own command line.
         rules = read_rules(settings.model_copy(update={"team": True}))
         if rules is None:
-            return Check(name, True, "not set up")
-        return Check(name, True, Provider(rules).examine())
+            return CheckResult(name, True, "not set up")
+        return CheckResult(name, True, Provider(rules).examine())
     except (InputError, ConflictError) as error:
-        return Check(
+        return CheckResult(
             name, False, error.message, error.hint if isinstance(error, InputError) else mend
         )
 
 
-def _check_mail(settings: Settings) -> Check:
+def _check_mail(settings: Settings) -> CheckResult:
     """Whether the mail server takes us; it is sent nothing."""
     try:
         server = read_mail_server(settings)
         if server is None:
-            return Check("mail", True, "not set up")
+            return CheckResult("mail", True, "not set up")
         found = server.examine()
     except InputError as error:
-        return Check("mail", False, error.message, error.hint)
+        return CheckResult("mail", False, error.message, error.hint)
     if settings.url is None:
-        return Check("mail", False, f"{found}; letters need TOUCHLINE_URL", "Set TOUCHLINE_URL.")
-    return Check("mail", True, found)
+        return CheckResult(
+            "mail", False, f"{found}; letters need TOUCHLINE_URL", "Set TOUCHLINE_URL."
+        )
+    return CheckResult("mail", True, found)
 
 
-def _check_linked_admins(store: Store) -> Check | None:
+def _check_linked_admins(store: Store) -> CheckResult | None:
     """Whether an admin can come in where there is no other way; None: there is one."""
     try:
         rules = read_rules(store.settings.model_copy(update={"team": True}))
@@ -359,20 +367,20 @@ def _check_linked_admins(store: Store) -> Check | None:
     mend = (
         None if count else "touchline users reset NAME prints a link with which an admin is linked."
     )
-    return Check("admins", count > 0, sentence, mend)
+    return CheckResult("admins", count > 0, sentence, mend)
 
 
-def _check_permissions(settings: Settings) -> Check:
+def _check_permissions(settings: Settings) -> CheckResult:
     found = open_to_others(settings)
     if found:
         sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
         more = " and others" if found[1:] else ""
         mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
-        return Check("permissions", False, sentence + more, mend)
-    return Check("permissions", True, "the home is its owner's alone")
+        return CheckResult("permissions", False, sentence + more, mend)
+    return CheckResult("permissions", True, "the home is its owner's alone")
 
 
-def _check_free_space(settings: Settings) -> Check:
+def _check_free_space(settings: Settings) -> CheckResult:
     free = shutil.disk_usage(settings.home).free
     # A migration copies the database twice: once as it is, once packed.
     database = settings.database_file
@@ -380,79 +388,83 @@ def _check_free_space(settings: Settings) -> Check:
     sentence = f"{free / 1e9:,.1f} GB are free"
     if free < needed:
         mend = f"Free some space: at least {needed / 1e9:,.1f} GB."
-        return Check("room", False, sentence, mend)
-    return Check("room", True, sentence)
+        return CheckResult("room", False, sentence, mend)
+    return CheckResult("room", True, sentence)
 
 
-def _check_library_versions() -> Check:
+def _check_library_versions() -> CheckResult:
     sqlite = pysqlite3.dbapi2.sqlite_version
     lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
     sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
     if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
         mend = "Install the packages of requirements.lock: this SQLite can corrupt its file."
-        return Check("versions", False, sentence, mend)
+        return CheckResult("versions", False, sentence, mend)
     if lacking:
         sentence += f", which knows no {', '.join(lacking)}"
-        return Check("versions", False, sentence, "Install the packages of requirements.lock.")
-    return Check("versions", True, sentence)
+        return CheckResult(
+            "versions", False, sentence, "Install the packages of requirements.lock."
+        )
+    return CheckResult("versions", True, sentence)
 
 
-def _check_anchor(settings: Settings) -> Check:
+def _check_anchor(settings: Settings) -> CheckResult:
     try:
         anchor = read_anchor(settings.database_file)
     except StorageError as error:
-        return Check("anchor", False, error.message, error.hint)
+        return CheckResult("anchor", False, error.message, error.hint)
     if anchor is None:
-        return Check("anchor", True, "none yet: it is made when the database is opened")
+        return CheckResult("anchor", True, "none yet: it is made when the database is opened")
     sentence = f"installation {anchor.installation[:8]}, {anchor.entries:,} entries or more"
-    return Check("anchor", True, sentence)
+    return CheckResult("anchor", True, sentence)
 
 
-def _check_clock(session: Session) -> Check:
+def _check_clock(session: Session) -> CheckResult:
     now = datetime.now(UTC)
     # Two machines that edit in turn may differ by a little.
     count, latest = count_entries_after(session, text_of(now + timedelta(minutes=5)))
     if count == 0:
-        return Check("clock", True, "not behind the log")
+        return CheckResult("clock", True, "not behind the log")
     sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
     last = find_last_entry_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
-        return Check("clock", False, sentence, "Set the clock of this machine.")
+        return CheckResult("clock", False, sentence, "Set the clock of this machine.")
     # Written while the clock was ahead: entries are in order all the same, and nothing can change them.
-    return Check("clock", True, f"{sentence}; the newest is not: the clock was set right since")
+    return CheckResult(
+        "clock", True, f"{sentence}; the newest is not: the clock was set right since"
+    )
 
 
-def _check_leftovers(settings: Settings) -> Check:
+def _check_leftovers(settings: Settings) -> CheckResult:
     found = [str(path.relative_to(settings.home)) for path in find_leftovers(settings)]
     if found:
         sentence = f"{len(found):,} half-written files are left: {found[0]}"
-        return Check(
+        return CheckResult(
             "leftovers", True, sentence, "The server deletes them when it has nothing to do."
         )
-    return Check("leftovers", True, "none")
+    return CheckResult("leftovers", True, "none")
 
 
-def _check_calibrations(session: Session) -> Check:
+def _check_calibrations(session: Session) -> CheckResult:
     count = len(list_unused_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
-    return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
+    return CheckResult("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
-def _check_uploads(session: Session, settings: Settings) -> Check:
+def _check_uploads(session: Session, settings: Settings) -> CheckResult:
     found = list_unused_uploads(session, settings)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
-    return Check("uploads", True, sentence, mend)
+    return CheckResult("uploads", True, sentence, mend)
 
 
-def _check_recordings(session: Session, settings: Settings) -> Check:
+def _check_recordings(session: Session, settings: Settings) -> CheckResult:
     found = list_unused_frame_files(session, settings)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
     mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
-    return Check("recordings", True, sentence, mend)
+    return CheckResult("recordings", True, sentence, mend)
 
 
-def examine_everything(settings: Settings) -> list[Check]:
+def examine_everything(settings: Settings) -> list[CheckResult]:
     """Look at everything; where the database cannot be opened, say why, and what lies around it."""
     make_home(settings)
     checks = [*examine_home(settings), examine_yields(settings)]
@@ -461,4 +473,4 @@ def examine_everything(settings: Settings) -> list[Check]:
             checks += [*examine_surroundings(store), *examine_database(store)]
             return [*checks, examine_threads(store), *examine_versions(store)]
     except StorageError as error:
-        return [*checks, Check("database", False, error.message, error.hint)]
+        return [*checks, CheckResult("database", False, error.message, error.hint)]

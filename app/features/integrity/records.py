@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.db.check import Check, compare_records, compare_with_log
+from app.db.check import CheckResult, compare_records, compare_with_log
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
 from app.db.log import LogEntry, iterate_entries_of_kinds
@@ -74,7 +74,7 @@ class KnownPeople:
     shown: dict[str, str] = field(default_factory=dict)
 
 
-def examine_people(session: Session, restore: str) -> list[Check]:
+def examine_people(session: Session, restore: str) -> list[CheckResult]:
     """Compare accounts, roles in datasets and adopted names with what the log says of them.
 
     Args:
@@ -182,7 +182,7 @@ def _record_name(key: str | tuple[str, int]) -> str:
     return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
 
 
-def examine_computed(session: Session, restore: str) -> list[Check]:
+def examine_computed(session: Session, restore: str) -> list[CheckResult]:
     """Read every calibration, every reading of paint, and every solution of this solver.
 
     A solution has to be that of its row, and its summary that of its own figures; one that fits its
@@ -214,7 +214,9 @@ def _count_damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
     return count, damaged
 
 
-def _check_written_records(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
+def _check_written_records(
+    name: str, count: int, apart: Sequence[str], restore: str
+) -> CheckResult:
     return compare_records(name, f"{count:,}, each as it was written", apart, WRONG, restore)
 
 
@@ -280,7 +282,7 @@ def _are_equal_values(stored: SolutionSummary, computed: SolutionSummary) -> boo
     )
 
 
-def examine_versions(store: Store) -> list[Check]:
+def examine_versions(store: Store) -> list[CheckResult]:
     """Compare each version with its groups and the log, and each frozen content with its key.
 
     Whether solutions would come out as they were frozen is what ``verify`` tells.

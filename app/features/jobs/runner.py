@@ -196,7 +196,7 @@ class RunQueue:
         taken = {run.job.dataset_id for run in self.running} - {None}
         return [run for run in self.waiting if run.job.dataset_id not in taken]
 
-    def ready_beside_running(self, kinds: Collection[str]) -> list[JobRun]:
+    def list_independent_ready_runs(self, kinds: Collection[str]) -> list[JobRun]:
         """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
         first: dict[int | None, int] = {}
         for run in self.waiting:
@@ -208,20 +208,20 @@ class RunQueue:
             and (run.job.dataset_id is None or run.job.id == first[run.job.dataset_id])
         ]
 
-    def running_of(self, job_id: int) -> JobRun | None:
+    def find_running(self, job_id: int) -> JobRun | None:
         """The run of a job, where it runs."""
         return next((run for run in self.running if run.job.id == job_id), None)
 
-    def joined_by(self, *runs: JobRun) -> RunQueue:
+    def with_waiting_runs(self, *runs: JobRun) -> RunQueue:
         """With more that wait."""
         return replace(self, waiting=(*self.waiting, *runs))
 
     def begun(self, run: JobRun) -> RunQueue:
         """With one running that waited."""
-        left = self.left_by(run)
+        left = self.without_run(run)
         return replace(left, running=(*left.running, run))
 
-    def left_by(self, run: JobRun) -> RunQueue:
+    def without_run(self, run: JobRun) -> RunQueue:
         """Without one that waits or runs."""
         waiting, running = (
             tuple(item for item in items if item is not run)

@@ -104,7 +104,7 @@ class Jobs(JobRecords):
         """Whether this process carries out jobs and what else is one process's."""
         return True
 
-    def on_leadership(self, begin: Callable[[], None]) -> None:
+    def call_on_leadership(self, begin: Callable[[], None]) -> None:
         """Call a function once this process leads, on whichever thread finds that out."""
         self._beginners.append(begin)
 
@@ -123,7 +123,7 @@ class Jobs(JobRecords):
                 update_job(session, job.id, **self._recovered_columns(job))
         with self._changed:
             resumed = [self._make_resumed_run(job) for job in left if self._is_resumed(job)]
-            self._queue = self._queue.joined_by(*resumed)
+            self._queue = self._queue.with_waiting_runs(*resumed)
             self._start_workers()
 
     def submit(
@@ -189,9 +189,9 @@ class Jobs(JobRecords):
             raise ConflictError(f"job {job_id} has already ended")
         with self._changed:
             run = next((item for item in self._queue.waiting if item.job.id == job_id), None)
-            running = self._queue.running_of(job_id)
+            running = self._queue.find_running(job_id)
             if run is not None:
-                self._queue = self._queue.left_by(run)
+                self._queue = self._queue.without_run(run)
             elif running is not None:
                 running.progress.cancelled.set()
         if run is not None:
@@ -205,7 +205,7 @@ class Jobs(JobRecords):
     def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
         self._save_columns(job_id, dataset_id=dataset_id)
-        running = self._queue.running_of(job_id)
+        running = self._queue.find_running(job_id)
         if running is not None:
             running.progress.job = replace(running.job, dataset_id=dataset_id)
 
@@ -223,11 +223,11 @@ class Jobs(JobRecords):
 
     def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin, once a transaction is kept."""
-        session.once_kept(lambda: self.signal_cancel(ids))
+        session.call_after_commit(lambda: self.signal_cancel(ids))
 
     def signal_cancel(self, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin: without asking the database, so that it can be
-        called when a transaction is kept (``Session.once_kept``)."""
+        called when a transaction is kept (``Session.call_after_commit``)."""
         for run in self._queue.runs:
             if run.job.id in ids:
                 run.progress.cancelled.set()
@@ -332,7 +332,7 @@ class Jobs(JobRecords):
         def enter(run: JobRun) -> None:
             with self._changed:
                 entered.append(run)
-                self._queue = self._queue.joined_by(run)
+                self._queue = self._queue.with_waiting_runs(run)
 
         with self._changed:
             self._entering += 1
@@ -341,7 +341,7 @@ class Jobs(JobRecords):
         except BaseException:
             with self._changed:
                 for run in entered:
-                    self._queue = self._queue.left_by(run)
+                    self._queue = self._queue.without_run(run)
             raise
         finally:
             with self._changed:
@@ -370,7 +370,7 @@ class Jobs(JobRecords):
         if not self._workers and self._queue.waiting:
             for ready in (
                 lambda: self._queue.ready,
-                lambda: self._queue.ready_beside_running(BESIDE),
+                lambda: self._queue.list_independent_ready_runs(BESIDE),
             ):
                 # Daemons: a job that does not come to its next step must not hold the process.
                 worker = threading.Thread(
@@ -388,7 +388,7 @@ class Jobs(JobRecords):
                 log.exception("the record of a job could not be written", job=run.job.id)
             finally:
                 with self._changed:
-                    self._queue = self._queue.left_by(run)
+                    self._queue = self._queue.without_run(run)
                     # What was of its dataset may run beside another now.
                     self._changed.notify_all()
                 run.over.set()

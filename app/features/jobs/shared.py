@@ -249,7 +249,7 @@ class SharedJobs(Jobs):
         lost, self._lost = self._lost, None
         with self._changed:
             for run in self._queue.waiting:
-                self._queue = self._queue.left_by(run)
+                self._queue = self._queue.without_run(run)
         if lost is not None:
             lost.set()
 
@@ -273,7 +273,7 @@ class SharedJobs(Jobs):
                 self._enqueue_job(job)
 
     def _apply_cancellation(self, job: Job) -> None:
-        run = self._queue.running_of(job.id)
+        run = self._queue.find_running(job.id)
         if job.ending and run is not None:
             run.progress.cancelled.set()
 
@@ -284,7 +284,7 @@ class SharedJobs(Jobs):
             return
         run = JobRun(work, SharedProgress(job, lost, self._store))
         with self._changed:
-            self._queue = self._queue.joined_by(run)
+            self._queue = self._queue.with_waiting_runs(run)
             self._start_workers()
 
     @contextmanager

@@ -38,7 +38,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, compute_calibration_key
-from app.solving.match_position import FramePlace, Places, find_camera_place, find_pan
+from app.solving.match_position import FramePlace, FramePlaces, find_camera_place, find_pan
 from app.workers.executors import run_tasks
 
 _BATCH = 100
@@ -346,7 +346,7 @@ def _estimate_match(
     """Positions by group and view; runs in a worker."""
     found = list(_calibrated_alone(task))
     places = [place for _, _, place in found if place is not None]
-    every, row = Places(places), iter(range(len(places)))
+    every, row = FramePlaces(places), iter(range(len(places)))
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without(next(row))

@@ -22,7 +22,7 @@ NOISE = "noise"
 """Kind of the log's entries on noise: what is accepted for a dataset, and one for each group."""
 
 
-class Factor(NamedTuple):
+class NoiseFactor(NamedTuple):
     """How noisy balls of a camera that a person places are beside the dataset's.
 
     Attributes:
@@ -36,7 +36,7 @@ class Factor(NamedTuple):
     ratio: float
 
 
-Factors = tuple[Factor, ...]
+Factors = tuple[NoiseFactor, ...]
 
 
 def read_factors(session: Session, dataset_id: int) -> Factors:
@@ -51,7 +51,7 @@ def factors_from_text(text: str | None) -> Factors:
     if text is None:
         return ()
     with report_damaged_values():
-        return tuple(Factor(*row) for row in parse_json_column(text))
+        return tuple(NoiseFactor(*row) for row in parse_json_column(text))
 
 
 def write_factors(session: Session, dataset_id: int, factors: Factors) -> None:
@@ -66,7 +66,9 @@ def factors_to_json(factors: Factors) -> Json:
     return [list(item) for item in factors]
 
 
-def find_noise_factor(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
+def find_noise_factor(
+    factors: Sequence[NoiseFactor], camera: str | None, person: str | None
+) -> float:
     """How noisy a ball is beside the dataset's; a camera or person that is not named is any other."""
     known = {(item.camera, item.person): item.ratio for item in factors}
     cameras, people = {item.camera for item in factors}, {item.person for item in factors}

@@ -19,7 +19,7 @@ from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import list_station_pitches
 from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.stations.service import StationState, load_station, submit_stations, undo_stations
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
 from app.soccer.codec import digest, lines_to_json
@@ -270,7 +270,7 @@ def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:
     lines = {}
     for size in {state.station.size for state in states}:
         keys = {state.station.key for state in states if state.station.size == size}
-        for file in read_line_files(path, size, Report()):
+        for file in read_line_files(path, size, ReaderReport()):
             if file.stem in keys:
                 lines[file.stem] = file.lines
     if not lines:

@@ -26,7 +26,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
-from app.solving.ball_noise import Sigma
+from app.solving.ball_noise import SigmaEstimate
 from app.solving.line_noise import LineEstimate
 
 positions_router = APIRouter(
@@ -101,9 +101,11 @@ class RigTakenBack(BaseModel):
 class BallNoiseDocument(Document):
     """Noise of annotated balls; null where no groups say anything."""
 
-    click: Sigma | None = Field(description="Of a coordinate of a ball's centre.")
+    click: SigmaEstimate | None = Field(description="Of a coordinate of a ball's centre.")
     share: float | None = Field(description="What the ball's diameter adds, as a share of it.")
-    given: Sigma | None = Field(description="What a given camera of unknown exactness adds.")
+    given: SigmaEstimate | None = Field(
+        description="What a given camera of unknown exactness adds."
+    )
 
 
 class SourceNoiseDocument(Document):

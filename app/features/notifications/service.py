@@ -68,7 +68,7 @@ def notify_person(
     if row is None or row.disabled:
         return False
     roles = read_roles(session, row.id, Role(row.role))
-    if dataset_id is not None and roles.role_in(dataset_id) is Role.NONE:
+    if dataset_id is not None and roles.find_role_in(dataset_id) is Role.NONE:
         return False
     at = now()
     delete_notifications(session, row.id, _oldest_shown_time())

@@ -41,7 +41,7 @@ LASTS = timedelta(days=400)
 _NONCE_BYTES = 16
 
 
-class Devices:
+class DeviceTokens:
     """Makes and recognises the tokens that browsers keep after a login.
 
     A token ends after ``LASTS``, and with the password that its person had then.
@@ -210,7 +210,7 @@ def make_pending_actions(store: Store, clock: Clock, lasts: timedelta, kind: str
     return InMemoryPending(clock, lasts)
 
 
-class Challenges:
+class PasskeyChallenges:
     """Challenges of passkeys."""
 
     def __init__(self, waiting: PendingActions):

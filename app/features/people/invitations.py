@@ -12,12 +12,12 @@ from urllib.parse import urlsplit
 
 from app.db.store import Store
 from app.errors import InputError, ReviewError
-from app.features.people.links import Link
+from app.features.people.links import PasswordLink
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role, normalize_user_name, require_no_token
 from app.features.people.service import Person, insert_invited, invite, renew_link
 from app.json_text import Moment, quoted
-from app.mail import Letter, MailServer, parse_mail_address
+from app.mail import MailMessage, MailServer, parse_mail_address
 
 MOST = 500
 """People in one list."""
@@ -79,8 +79,8 @@ class LinkMailer:
     url: str | None
     base: str
 
-    def hand_over(
-        self, rows: Sequence[tuple[Invitation, Link, str | None]], by: str
+    def send_links(
+        self, rows: Sequence[tuple[Invitation, PasswordLink, str | None]], by: str
     ) -> list[Invitation]:
         """Send the links of those who have an address; what is not sent is shown.
 
@@ -118,7 +118,7 @@ def invite_one(
     address = parse_mail_address(email, pointer="/email") if email else None
     person, link = invite(store, name, role, actor=actor)
     row = Invitation(1, person.name, person.role, "invited", expires=link.expires)
-    return person, post.hand_over([(row, link, address)], actor)[0]
+    return person, post.send_links([(row, link, address)], actor)[0]
 
 
 def renew_one(
@@ -136,7 +136,7 @@ def renew_one(
     person, link = renew_link(store, person_id, actor=actor)
     state: Literal["reset", "invited"] = "reset" if person.joined else "invited"
     row = Invitation(1, person.name, person.role, state, expires=link.expires)
-    return person, post.hand_over([(row, link, address)], actor)[0]
+    return person, post.send_links([(row, link, address)], actor)[0]
 
 
 def invite_many(
@@ -161,7 +161,7 @@ def invite_many(
             f"a list has 1 to {MOST} people, and this one {len(wanted):,}", pointer="/people"
         )
     refused: list[Invitation] = []
-    made: list[tuple[Invitation, Link | None, str | None]] = []
+    made: list[tuple[Invitation, PasswordLink | None, str | None]] = []
     with store.read() if dry_run else store.write() as session:
         seen: dict[str, int] = {}
         for one in wanted:
@@ -182,7 +182,7 @@ def invite_many(
     done = [row for row, link, _ in made if link is None]
     links = [(row, link, address) for row, link, address in made if link is not None]
     # After the transaction: a slow mail server keeps nobody from writing.
-    return sorted([*refused, *done, *post.hand_over(links, actor)], key=lambda row: row.row)
+    return sorted([*refused, *done, *post.send_links(links, actor)], key=lambda row: row.row)
 
 
 def read_list(text: str) -> list[InvitationRow]:
@@ -249,7 +249,9 @@ def _refused_invitation(one: InvitationRow, problem: str) -> Invitation:
     return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
 
 
-def _invitation_letter(url: str, row: Invitation, link: Link, address: str, by: str) -> Letter:
+def _invitation_letter(
+    url: str, row: Invitation, link: PasswordLink, address: str, by: str
+) -> MailMessage:
     host = urlsplit(url).hostname
     until = f"{datetime.fromisoformat(link.expires):%d %B %Y, %H:%M} UTC"
     if row.state == "reset":
@@ -258,7 +260,7 @@ def _invitation_letter(url: str, row: Invitation, link: Link, address: str, by: 
     else:
         subject = f"Your account on Touchline at {host}"
         why = f"{by} invites you to Touchline at {url} as {row.role}."
-    return Letter(
+    return MailMessage(
         address,
         subject,
         f"Hello {row.name},\n\n{why}\n\nChoose your password here:\n\n{link.address(url)}\n\n"

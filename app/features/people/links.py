@@ -119,7 +119,7 @@ ASK = "Ask an admin of this server for a new one."
 
 
 @dataclass(frozen=True)
-class Link:
+class PasswordLink:
     """A link, which is shown to whoever asked for it, once: the database has its hash alone."""
 
     token: str
@@ -143,7 +143,7 @@ class LinkHolder:
     joined: bool
 
 
-def make_first_link(store: Store, *, actor: str) -> Link | None:
+def make_first_link(store: Store, *, actor: str) -> PasswordLink | None:
     """A link that makes the first admin; None where there is one who can log in."""
     with store.write() as session:
         if count_people_who_can_log_in(session, Role.ADMIN):
@@ -153,11 +153,11 @@ def make_first_link(store: Store, *, actor: str) -> Link | None:
 
 def insert_new(
     session: Session, person_id: int | None, *, by: str, at: datetime, lasts: timedelta = LASTS
-) -> Link:
+) -> PasswordLink:
     """Make a link for a person (None: for the first admin), in the caller's transaction."""
     token, expires = make_random_token(), text_of(at + lasts)
     insert_link(session, hash_token(token), person_id, by=by, expires=expires)
-    return Link(token, expires)
+    return PasswordLink(token, expires)
 
 
 def find_link_holder(store: Store, token: str) -> LinkHolder:

@@ -28,7 +28,7 @@ from app.features.people.login_queries import (
     update_login_last_use,
 )
 from app.features.people.queries import (
-    Rights,
+    DatasetRights,
     find_person_by_id,
     find_person_by_name,
     find_rights,
@@ -136,7 +136,7 @@ class Login:
         return RestrictedReader(
             self.name,
             self.roles.blind,
-            lambda one: role_allows(self.roles.role_in(one), Action.REVIEW),
+            lambda one: role_allows(self.roles.find_role_in(one), Action.REVIEW),
         )
 
 
@@ -152,7 +152,7 @@ class OpenSession:
     expires: str
 
 
-class Logins:
+class LoginSessions:
     """Everything that is asked of sessions.
 
     Args:
@@ -371,20 +371,22 @@ def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRol
     return dataset_roles_from_rights(everywhere, find_rights(session, person_id, LEADING))
 
 
-def dataset_roles_from_rights(everywhere: Role, rights: Rights) -> DatasetRoles:
+def dataset_roles_from_rights(everywhere: Role, rights: DatasetRights) -> DatasetRoles:
     """The rights of somebody who is that everywhere; in copies they are what they are in what those
     are of."""
     if everywhere is Role.ADMIN:
         return DatasetRoles(everywhere)
     single = {key: Role(role) for key, role in rights.roles.items()}
     roles = DatasetRoles(everywhere, single)
-    copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
+    copies = {key: roles.find_role_in(of_id) for key, of_id in rights.copies.items()}
     return DatasetRoles(
         everywhere, {**single, **copies}, blind=_blind_batches_by_dataset(roles, rights)
     )
 
 
-def _blind_batches_by_dataset(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
+def _blind_batches_by_dataset(
+    roles: DatasetRoles, rights: DatasetRights
+) -> dict[int, frozenset[int]]:
     """The batches in which somebody annotates blind, by dataset.
 
     Leads see everything. Who judges decides where people differ: also in a batch of their own, once
@@ -392,7 +394,7 @@ def _blind_batches_by_dataset(roles: DatasetRoles, rights: Rights) -> dict[int, 
     """
     found: dict[int, frozenset[int]] = {}
     for batch, dataset, waits in rights.blind:
-        role = roles.role_in(dataset)
+        role = roles.find_role_in(dataset)
         if role_allows(role, Action.LEAD) or (role_allows(role, Action.REVIEW) and not waits):
             continue
         found[dataset] = found.get(dataset, frozenset()) | {batch}

@@ -81,7 +81,7 @@ def find_role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
     if roles.is_admin:
         return Role.ADMIN
     if found.dataset is not None:
-        return roles.role_in(found.dataset)
+        return roles.find_role_in(found.dataset)
     mine = any(is_actor_of(owner, name) for owner in found.owners)
     return roles.highest if mine else Role.NONE
 

@@ -29,7 +29,7 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import Challenges, make_pending_actions
+from app.features.people.devices import PasskeyChallenges, make_pending_actions
 from app.features.people.links import hash_token
 from app.features.people.login_queries import (
     delete_logins,
@@ -39,7 +39,7 @@ from app.features.people.login_queries import (
     list_passkeys,
     update_passkey_use,
 )
-from app.features.people.logins import Login, LoginMethod, Logins
+from app.features.people.logins import Login, LoginMethod, LoginSessions
 from app.features.people.queries import count_recovery_codes, find_person_by_id, put_recovery_codes
 from app.features.people.roles import log_account_event
 from app.features.people.second_factor import (
@@ -102,11 +102,11 @@ class Passkeys:
     def __init__(
         self,
         store: Store,
-        logins: Logins,
+        logins: LoginSessions,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ):
         self._store, self._logins, self._clock = store, logins, clock
-        self._challenges = Challenges(make_pending_actions(store, clock, LASTS, "passkey"))
+        self._challenges = PasskeyChallenges(make_pending_actions(store, clock, LASTS, "passkey"))
 
     def of(self, person_id: int) -> list[Passkey]:
         """The passkeys of a person, the oldest first."""

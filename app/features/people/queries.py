@@ -147,7 +147,7 @@ def list_people_with_valid_links(session: Session, at: str) -> set[int]:
 
 
 @dataclass(frozen=True)
-class Rights:
+class DatasetRights:
     """What a person is in single datasets.
 
     Attributes:
@@ -178,19 +178,19 @@ def select_with_rights(
     )
 
 
-def rights_from_row(row: Any) -> Rights:
+def rights_from_row(row: Any) -> DatasetRights:
     """The rights that a row of such a statement tells."""
     blind = ((batch, dataset, bool(waits)) for batch, dataset, waits in json.loads(row.blind))
-    return Rights(dict(json.loads(row.single)), dict(json.loads(row.copies)), tuple(blind))
+    return DatasetRights(dict(json.loads(row.single)), dict(json.loads(row.copies)), tuple(blind))
 
 
-def find_rights(session: Session, person_id: int, leading: Collection[str]) -> Rights:
+def find_rights(session: Session, person_id: int, leading: Collection[str]) -> DatasetRights:
     """The rights of one person; none where there is nobody of that id."""
     statement = select_with_rights(
         select(PersonModel.id).where(PersonModel.id == person_id), leading
     )
     row = session.execute(statement).one_or_none()
-    return Rights({}, {}) if row is None else rights_from_row(row)
+    return DatasetRights({}, {}) if row is None else rights_from_row(row)
 
 
 def _roles_column() -> ColumnElement[Any]:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.errors import ForbiddenError, InputError
 from app.features.people.visibility_queries import COPIES
@@ -141,7 +141,7 @@ class DatasetRoles:
         """Whether they may do everything in every dataset."""
         return self.everywhere is Role.ADMIN
 
-    def role_in(self, dataset_id: int | None) -> Role:
+    def find_role_in(self, dataset_id: int | None) -> Role:
         """What they are in a dataset; of one that is yet to be made (None) what they are everywhere."""
         if self.is_admin or dataset_id is None:
             return self.everywhere
@@ -158,7 +158,7 @@ class DatasetRoles:
 
     def only(self, dataset_id: int) -> DatasetRoles:
         """The same rights in one dataset, and none in any other."""
-        role = self.role_in(dataset_id)
+        role = self.find_role_in(dataset_id)
         return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
 
     def led_datasets(self) -> Visibility:
@@ -232,4 +232,4 @@ def log_account_event(
     body = {"person": name, "did": did, "role": str(role), **more}
     dataset = more.get("dataset_id")
     where = dataset if isinstance(dataset, int) else None
-    append_entries(session, [Entry(PERSON, actor, now(), body, where)])
+    append_entries(session, [NewLogEntry(PERSON, actor, now(), body, where)])

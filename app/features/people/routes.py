@@ -35,7 +35,7 @@ from app.http.deps import AppStore, DatasetPath, DryRun, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route, SecretRoute
-from app.http.team import AppTeam, Team
+from app.http.team import AppTeam, TeamLogin
 
 users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRoute)
 
@@ -58,7 +58,7 @@ def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
     return _list_users(store, team)
 
 
-def _list_users(store: Store, team: Team) -> UserList:
+def _list_users(store: Store, team: TeamLogin) -> UserList:
     by_mail = team.mail is not None and team.url is not None
     return UserList(
         items=people.list_people(store), adopted_by=find_owner_of_local_work(store), mail=by_mail
@@ -118,7 +118,7 @@ def invite_users(
     )
 
 
-def _make_mailer(team: Team, request: Request) -> LinkMailer:
+def _make_mailer(team: TeamLogin, request: Request) -> LinkMailer:
     return LinkMailer(team.mail, team.url, team.base(request))
 
 

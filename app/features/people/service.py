@@ -12,7 +12,7 @@ from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.features.datasets.queries import find_dataset, read_dataset_names
 from app.features.independent_annotations.queries import list_copy_dataset_ids
-from app.features.people.links import Link, insert_new
+from app.features.people.links import PasswordLink, insert_new
 from app.features.people.login_queries import (
     count_access_tokens,
     delete_access_tokens,
@@ -121,7 +121,7 @@ def require_no_people(store: Store) -> None:
         )
 
 
-def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, Link]:
+def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, PasswordLink]:
     """Make an account, and the link with which its person chooses a password.
 
     Raises:
@@ -141,14 +141,16 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
         return _read_person(session, person), link
 
 
-def insert_invited(session: Session, name: str, role: Role, *, actor: str) -> tuple[int, Link]:
+def insert_invited(
+    session: Session, name: str, role: Role, *, actor: str
+) -> tuple[int, PasswordLink]:
     """Make the account of a checked name that nobody has, in the caller's transaction; id and link."""
     person = insert_person(session, name, role, by=actor)
     log_account_event(session, actor, name, "invited", role)
     return person, insert_new(session, person, by=actor, at=datetime.now(UTC))
 
 
-def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Link]:
+def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, PasswordLink]:
     """A new link for somebody; the password that they have stays good until they use it.
 
     Raises:

@@ -44,7 +44,7 @@ from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import SecretRoute
-from app.http.team import AppTeam, Team
+from app.http.team import AppTeam, TeamLogin
 from app.soccer.actors import LOCAL_USER
 
 router = APIRouter(tags=["sessions"], route_class=SecretRoute)
@@ -94,7 +94,7 @@ def make_session_document(login: Login | None, store: Store) -> SessionDocument:
 @open_to_all
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
-    team: Team | None = request.app.state.team
+    team: TeamLogin | None = request.app.state.team
     if team is None:
         every = ALLOWS[Role.ADMIN]
         return SessionDocument(
@@ -133,7 +133,7 @@ def log_in(
 
 
 def _begin_session(
-    team: Team,
+    team: TeamLogin,
     store: Store,
     request: Request,
     response: Response,

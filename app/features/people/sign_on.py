@@ -26,7 +26,7 @@ from app.features.people.login_queries import (
     put_identity,
     update_identity_use,
 )
-from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, LoginMethod, Logins
+from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, LoginMethod, LoginSessions
 from app.features.people.provider import LoginRequest, Provider
 from app.features.people.queries import (
     find_person_by_id,
@@ -101,7 +101,7 @@ class SignOn:
     def __init__(
         self,
         store: Store,
-        logins: Logins,
+        logins: LoginSessions,
         rules: SignOnRules,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ):

@@ -20,7 +20,12 @@ from app.features.datasets.service import need_dataset, read_dataset_head, save_
 from app.features.groups.group_edits import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy_dataset
-from app.features.match_estimates.queries import Factor, Factors, find_noise_factor, read_factors
+from app.features.match_estimates.queries import (
+    Factors,
+    NoiseFactor,
+    find_noise_factor,
+    read_factors,
+)
 from app.features.policies.service import (
     CUSTOM,
     PolicyState,
@@ -30,7 +35,7 @@ from app.features.policies.service import (
 )
 from app.features.solutions.queries import find_newest_solution_id, list_solved_groups
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
-from app.solving.ball_noise import BallNoise, RayResidual, Sigma
+from app.solving.ball_noise import BallNoise, RayResidual, SigmaEstimate
 from app.solving.dataset_noise import (
     BallSource,
     DatasetNoise,
@@ -293,7 +298,7 @@ def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
     for camera in cameras:
         for person in people:
             sources = (BallSource("camera", camera), BallSource("person", person))
-            factors.append(Factor(camera or None, person or None, found.factor(sources)))
+            factors.append(NoiseFactor(camera or None, person or None, found.factor(sources)))
     return tuple(factors) if any(item.ratio != 1 for item in factors) else ()
 
 
@@ -337,7 +342,7 @@ def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]
             yield _threshold_advice(f"{CALIBRATION}.{name}", ends, policy)
 
 
-def _make_interval(sigma: Sigma) -> tuple[float, float, float]:
+def _make_interval(sigma: SigmaEstimate) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
 

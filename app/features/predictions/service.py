@@ -36,7 +36,7 @@ from app.features.predictions.queries import (
 )
 from app.features.predictions.reader import PredictionFiles, Read, read_files
 from app.formats.file_tree import Limits
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.json_text import canonical_json_text, quoted
 from app.object_store.path import unseal_address
@@ -319,7 +319,7 @@ def _reading_report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Js
     }
 
 
-def _list_problems(*reports: Report) -> dict[str, Any]:
+def _list_problems(*reports: ReaderReport) -> dict[str, Any]:
     every = [problem for report in reports for problem in report.problems]
     dropped = sum(report.dropped for report in reports)
     return {

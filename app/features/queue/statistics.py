@@ -143,7 +143,7 @@ UNKNOWN, NOWHERE = -1, -2
 
 
 @dataclass(frozen=True, eq=False)
-class Counted:
+class StatisticsColumns:
     """Groups as statistics count them: 21 bytes each, whatever was measured.
 
     Attributes:
@@ -180,7 +180,7 @@ def read_statistics(store: Store, dataset_id: int, query: str = "") -> Statistic
     return make_statistics(count_rows(rows))
 
 
-def count_rows(rows: Sequence[Any]) -> Counted:
+def count_rows(rows: Sequence[Any]) -> StatisticsColumns:
     """Rows of ``COLUMNS`` as they are counted."""
     nothing: list[tuple[Any, ...]] = [()] * len(COLUMNS)
     split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
@@ -188,7 +188,7 @@ def count_rows(rows: Sequence[Any]) -> Counted:
     splits, matches = sorted(set(split)), sorted(set(match))
     of_split = {name: place for place, name in enumerate(splits)}
     of_match = {name: place for place, name in enumerate(matches)}
-    return Counted(
+    return StatisticsColumns(
         splits=tuple(splits),
         matches=tuple(matches),
         split=np.array([of_split[name] for name in split], np.int32),
@@ -206,7 +206,7 @@ def count_rows(rows: Sequence[Any]) -> Counted:
     )
 
 
-def make_statistics(found: Counted) -> Statistics:
+def make_statistics(found: StatisticsColumns) -> Statistics:
     """The statistics of groups."""
     return Statistics(
         groups=found.groups,
@@ -252,7 +252,7 @@ def _pitch_cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
 
 
 def _make_histogram(
-    measure: Measure, place: npt.NDArray[np.int8], found: Counted
+    measure: Measure, place: npt.NDArray[np.int8], found: StatisticsColumns
 ) -> MeasureHistogram:
     bins = len(measure.edges) - 1
     # NOWHERE, UNKNOWN, and the bins, of each split.
@@ -285,7 +285,7 @@ def _make_positions(cell: npt.NDArray[np.int16]) -> Positions:
 
 
 def _make_shares(
-    found: Counted, match: npt.NDArray[np.int32], matches: Sequence[str]
+    found: StatisticsColumns, match: npt.NDArray[np.int32], matches: Sequence[str]
 ) -> tuple[Share, ...]:
     width = max(len(found.splits), 1)
     code = match.astype(np.int64) * width + found.split

@@ -70,7 +70,7 @@ class RecordingFrames:
         asked = (recording.path, sha256, number, width, self._settings)
         return self._pool.submit(read_jpeg, *asked, explain=explain)
 
-    def ask_ahead(self, recording: Recording, number: int) -> None:
+    def request_frames_beside(self, recording: Recording, number: int) -> None:
         """Have the frames beside one decoded, one after the other, as long as nobody waits for any."""
         if recording.sha256 is not None:
             self._go_on(recording.path, recording.sha256, number, self._settings)

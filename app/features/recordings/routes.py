@@ -171,7 +171,7 @@ async def get_frame(
     data = await task.result_unless_client_gone(request.is_disconnected)
     if data is None:
         return Response(status_code=CLIENT_GONE)
-    services.recordings.ask_ahead(found, frame)
+    services.recordings.request_frames_beside(found, frame)
     return Response(data, media_type=JPEG, headers=headers)
 
 

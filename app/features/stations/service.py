@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.db.json_columns import Json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
@@ -237,7 +237,9 @@ def _solve_encoded(
 def _save_change(session: Session, state: StationState, change: _StationChange, actor: str) -> None:
     save_station(session, state.stored, change.station)
     refresh_inputs_hashes(session, state.groups)
-    entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
+    entry = NewLogEntry(
+        change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id
+    )
     append_entries(session, [entry])
 
 

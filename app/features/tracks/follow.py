@@ -288,7 +288,9 @@ def _expected(state: GroupState, key: str, camera: Camera, size: ImageSize) -> l
 def ask_follow(frames: Frames, question: FollowQuestion) -> PoolTask:
     """Have a ball followed in a worker process; ``followed_views`` makes of its result what is told."""
     view = question.view
-    return frames.ask_of(question.media, view.flipped, follow_through, question.sequence)
+    return frames.request_work_on_frame(
+        question.media, view.flipped, follow_through, question.sequence
+    )
 
 
 def followed_views(question: FollowQuestion, found: FollowedSequence) -> FollowedViews:

@@ -44,7 +44,7 @@ from app.features.recordings.links import (
 )
 from app.features.recordings.service import Recording, get_recording, groups_taken
 from app.features.tracks.service import list_tracks, read_track
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.progress import ReportProgress
@@ -169,7 +169,7 @@ def link_by_ball(
         row = need_link(session, recording_id, link_id)
     live, replay = shots_of_link(row)
     live_times, times = link_seconds(store.settings, row)
-    report = Report()
+    report = ReaderReport()
     sides = [
         _rays(store, shot, seconds, (live, replay), uploads.get(name), report, link_id)
         for name, shot, seconds in (("live", live, live_times), ("replay", replay, times))
@@ -212,7 +212,7 @@ def _rays(
     seconds: FloatArray,
     shots: Sequence[LinkedShot],
     upload: str | None,
-    report: Report,
+    report: ReaderReport,
     link_id: int,
 ) -> tuple[BallRays, int]:
     """The rays of the ball in a shot, and how many frames with a ball have no camera, or are of another shot."""
@@ -279,7 +279,7 @@ def ball_places(
     return found
 
 
-def _of_file(settings: Settings, upload: str, report: Report) -> dict[int, _Seen]:
+def _of_file(settings: Settings, upload: str, report: ReaderReport) -> dict[int, _Seen]:
     """Where a ``ball.csv`` says that the ball is, by frame of its recording."""
     rows = read_ball(upload_path(settings, upload), get_upload(settings, upload).name, report)
     return {frame: (pixel, None) for frame, _, pixel in rows}

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.db.idempotency import read_progress, save_progress
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
@@ -371,7 +371,7 @@ class BatchRun:
         at = now()
         body = {"batch": self.batch, "q": self._query, "changed": self.changed}
         body |= asdict(self._verdict) | self._again
-        entry = Entry("verdict_batch", self._actor, at, body, self._dataset_id)
+        entry = NewLogEntry("verdict_batch", self._actor, at, body, self._dataset_id)
         (log_id,) = append_entries(session, [entry])
         update_batch(session, self.batch, log_id=log_id)
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
@@ -112,7 +112,7 @@ def _close_batch(
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
     update_batch(session, batch.id, undone=at, undone_by=actor)
-    entry = Entry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
+    entry = NewLogEntry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
     append_entries(session, [entry])
 
 

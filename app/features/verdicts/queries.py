@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 from sqlalchemy import Table, bindparam, case, func, insert, select, update
 
 from app.db.json_columns import parse_json_column
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session
 from app.features.batches.completion_queries import complete_judged_groups
 from app.features.datasets.tables import GroupModel
@@ -160,7 +160,7 @@ def insert_verdicts(
     entries = []
     for row in rows:
         body = {name: value for name, value in row.items() if name not in ("id", "group_id")}
-        entries.append(Entry("verdict", actor, at, body, dataset_id, row["group_id"]))
+        entries.append(NewLogEntry("verdict", actor, at, body, dataset_id, row["group_id"]))
     append_entries(session, entries)
     if dataset_id <= COPIES:
         states = {verdict.group_id: verdict.state for verdict in given}

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.db.json_columns import Json, compress_json
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
@@ -441,6 +441,6 @@ def _save_version(
 ) -> Version:
     identity = insert_version(session, values, rows)
     body = {"version": identity, "name": values["name"], "hash": values["hash"]}
-    entry = Entry("freeze", values["actor"], values["created"], body, values["dataset_id"])
+    entry = NewLogEntry("freeze", values["actor"], values["created"], body, values["dataset_id"])
     append_entries(session, [entry])
     return read_version(session, identity)

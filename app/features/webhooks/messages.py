@@ -25,7 +25,7 @@ from app.features.webhooks.queries import list_jobs_ended_since, list_log_entrie
 from app.json_text import canonical_json_text
 
 
-class Kind(StrEnum):
+class MessageKind(StrEnum):
     """What a message tells of."""
 
     CHANGED = "group.changed"
@@ -55,38 +55,38 @@ class Kind(StrEnum):
     """Somebody tries whether messages arrive; every webhook gets it."""
 
 
-CHOSEN = tuple(kind for kind in Kind if kind is not Kind.PING)
+CHOSEN = tuple(kind for kind in MessageKind if kind is not MessageKind.PING)
 """Kinds that a webhook asks for."""
 MOST = 500
 """Entries of the log in one message."""
 _OF_LOG = {
-    "edit": Kind.CHANGED,
-    "undo": Kind.CHANGED,
-    "redo": Kind.CHANGED,
-    "verdict": Kind.JUDGED,
-    "dismissal": Kind.JUDGED,
-    "comment": Kind.COMMENTED,
-    "freeze": Kind.FROZEN,
+    "edit": MessageKind.CHANGED,
+    "undo": MessageKind.CHANGED,
+    "redo": MessageKind.CHANGED,
+    "verdict": MessageKind.JUDGED,
+    "dismissal": MessageKind.JUDGED,
+    "comment": MessageKind.COMMENTED,
+    "freeze": MessageKind.FROZEN,
 }
-_OF_JOBS = {DONE: Kind.JOB_DONE, FAILED: Kind.JOB_FAILED}
+_OF_JOBS = {DONE: MessageKind.JOB_DONE, FAILED: MessageKind.JOB_FAILED}
 
 
 @dataclass(frozen=True)
-class Message:
+class WebhookMessage:
     """One thing to tell; ``id`` is the same however often it is sent.
 
     ``log_id``, or ``ended`` and ``job_id``, are up to where the log or the jobs are told with it.
     """
 
     id: str
-    kind: Kind
+    kind: MessageKind
     body: str
     log_id: int = 0
     ended: str = ""
     job_id: int = 0
 
 
-def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]:
+def read_messages(session: Session, webhook: Any, dataset: str) -> list[WebhookMessage]:
     """What has happened since a webhook was told last, its kinds and others."""
     entries = list_log_entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
     place = (webhook.jobs_until, webhook.job_id)
@@ -97,20 +97,22 @@ def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]
     ]
 
 
-def make_ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
+def make_ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> WebhookMessage:
     """A message that says nothing."""
     stamp = "".join(letter for letter in at if letter.isdigit())
-    body = _message_body(Kind.PING, at, {"dataset": dataset, "actor": actor})
-    return Message(f"msg_{webhook_id}_ping{stamp}", Kind.PING, body)
+    body = _message_body(MessageKind.PING, at, {"dataset": dataset, "actor": actor})
+    return WebhookMessage(f"msg_{webhook_id}_ping{stamp}", MessageKind.PING, body)
 
 
-def _messages_of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[Message]:
+def _messages_of_log(
+    webhook_id: int, dataset: str, entries: Sequence[Any]
+) -> Iterator[WebhookMessage]:
     """Entries of one kind by one person that follow each other become one message."""
 
-    def what(row: Any) -> tuple[Kind, str]:
-        kind = _OF_LOG.get(row.kind.removeprefix("station_"), Kind.DATASET)
+    def what(row: Any) -> tuple[MessageKind, str]:
+        kind = _OF_LOG.get(row.kind.removeprefix("station_"), MessageKind.DATASET)
         return (
-            kind if row.group_id is not None or kind is Kind.FROZEN else Kind.DATASET
+            kind if row.group_id is not None or kind is MessageKind.FROZEN else MessageKind.DATASET
         ), row.actor
 
     for (kind, actor), rows in groupby(entries, what):
@@ -124,7 +126,7 @@ def _messages_of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> I
                 for row in found
             ],
         }
-        yield Message(
+        yield WebhookMessage(
             f"msg_{webhook_id}_log{first}-{last}",
             kind,
             _message_body(kind, found[-1].at, data),
@@ -132,7 +134,9 @@ def _messages_of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> I
         )
 
 
-def _messages_of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Message]:
+def _messages_of_jobs(
+    webhook_id: int, dataset: str, jobs: Sequence[Any]
+) -> Iterator[WebhookMessage]:
     for row in jobs:
         kind = _OF_JOBS[row.state]
         data = {
@@ -142,10 +146,10 @@ def _messages_of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Ite
         }
         body = _message_body(kind, row.ended, data)
         name = f"msg_{webhook_id}_job{row.id}"
-        yield Message(name, kind, body, ended=row.ended, job_id=row.id)
+        yield WebhookMessage(name, kind, body, ended=row.ended, job_id=row.id)
 
 
-def _message_body(kind: Kind, at: str, data: Json) -> str:
+def _message_body(kind: MessageKind, at: str, data: Json) -> str:
     return canonical_json_text({"type": str(kind), "timestamp": at, "data": data})
 
 

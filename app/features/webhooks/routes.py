@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.webhooks import service as webhooks
-from app.features.webhooks.messages import CHOSEN, Kind
+from app.features.webhooks.messages import CHOSEN, MessageKind
 from app.features.webhooks.sender import LONGEST
 from app.features.webhooks.service import Delivery, Webhook
 from app.http.cursor import Before, Cursor, paged, parse_descending_cursor
@@ -19,7 +19,7 @@ from app.http.problem import responses
 from app.http.route import SecretRoute
 
 Url = Annotated[str, Field(min_length=1, max_length=LONGEST)]
-Kinds = Annotated[list[Kind], Field(min_length=1, max_length=len(CHOSEN))]
+Kinds = Annotated[list[MessageKind], Field(min_length=1, max_length=len(CHOSEN))]
 URL = "https://hooks.example.org/touchline"
 
 
@@ -59,7 +59,7 @@ class WebhookList(ListDocument[Webhook]):
     """Webhooks of a dataset, and what they may be."""
 
     allowed: list[str] = Field(description="How the operator lets addresses begin.")
-    kinds: list[Kind] = Field(description="Kinds of messages a webhook can get.")
+    kinds: list[MessageKind] = Field(description="Kinds of messages a webhook can get.")
 
 
 class WebhookWithSecret(Document):

@@ -22,7 +22,7 @@ from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalled_batches
 from app.features.datasets.queries import read_dataset_names
 from app.features.webhooks.messages import (
-    Message,
+    WebhookMessage,
     derive_webhook_secret,
     read_messages,
     sign_message,
@@ -221,7 +221,7 @@ class WebhookSender:
                 if messages and still.get(row.id) == row
             )
 
-    def look_for_stalls(self) -> int:
+    def queue_stall_messages(self) -> int:
         """Write down which batches have stalled, now and then; returns how many messages that makes."""
         at, last = self._clock(), self._stalls_at
         if last is not None and (at - last).total_seconds() < STALLS_SECONDS:
@@ -274,7 +274,7 @@ class WebhookSender:
     def _run_once(self) -> float:
         """Tell and send all that can be; seconds until the next look."""
         self.look()
-        self.look_for_stalls()
+        self.queue_stall_messages()
         while not self._closing.is_set() and self.send():
             pass
         return self._seconds_until_next_due()
@@ -350,7 +350,7 @@ def _tls_context() -> ssl.SSLContext:
     return httpx.create_ssl_context(trust_env=False)
 
 
-def _queue_messages(session: Session, row: Any, messages: Sequence[Message]) -> int:
+def _queue_messages(session: Session, row: Any, messages: Sequence[WebhookMessage]) -> int:
     wanted = set(parse_json_column(row.kinds))
     made = 0
     for message in messages:

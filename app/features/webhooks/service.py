@@ -16,7 +16,7 @@ from app.features.datasets.queries import read_dataset_name
 from app.features.datasets.service import dataset_id
 from app.features.webhooks.messages import (
     CHOSEN,
-    Kind,
+    MessageKind,
     derive_webhook_secret,
     make_ping_message,
     make_salt,
@@ -58,7 +58,7 @@ class Webhook:
 
     id: int
     url: str
-    kinds: list[Kind]
+    kinds: list[MessageKind]
     off: str | None
     created: Moment
     created_by: str
@@ -81,7 +81,7 @@ class Delivery:
 
     id: int
     message: str
-    kind: Kind
+    kind: MessageKind
     body: str
     created: Moment
     state: Literal["waiting", "delivered", "failed"]
@@ -99,7 +99,7 @@ def list_webhooks(store: Store, dataset: str) -> list[Webhook]:
 
 
 def make_webhook(
-    store: Store, dataset: str, url: str, kinds: Iterable[Kind], *, actor: str
+    store: Store, dataset: str, url: str, kinds: Iterable[MessageKind], *, actor: str
 ) -> tuple[Webhook, str]:
     """A webhook that is told what happens from now on, and its secret, which is shown this once.
 
@@ -126,7 +126,7 @@ def change_webhook(
     webhook_id: int,
     *,
     url: str | None = None,
-    kinds: Iterable[Kind] | None = None,
+    kinds: Iterable[MessageKind] | None = None,
     on: bool | None = None,
     actor: str,
 ) -> Webhook:
@@ -206,7 +206,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
     number = dataset_id(store, dataset)
     with store.write() as session:
         _require_on(_read_webhook(session, number, webhook_id))
-        waiting = find_waiting_delivery(session, webhook_id, Kind.PING)
+        waiting = find_waiting_delivery(session, webhook_id, MessageKind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
             return _delivery_from_row(find_delivery(session, webhook_id, waiting.id))
@@ -222,9 +222,9 @@ def _require_on(webhook: Webhook) -> None:
         )
 
 
-def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:
+def _checked_kinds(kinds: Iterable[MessageKind]) -> list[str]:
     chosen = sorted({str(kind) for kind in kinds})
-    if not chosen or Kind.PING in chosen:
+    if not chosen or MessageKind.PING in chosen:
         raise InputError(
             "a webhook needs at least one kind of message",
             hint=f"Kinds are {', '.join(CHOSEN)}.",
@@ -250,11 +250,11 @@ def _webhook_from_row(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhoo
     waiting, delivered, failed = (
         counts.get((row.id, state), 0) for state in (WAITING, DELIVERED, FAILED)
     )
-    kinds = [Kind(kind) for kind in parse_json_column(row.kinds)]
+    kinds = [MessageKind(kind) for kind in parse_json_column(row.kinds)]
     made = (row.created, row.created_by)
     return Webhook(row.id, row.url, kinds, row.off, *made, waiting, delivered, failed)
 
 
 def _delivery_from_row(row: Any) -> Delivery:
     values = {name: getattr(row, name) for name in Delivery.__dataclass_fields__}
-    return Delivery(**{**values, "kind": Kind(row.kind)})
+    return Delivery(**{**values, "kind": MessageKind(row.kind)})

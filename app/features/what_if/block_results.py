@@ -94,7 +94,7 @@ class BlockResults:
         uncertainty = 0 if self.uncertainty is None else self.uncertainty.nbytes
         return int(rows + uncertainty + sum(array.nbytes for array in arrays))
 
-    def judge_under(self, policy: Policy) -> Judgement:
+    def judge_with_policy(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
         if _uses_click_noise(policy) and noise_of_policy(policy) != noise_of_policy(self.policy):
             jac = _jac_at_threshold(self.facts, self.jac, policy)

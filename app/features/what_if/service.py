@@ -11,7 +11,7 @@ from pathlib import Path
 import structlog
 
 from app.config import Settings
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
@@ -66,7 +66,7 @@ class TableBlock:
 
     def count_under(self, policy: Policy) -> GroupCounts:
         """What is counted of them under another one."""
-        judgement = self.judged.judge_under(policy)
+        judgement = self.judged.judge_with_policy(policy)
         return count_table_groups(
             self.table, self.live, policy, self.judged.judgement, judgement, self.count_present
         )
@@ -327,7 +327,7 @@ def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
     )
 
 
-def examine_yields(settings: Settings) -> Check:
+def examine_yields(settings: Settings) -> CheckResult:
     """Read every file of the cache; one that a server deletes meanwhile is none any more."""
     files = [path for ending in ARRAYS for path in sorted(settings.yields.glob(f"*/*{ending}"))]
     damaged = [path for path in files if not _is_sound(path)]
@@ -335,9 +335,9 @@ def examine_yields(settings: Settings) -> Check:
         more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
         sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
         mend = f"Stop the server and delete {settings.yields}: yields are counted anew."
-        return Check("yields", False, sentence, mend)
+        return CheckResult("yields", False, sentence, mend)
     count = plural(len(files), "file")
-    return Check("yields", True, f"{count} in the cache, each as it was written")
+    return CheckResult("yields", True, f"{count} in the cache, each as it was written")
 
 
 def _is_sound(path: Path) -> bool:

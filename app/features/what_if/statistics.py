@@ -26,7 +26,13 @@ from app.features.groups.revision_queries import (
     list_changed_group_ids,
 )
 from app.features.queue.queries import read_columns, read_columns_after
-from app.features.queue.statistics import COLUMNS, Counted, Statistics, count_rows, make_statistics
+from app.features.queue.statistics import (
+    COLUMNS,
+    Statistics,
+    StatisticsColumns,
+    count_rows,
+    make_statistics,
+)
 from app.features.verdicts.queries import find_newest_verdict_id, list_groups_judged_since
 from app.features.what_if.cache import map_arrays, write_arrays
 from app.features.what_if.service import AT_ONCE, read_policy
@@ -62,7 +68,7 @@ class _DatasetColumns:
     verdict: int
     entry: tuple[int, str]
     group_id: IntArray
-    counted: Counted
+    counted: StatisticsColumns
     noted: int = 0
 
 
@@ -185,11 +191,11 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     )
 
 
-def _select_groups(found: Counted, chosen: Any) -> Counted:
+def _select_groups(found: StatisticsColumns, chosen: Any) -> StatisticsColumns:
     return replace(found, **{name: getattr(found, name)[..., chosen] for name in _ARRAYS})
 
 
-def _join_counted(parts: Sequence[Counted]) -> Counted:
+def _join_counted(parts: Sequence[StatisticsColumns]) -> StatisticsColumns:
     splits = sorted({name for part in parts for name in part.splits})
     matches = sorted({name for part in parts for name in part.matches})
     joined = {
@@ -201,7 +207,7 @@ def _join_counted(parts: Sequence[Counted]) -> Counted:
     joined["match"] = np.concatenate(
         [_recode_names(part.matches, part.match, matches) for part in parts]
     )
-    return Counted(tuple(splits), tuple(matches), **joined)
+    return StatisticsColumns(tuple(splits), tuple(matches), **joined)
 
 
 def _recode_names(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
@@ -237,7 +243,7 @@ def _read_columns(session: Session, file: Path) -> _DatasetColumns | None:
         if number and read_entry_hash(session, number) != digest:
             return None
         group_id = arrays.pop("group_id")
-        held = Counted(tuple(about["splits"]), tuple(about["matches"]), **arrays)
+        held = StatisticsColumns(tuple(about["splits"]), tuple(about["matches"]), **arrays)
         return _DatasetColumns(
             about["policy"], about["change"], about["verdict"], (number, digest), group_id, held
         )

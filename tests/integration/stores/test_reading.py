@@ -19,7 +19,7 @@ from app.features.imports.uploads import list_folder, resolve_folder
 from app.features.integrity.checks import examine_stores
 from app.formats.file_tree import Limits
 from app.formats.frames_reader import read_frame_list
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.media.files import guess_content_type, read_frame
 from app.media.object_frames import is_kept
@@ -30,7 +30,7 @@ from tests.moto_server import StoreProxy, fill_store, store_settings, stored_set
 
 
 def groups_of(settings: Settings, address: str) -> list[Group]:
-    report = Report()
+    report = ReaderReport()
     found = [*read_soccernet_v3(find_path(settings, address), report, Limits.of(settings))]
     assert not report.problems, report.problems
     return found
@@ -94,7 +94,7 @@ class TestReading:
     def test_groups_are_those_of_the_same_files_on_a_disk(
         self, settings: Settings, filled_store: str, tree: Path
     ) -> None:
-        here = [*read_soccernet_v3(tree, Report())]
+        here = [*read_soccernet_v3(tree, ReaderReport())]
         there = groups_of(settings, filled_store)
         assert [group.key for group in there] == [group.key for group in here]
         for one, other in zip(here, there, strict=True):
@@ -158,7 +158,7 @@ class TestFrameLists:
     ) -> None:
         labels = tmp_path / "labels"
         shutil.copytree(tree, labels, ignore=shutil.ignore_patterns("*.zip"))
-        first, second = [*read_soccernet_v3(labels, Report())][:2]
+        first, second = [*read_soccernet_v3(labels, ReaderReport())][:2]
         media = groups_of(settings, filled_store)[0].views
         assert media[0].media is not None and media[1].media is not None
         archive = media[0].media.path.partition("#")[0]
@@ -175,9 +175,9 @@ class TestFrameLists:
         ]
         file = tmp_path / "frames.json"
         file.write_text(json.dumps({"frames": entries}))
-        report = Report()
+        report = ReaderReport()
         found = read_frame_list(file, settings, report)
-        groups = [*found.with_listed_frames(read_soccernet_v3(labels, Report()))]
+        groups = [*found.with_listed_frames(read_soccernet_v3(labels, ReaderReport()))]
         assert [problem.record for problem in report.problems] == [
             "frames/3",
             "frames/4",

@@ -8,7 +8,7 @@ from pathlib import Path
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.log import Entry, append_entries, read_log
+from app.db.log import NewLogEntry, append_entries, read_log
 from app.db.session import now
 from app.db.store import Store
 
@@ -33,7 +33,9 @@ def say(store: Store, times: int = 1) -> None:
     """Entries of the log, each in a transaction of its own, of a size that makes pages full."""
     for number in range(times):
         with store.write() as session:
-            append_entries(session, [Entry("dataset", "ann", now(), {"n": number, "x": "y" * 900})])
+            append_entries(
+                session, [NewLogEntry("dataset", "ann", now(), {"n": number, "x": "y" * 900})]
+            )
 
 
 def log_ids(store: Store) -> list[int]:

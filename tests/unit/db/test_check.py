@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.db.check import Check, compare_with_log
+from app.db.check import CheckResult, compare_with_log
 
-WHOLE = Check("findings", True, "2, as the log says")
+WHOLE = CheckResult("findings", True, "2, as the log says")
 
 
 class TestAsLogged:
@@ -15,7 +15,7 @@ class TestAsLogged:
     def test_what_is_missing_new_or_otherwise_is_named_in_the_order_of_the_keys(self) -> None:
         said, present = {2: "a", 10: "b", 30: "c"}, {2: "x", 30: "c", 4: "d"}
         found = compare_with_log("groups", said, present, "mend it")
-        assert found == Check("groups", False, "3 not as the log says: 2, 4, 10", "mend it")
+        assert found == CheckResult("groups", False, "3 not as the log says: 2, 4, 10", "mend it")
 
     def test_keys_of_which_parts_are_missing_are_named_by_the_others(self) -> None:
         said = {(3, None, "7.png", "no ball"), (None, 5, None, "no lines"), (1, None, None, "old")}

@@ -25,7 +25,7 @@ from app.db.idempotency import (
     store_sent,
     without_response,
 )
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.errors import ConflictError
 from tests.unit.features.pending import keyed_request
@@ -86,7 +86,7 @@ def work(store: Store, outcome: object) -> object:
     """What a service does: it writes, and answers the request as the last of its transaction."""
     with store.write() as session:
         append_entries(
-            session, [Entry("deed", "ann", "2026-01-01T00:00:00Z", {"did": str(outcome)})]
+            session, [NewLogEntry("deed", "ann", "2026-01-01T00:00:00Z", {"did": str(outcome)})]
         )
         session.respond(outcome)
     return outcome
@@ -142,7 +142,9 @@ class TestPendingResponse:
                 return run(statement, *values, **options)
 
             monkeypatch.setattr(session, "execute", execute)
-            append_entries(session, [Entry("deed", "ann", "2026-01-01T00:00:00Z", {"did": "it"})])
+            append_entries(
+                session, [NewLogEntry("deed", "ann", "2026-01-01T00:00:00Z", {"did": "it"})]
+            )
             before = len(statements)
         assert before > 0
         # PostgreSQL tells other processes of the commit, too.

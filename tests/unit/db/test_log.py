@@ -6,8 +6,8 @@ import pytest
 from sqlalchemy import text
 
 from app.db.log import (
-    Entry,
     LogModel,
+    NewLogEntry,
     append_entries,
     filter_groups_with_history,
     find_newest_entry_id,
@@ -20,7 +20,7 @@ from app.db.log import (
 from app.errors import StorageError
 from tests.databases import said_for_sqlite
 
-FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)
+FIRST = NewLogEntry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)
 
 
 def fill(own_store, count: int) -> None:

@@ -15,7 +15,7 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.db.dialects.sqlite import AGAIN_S, PRAGMAS
-from app.db.log import Entry, append_entries, read_log
+from app.db.log import NewLogEntry, append_entries, read_log
 from app.db.migrate import migrate_database
 from app.db.store import Store
 from app.errors import BusyError, DamagedError, InputError, StorageError
@@ -90,7 +90,7 @@ class TestOpen:
             pytest.raises(RuntimeError, match="must be durable"),
             own_store.write(lasting=False) as session,
         ):
-            append_entries(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
+            append_entries(session, [NewLogEntry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
         with own_store.read() as session:
             assert list(read_log(session)) == []
 

@@ -79,16 +79,16 @@ class TestFind:
 
     def test_a_name_that_fits_several_is_none_of_them(self, names) -> None:
         assert names.find("7.png") is None
-        assert "several" in names.why_not("7.png")
+        assert "several" in names.explain_unknown("7.png")
         assert names.find(f"{CEDAR}/7.png").id == 3
 
     def test_a_frame_of_another_match_is_not_the_one_of_that_number(self, names) -> None:
         other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
         assert names.find(other) is None
-        assert names.why_not(other).startswith(
+        assert names.explain_unknown(other).startswith(
             "is not a frame of the dataset: its folders name none"
         )
-        assert names.why_not("99.png") == "is not a frame of the dataset"
+        assert names.explain_unknown("99.png") == "is not a frame of the dataset"
 
     @pytest.mark.parametrize(
         "name",
@@ -164,8 +164,8 @@ class TestFindNumber:
         assert (frame and frame.id) == found
 
     def test_says_why_there_is_none(self, pictures: FrameNames) -> None:
-        assert "several frames" in pictures.why_not_number("7")
-        assert "is not a number that the name" in pictures.why_not_number("99")
+        assert "several frames" in pictures.explain_unknown_number("7")
+        assert "is not a number that the name" in pictures.explain_unknown_number("99")
 
     @pytest.mark.parametrize(
         ("name", "found"), [("0004.jpg", 1), ("other/0007.jpg", 4), ("0007.jpg", None)]

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 from app.formats.export_record import ExportRecord
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -29,8 +29,8 @@ SIZE = ImageSize(1280, 720)
 
 
 @pytest.fixture
-def report() -> Report:
-    return Report()
+def report() -> ReaderReport:
+    return ReaderReport()
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 from app.formats.ball_names import is_ball, is_same_name
 from app.formats.coco_reader import read_coco
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from tests.unit.formats.foreign_coco import ball, category, coco, image, write
 
 BALLS = [
@@ -90,7 +90,7 @@ class TestSameName:
 PEOPLE = [category("Player"), category("Referee", 2)]
 
 
-def balls(root: Path, report: Report, value: Any, ball_category: str = "") -> int:
+def balls(root: Path, report: ReaderReport, value: Any, ball_category: str = "") -> int:
     write(root, {"x.json": value})
     groups = read_coco(root, report, ball_category=ball_category)
     return sum(len(view.balls) for group in groups for view in group.views)
@@ -99,7 +99,7 @@ def balls(root: Path, report: Report, value: Any, ball_category: str = "") -> in
 class TestCategories:
     @pytest.mark.parametrize("name", ["ball", "sports_ball", "soccer-ball", "balls", "Football"])
     def test_the_report_says_which_one_was_taken(
-        self, tmp_path: Path, report: Report, name: str
+        self, tmp_path: Path, report: ReaderReport, name: str
     ) -> None:
         assert balls(tmp_path, report, coco(categories=[category(name)])) == 1
         assert f'category "{name}" is the ball (1 annotation)' in report.remarks[-1]
@@ -107,7 +107,7 @@ class TestCategories:
 
     @pytest.mark.parametrize("name", ["basketball", "ball_boy", "Player"])
     def test_where_none_is_the_ball_the_names_are_listed_with_what_to_do(
-        self, tmp_path: Path, report: Report, name: str
+        self, tmp_path: Path, report: ReaderReport, name: str
     ) -> None:
         assert balls(tmp_path, report, coco(categories=[category(name)])) == 0
         (problem,) = report.problems
@@ -118,7 +118,7 @@ class TestCategories:
 
     @pytest.mark.parametrize("named", ["Round thing", "round_thing", "2", " 2.0"])
     def test_a_category_that_somebody_names_is_the_ball(
-        self, tmp_path: Path, report: Report, named: str
+        self, tmp_path: Path, report: ReaderReport, named: str
     ) -> None:
         value = coco(
             annotations=[ball(category=2), ball(identity=2, category=1)],
@@ -128,13 +128,13 @@ class TestCategories:
         assert '"round thing" is the ball' in report.remarks[-1]
 
     def test_a_name_that_no_category_has_brings_no_ball(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         assert balls(tmp_path, report, coco(), "puck") == 0
         assert 'none of its categories ("ball", "Player") is taken' in report.problems[0].problem
 
     def test_without_a_list_the_only_id_is_the_ball_where_no_picture_has_two(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         value = coco()
         del value["categories"]
@@ -148,20 +148,22 @@ class TestCategories:
         "second", [{"category": 2}, {"bbox": [5, 6, 7, 8]}], ids=["two ids", "two in a picture"]
     )
     def test_without_a_list_anything_else_is_left_to_a_person(
-        self, tmp_path: Path, report: Report, second: dict[str, Any]
+        self, tmp_path: Path, report: ReaderReport, second: dict[str, Any]
     ) -> None:
         value = coco(annotations=[ball(), ball(identity=2, **second)], categories=[])
         assert balls(tmp_path, report, value) == 0
         assert "none of its categories (id 1" in report.problems[-1].problem
-        assert balls(tmp_path, Report(), value, "1") > 0
+        assert balls(tmp_path, ReaderReport(), value, "1") > 0
 
-    def test_a_category_that_nothing_has_is_no_ball(self, tmp_path: Path, report: Report) -> None:
+    def test_a_category_that_nothing_has_is_no_ball(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         value = coco(annotations=[ball(category=2)])
         assert balls(tmp_path, report, value) == 0
         assert 'no annotation that can be read has "ball"' in report.problems[0].problem
 
     def test_a_file_without_a_ball_beside_one_with_it_is_a_remark(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         people = coco([image("b.jpg")], categories=PEOPLE)
         write(tmp_path, {"people.json": people})
@@ -179,7 +181,7 @@ class TestCategories:
         ],
     )
     def test_one_that_cannot_be_used_is_named_and_the_others_count(
-        self, tmp_path: Path, report: Report, categories: list[Any], field: str
+        self, tmp_path: Path, report: ReaderReport, categories: list[Any], field: str
     ) -> None:
         assert balls(tmp_path, report, coco(categories=categories)) == 1
         assert [problem.field for problem in report.problems] == [field]

@@ -11,7 +11,7 @@ import pytest
 from app.formats import cameras
 from app.formats.camera_matrix import MOST_CAMERAS
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 
 K = np.array([[1800.0, 0, 639.5], [0, 1800.0, 359.5], [0, 0, 1]])
@@ -26,7 +26,7 @@ def arrays(camera: Camera) -> dict[str, np.ndarray]:
 
 class TestCamerasOfArrays:
     def test_frames_of_a_match_are_called_by_their_number(
-        self, tmp_path: Path, arrays: dict[str, np.ndarray], camera: Camera, report: Report
+        self, tmp_path: Path, arrays: dict[str, np.ndarray], camera: Camera, report: ReaderReport
     ) -> None:
         arrays["K"][1, 0, 0] = 2000.0
         np.savez(tmp_path / "ARG_CRO.npz", **arrays)
@@ -36,7 +36,7 @@ class TestCamerasOfArrays:
         assert np.allclose(found["ARG_CRO/0"].position, camera.position)
 
     def test_a_camera_that_never_moves_is_one_camera(
-        self, tmp_path: Path, arrays: dict[str, np.ndarray], report: Report
+        self, tmp_path: Path, arrays: dict[str, np.ndarray], report: ReaderReport
     ) -> None:
         np.savez_compressed(tmp_path / "north.npz", **arrays)
         assert list(read_cameras(tmp_path, report)) == ["north"]
@@ -56,7 +56,12 @@ class TestCamerasOfArrays:
         ],
     )
     def test_arrays_that_do_not_fit_are_refused(
-        self, tmp_path: Path, arrays: dict[str, np.ndarray], report: Report, changes, problem: str
+        self,
+        tmp_path: Path,
+        arrays: dict[str, np.ndarray],
+        report: ReaderReport,
+        changes,
+        problem: str,
     ) -> None:
         np.savez(tmp_path / "a.npz", **(arrays | changes))
         assert read_cameras(tmp_path, report) == {}
@@ -73,7 +78,7 @@ class TestCamerasOfArrays:
     def test_more_cameras_than_a_file_may_hold_are_refused_before_they_are_made(
         self,
         tmp_path: Path,
-        report: Report,
+        report: ReaderReport,
         camera: Camera,
         arrays: dict[str, np.ndarray],
         problem: str,
@@ -90,14 +95,14 @@ class TestCamerasOfArrays:
         assert "a file may hold 100,000 cameras: split it into several files" in said
 
     def test_what_says_nothing_of_cameras_is_not_unpacked(
-        self, tmp_path: Path, report: Report, arrays: dict[str, np.ndarray]
+        self, tmp_path: Path, report: ReaderReport, arrays: dict[str, np.ndarray]
     ) -> None:
         more = {"frames": np.array(["a.png", "b.png", "c.png"]), "depth": np.zeros((10**6, 9))}
         np.savez_compressed(tmp_path / "north.npz", **arrays, **more)
         assert list(read_cameras(tmp_path, report)) == ["north"], report.problems
 
     def test_a_header_that_lies_about_its_size_takes_no_memory(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         buffer = io.BytesIO()
         np.lib.format.write_array_header_1_0(
@@ -109,7 +114,7 @@ class TestCamerasOfArrays:
         assert "differs from the size that it declares" in str(report.problems[0])
 
     def test_an_empty_array_that_says_to_be_endless_is_refused(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         buffer = io.BytesIO()
         np.lib.format.write_array_header_1_0(
@@ -123,7 +128,7 @@ class TestCamerasOfArrays:
 
 class TestOpencvStorage:
     def test_matrices_of_a_yaml_file_are_a_camera(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         path = tmp_path / "north.yml"
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
@@ -149,7 +154,7 @@ class TestOpencvStorage:
         ],
     )
     def test_anything_but_plain_matrices_is_refused(
-        self, tmp_path: Path, report: Report, text: str
+        self, tmp_path: Path, report: ReaderReport, text: str
     ) -> None:
         (tmp_path / "x.yaml").write_text(text)
         assert read_cameras(tmp_path, report) == {}
@@ -167,7 +172,7 @@ class TestOpencvStorage:
         ],
     )
     def test_keys_that_are_no_text_are_named_as_they_are_written(
-        self, tmp_path: Path, report: Report, text: str, key: str
+        self, tmp_path: Path, report: ReaderReport, text: str, key: str
     ) -> None:
         (tmp_path / "x.yml").write_text(text)
         assert read_cameras(tmp_path, report) == {}

@@ -13,7 +13,7 @@ from app.errors import InputError, UnsafePathError
 from app.formats.camera_json import camera_to_json
 from app.formats.cameras import camera_file_text, read_cameras, write_camera_files
 from app.formats.export_record import ExportRecord
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
@@ -24,7 +24,7 @@ from tests.cameras import SIZE, looking, write_cameras
 
 class TestReadCameras:
     def test_a_folder_of_camera_files_is_keyed_by_stem(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         write_cameras(tmp_path, {"00002": camera, "00005": camera})
         (tmp_path / "00002.json").write_text("{}")
@@ -32,20 +32,20 @@ class TestReadCameras:
         assert (report.read, report.imported, report.problems) == (2, 2, [])
 
     def test_files_in_match_folders_keep_their_match(
-        self, tmp_path: Path, camera: Camera, report: Report, match: str
+        self, tmp_path: Path, camera: Camera, report: ReaderReport, match: str
     ) -> None:
         write_cameras(tmp_path / "..", {f"{tmp_path.name}/{match}/7_1": camera})
         assert list(read_cameras(tmp_path, report)) == [f"{match}/7_1"]
 
     def test_equal_stems_in_two_folders_keep_their_folders(
-        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+        self, make_zip: Callable[..., Path], camera: Camera, report: ReaderReport
     ) -> None:
         text = camera_file_text(camera)
         path = make_zip({"a/camera_1.json": text, "b/camera_1.json": text})
         assert list(read_cameras(path, report)) == ["a/1", "b/1"]
 
     def test_a_bad_camera_is_reported_and_the_rest_imported(
-        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+        self, make_zip: Callable[..., Path], camera: Camera, report: ReaderReport
     ) -> None:
         bad = camera_file_text(camera).replace("2100.5", "NaN")
         path = make_zip({"camera_1.json": bad, "camera_2.json": camera_file_text(camera)})
@@ -56,7 +56,7 @@ class TestReadCameras:
         )
 
     def test_how_well_a_camera_is_known_is_read_with_it(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         known = row_by_row(np.eye(8) * 1e-4)
         camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 1500.0)
@@ -78,7 +78,7 @@ class TestReadCameras:
     @pytest.mark.parametrize("wrapped", [False, True])
     @pytest.mark.parametrize("encoded", ["plain", "json", "python"])
     def test_several_cameras_in_one_file(
-        self, tmp_path: Path, camera: Camera, report: Report, wrapped: bool, encoded: str
+        self, tmp_path: Path, camera: Camera, report: ReaderReport, wrapped: bool, encoded: str
     ) -> None:
         value: Any = {"cam1": camera_to_json(camera), "cam2": camera_to_json(camera)}
         value = {"_note": "ours", "cameras": value} if wrapped else value
@@ -89,7 +89,7 @@ class TestReadCameras:
         assert report.problems == []
 
     def test_one_bad_camera_of_several_is_named(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         value = {"cam1": camera_to_json(camera), "cam2": 5, "_note": "x"}
         path = tmp_path / "issia_calibration.json"
@@ -99,7 +99,7 @@ class TestReadCameras:
 
     @pytest.mark.parametrize("name", ["file_name", "image_ids", "image", "frame"])
     def test_objects_of_json_lines_and_lists_are_called_like_their_image(
-        self, tmp_path: Path, camera: Camera, report: Report, name: str
+        self, tmp_path: Path, camera: Camera, report: ReaderReport, name: str
     ) -> None:
         items = [camera_to_json(camera) | {name: f"{stem}.jpg"} for stem in ("north", "south")]
         lines, listed = tmp_path / "per_sample_output.json", tmp_path / "cameras.json"
@@ -110,21 +110,23 @@ class TestReadCameras:
         assert report.problems == []
 
     def test_a_line_that_cannot_be_read_is_named_and_the_others_are_read(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         good = json.dumps(camera_to_json(camera) | {"image": "a.jpg"})
         (tmp_path / "cameras.jsonl").write_text(f"{good}\n{good[:-20]}\n")
         assert list(read_cameras(tmp_path, report)) == ["a"]
         assert report.problems[0].record == "line 2"
 
-    def test_names_of_images_are_keys(self, tmp_path: Path, camera: Camera, report: Report) -> None:
+    def test_names_of_images_are_keys(
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
+    ) -> None:
         value = camera_to_json(camera)
         names = ["north.jpg", "images/south.png", "C:\\frames\\east.jpg", "/data/west.jpg"]
         (tmp_path / "predictions.json").write_text(json.dumps(dict.fromkeys(names, value)))
         assert list(read_cameras(tmp_path, report)) == ["north", "south", "east", "west"]
 
     def test_the_wrapper_of_pnlcalib_is_taken_off(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         value = {"cam_params": camera_to_json(camera), "rep_err": 0.5, "mode": "full"}
         (tmp_path / "camera_00002.json").write_text(json.dumps(value))
@@ -134,7 +136,7 @@ class TestReadCameras:
         assert [problem.record for problem in report.problems] == ["00004.jpg"]
 
     def test_the_principal_point_of_tvcalib_is_measured_from_the_corner(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         value = camera_to_json(camera) | {"image_ids": "a.jpg", "aov_radian": 0.6}
         (tmp_path / "per_sample_output.json").write_text(json.dumps(value))
@@ -142,7 +144,7 @@ class TestReadCameras:
         assert (x + 0.5, y + 0.5) == camera.principal_point
 
     def test_one_number_that_is_none_costs_its_own_camera_alone(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         value = {"cam1": camera_to_json(camera), "cam2": camera_to_json(camera)}
         text = json.dumps(value).replace("2100.5", "Infinity", 1)
@@ -151,7 +153,7 @@ class TestReadCameras:
         assert "cam1, x_focal_length: is inf, not a finite number" in str(report.problems[0])
 
     def test_a_folder_without_camera_files_says_what_it_holds(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         (tmp_path / "a.homographies").write_text("1 0 0\n")
         assert read_cameras(tmp_path, report) == {}
@@ -168,7 +170,7 @@ class TestReadCameras:
         ],
     )
     def test_a_size_that_a_file_states_is_handed_on(
-        self, tmp_path: Path, camera: Camera, report: Report, stated: dict[str, Any]
+        self, tmp_path: Path, camera: Camera, report: ReaderReport, stated: dict[str, Any]
     ) -> None:
         (tmp_path / "camera_1.json").write_text(json.dumps(camera_to_json(camera) | stated))
         (tmp_path / "camera_2.json").write_text(json.dumps(camera_to_json(camera) | {"width": 5}))
@@ -177,7 +179,7 @@ class TestReadCameras:
         assert sizes == {"1": ImageSize(1280, 720)}
 
     def test_a_second_camera_of_a_name_is_named(
-        self, tmp_path: Path, camera: Camera, report: Report
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
     ) -> None:
         items = [camera_to_json(camera) | {"image": "a.jpg"}] * 2
         (tmp_path / "cameras.json").write_text(json.dumps(items))
@@ -197,7 +199,7 @@ class TestReadCameras:
         ],
     )
     def test_a_file_that_holds_no_camera_says_what_it_is(
-        self, tmp_path: Path, report: Report, value: Any, what: str
+        self, tmp_path: Path, report: ReaderReport, value: Any, what: str
     ) -> None:
         (tmp_path / "x.json").write_text(json.dumps(value))
         assert read_cameras(tmp_path, report) == {}
@@ -212,7 +214,7 @@ Make = Callable[..., Group]
 class TestWriteCameraFiles:
     def test_one_file_a_calibrated_view_in_the_folder_of_its_match(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, camera: Camera,
-        report: Report,
+        report: ReaderReport,
     ) -> None:  # fmt: skip
         counts = write_camera_files(tmp_path, [solved(soccer_group(replays=3))])
         assert counts == {"groups": 1, "cameras": 3}

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.formats.coco_reader import read_coco
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
@@ -18,7 +18,7 @@ OTHER = [50.0, 60.0, 20.0, 20.0]
 PLAYER = {"keypoints": [100, 100, 2], "bbox": [100, 100, 0, 0]}
 
 
-def read(root: Path, report: Report, **files: Any) -> dict[str, Group]:
+def read(root: Path, report: ReaderReport, **files: Any) -> dict[str, Group]:
     """The groups by key; ``train__b`` is the file train/b."""
     named = {name.replace("__", "/"): content for name, content in files.items()}
     return {group.key: group for group in read_coco(write(root, named), report)}
@@ -34,7 +34,7 @@ def pictures(groups: dict[str, Group], root: Path) -> dict[str, str | None]:
 
 class TestOneFrameInSeveralFiles:
     def test_people_and_captions_beside_instances_lose_no_ball(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {
             "annotations__captions_default.json": coco(
@@ -55,7 +55,7 @@ class TestOneFrameInSeveralFiles:
 
     @pytest.mark.parametrize("pictured", [False, True])
     def test_files_of_one_folder_speak_of_the_same_frames(
-        self, tmp_path: Path, report: Report, pictured: bool
+        self, tmp_path: Path, report: ReaderReport, pictured: bool
     ) -> None:
         files: dict[str, Any] = {
             "balls.json": coco(),
@@ -75,7 +75,11 @@ class TestOneFrameInSeveralFiles:
         ],
     )
     def test_the_same_ball_is_one_ball(
-        self, tmp_path: Path, report: Report, second: dict[str, Any], balls: list[BallAnnotation]
+        self,
+        tmp_path: Path,
+        report: ReaderReport,
+        second: dict[str, Any],
+        balls: list[BallAnnotation],
     ) -> None:
         other = coco(annotations=[ball(**second)])
         groups = read(tmp_path, report, **{"a.json": coco(), "b.json": other})
@@ -83,13 +87,13 @@ class TestOneFrameInSeveralFiles:
         assert report.counts["balls"] == 1
         assert report.problems == []
 
-    def test_a_box_says_more_than_a_point(self, tmp_path: Path, report: Report) -> None:
+    def test_a_box_says_more_than_a_point(self, tmp_path: Path, report: ReaderReport) -> None:
         point = coco(annotations=[ball(bbox=[100, 50, 0, 0])])
         groups = read(tmp_path, report, **{"a.json": point, "b.json": coco()})
         assert groups["a.jpg"].views[0].balls == (BallAnnotation(box=Box(89.5, 39.5, 20, 20)),)
 
     def test_balls_that_lie_apart_are_both_kept_and_named(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         other = coco(annotations=[ball(bbox=OTHER)])
         groups = read(tmp_path, report, **{"a.json": coco(), "b.json": other})
@@ -99,7 +103,7 @@ class TestOneFrameInSeveralFiles:
         assert "places the ball elsewhere than" in problem.problem
 
     def test_sizes_and_splits_that_contradict_are_named(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {
             "annotations__instances_test.json": coco(annotations=[ball(bbox=OTHER)]),
@@ -114,7 +118,7 @@ class TestOneFrameInSeveralFiles:
         ]  # fmt: skip
 
     def test_a_picture_under_two_ids_of_one_file_is_one_frame(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         value = coco([image(), image(identity=2)], [ball(1), ball(2, 2, 2)])
         groups = read(tmp_path, report, **{"a.json": value})
@@ -122,7 +126,7 @@ class TestOneFrameInSeveralFiles:
         assert (len(view.balls), len(view.extras.boxes), report.imported) == (1, 1, 1)
 
     def test_who_names_no_group_speaks_of_the_view_that_has_the_picture(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         grouped = coco([image(group_id="kick", view="north")])
         people = coco(annotations=[ball(category=2)])
@@ -134,7 +138,7 @@ class TestOneFrameInSeveralFiles:
 
 class TestFramesOfOneName:
     def test_subsets_are_kept_apart_each_with_its_picture(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {
             "annotations__instances_Train.json": coco(),
@@ -154,7 +158,9 @@ class TestFramesOfOneName:
         ]
         assert (report.imported, report.problems) == (2, [])
 
-    def test_subsets_without_pictures_are_kept_apart(self, tmp_path: Path, report: Report) -> None:
+    def test_subsets_without_pictures_are_kept_apart(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         files = {
             "annotations__instances_one.json": coco(),
             "annotations__instances_two.json": coco(),
@@ -162,7 +168,7 @@ class TestFramesOfOneName:
         assert list(read(tmp_path, report, **files)) == ["one/a.jpg", "two/a.jpg"]
 
     def test_a_subset_whose_picture_is_missing_does_not_take_the_other_one(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {
             "annotations__instances_one.json": coco(),
@@ -177,7 +183,7 @@ class TestFramesOfOneName:
             "1 picture was not found: a.jpg (looked in annotations/images/one/" in problem.problem
         )
 
-    def test_folders_are_kept_apart(self, tmp_path: Path, report: Report) -> None:
+    def test_folders_are_kept_apart(self, tmp_path: Path, report: ReaderReport) -> None:
         files = {
             f"{task}__{name}": content
             for task in ("task1", "task2")
@@ -193,7 +199,7 @@ class TestFramesOfOneName:
         }
 
     def test_groups_that_only_share_their_number_are_kept_apart(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {f"{task}__x.json": coco([image(group_id=1, view="n")]) for task in ("p", "q")}
         groups = read(tmp_path, report, **files)
@@ -205,7 +211,7 @@ class TestFramesOfOneName:
         assert stations == {"p/1/n", "q/1/n"}
 
     def test_the_views_of_a_group_may_lie_in_several_files(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {
             f"{name}__x.json": coco([image(f"{name}.jpg", group_id=1, view=name)])
@@ -215,7 +221,7 @@ class TestFramesOfOneName:
         assert [view.key for view in groups["1"].views] == ["north", "south"]
 
     def test_views_without_a_name_whose_files_share_one_have_their_folders_in_it(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         images = [image("north/f.jpg", 1, group_id="g"), image("south/f.jpg", 2, group_id="g")]
         files = {"x.json": coco(images, [ball(1), ball(2, 2)])}
@@ -228,12 +234,14 @@ class TestFramesOfOneName:
         assert report.problems == []
 
     def test_views_without_a_name_in_different_splits_are_of_different_groups(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {f"{split}__y.json": coco([image(group_id=2)]) for split in ("train", "test")}
         assert list(read(tmp_path, report, **files)) == ["test/2", "train/2"]
 
-    def test_two_pictures_for_one_view_are_named(self, tmp_path: Path, report: Report) -> None:
+    def test_two_pictures_for_one_view_are_named(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         images = [image(f"{n}.jpg", n, group_id="g", view="north") for n in (1, 2)]
         groups = read(tmp_path, report, **{"x.json": coco(images, [ball(1), ball(2, 2)])})
         assert (len(groups["g"].views), report.imported) == (1, 1)
@@ -242,7 +250,7 @@ class TestFramesOfOneName:
 
 class TestPicturesOfFrames:
     def test_two_frames_never_share_a_picture_that_only_one_names(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         images = [image("clip1/a.jpg"), image("clip2/a.jpg", 2)]
         value = coco(images, [ball(1), ball(2, 2)])
@@ -253,39 +261,41 @@ class TestPicturesOfFrames:
         assert "clip2/a.jpg fits another image as well" in problem.problem
 
     def test_pictures_that_cannot_be_told_apart_are_named(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {"x.json": coco(), "p__1__a.jpg": "x", "p__2__a.jpg": "y"}
         assert pictures(read(tmp_path, report, **files), tmp_path) == {"a.jpg": None}
         assert "p/1/a.jpg and p/2/a.jpg cannot be told apart by a.jpg" in str(report.problems[0])
 
     def test_a_name_may_be_written_as_a_part_of_an_address(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {"x.json": coco([image("a%20b.jpg")]), "images__a b.jpg": "x"}
         found = pictures(read(tmp_path, report, **files), tmp_path)
         assert found == {"a%20b.jpg": "images/a b.jpg"}
 
-    def test_captions_alone_bring_no_ball(self, tmp_path: Path, report: Report) -> None:
+    def test_captions_alone_bring_no_ball(self, tmp_path: Path, report: ReaderReport) -> None:
         caption = {"id": 1, "image_id": 1, "caption": "a ball"}
         read(tmp_path, report, **{"captions_default.json": coco(annotations=[caption])})
         assert "the file brings no ball" in report.problems[0].problem
 
     def test_a_picture_found_by_the_end_of_its_name_is_said(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         files = {"x.json": coco([image("C:\\shots\\a.jpg")]), "pictures__a.jpg": "x"}
         assert pictures(read(tmp_path, report, **files), tmp_path) == {"a.jpg": "pictures/a.jpg"}
         assert any("1 picture was found by the end of the name" in it for it in report.remarks)
         assert report.problems == []
 
-    def test_files_without_any_picture_are_sound(self, tmp_path: Path, report: Report) -> None:
+    def test_files_without_any_picture_are_sound(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         read(tmp_path, report, **{"x.json": coco(categories=[category()])})
         assert report.problems == []
         assert any("1 picture was not found: a.jpg" in remark for remark in report.remarks)
 
     def test_a_point_outside_the_other_box_is_another_ball(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         point = coco(annotations=[ball(bbox=[300, 50, 0, 0])])
         groups = read(tmp_path, report, **{"a.json": coco(), "b.json": point})

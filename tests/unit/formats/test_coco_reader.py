@@ -11,7 +11,7 @@ import pytest
 from app.formats.coco_reader import read_coco
 from app.formats.coco_writer import write_coco
 from app.formats.export_record import ExportRecord
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
@@ -34,7 +34,7 @@ def foreign(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def read(tmp_path: Path, report: Report) -> Callable[[Any], list[Group]]:
+def read(tmp_path: Path, report: ReaderReport) -> Callable[[Any], list[Group]]:
     def run(value: Any) -> list[Group]:
         (tmp_path / "annotations").mkdir(exist_ok=True)
         path = tmp_path / "annotations/instances_test.json"
@@ -46,7 +46,7 @@ def read(tmp_path: Path, report: Report) -> Callable[[Any], list[Group]]:
 
 class TestReadCoco:
     def test_files_of_others_are_images_with_boxes(
-        self, read: Callable[[Any], list[Group]], tmp_path: Path, report: Report
+        self, read: Callable[[Any], list[Group]], tmp_path: Path, report: ReaderReport
     ) -> None:
         (tmp_path / "images/clip").mkdir(parents=True)
         (tmp_path / "images/clip/0001.jpg").write_bytes(b"x")
@@ -69,7 +69,7 @@ class TestReadCoco:
         assert report.problems == []
 
     def test_a_box_changed_in_another_tool_is_the_new_annotation(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_coco(tmp_path, [solved(soccer_group())])
         path = tmp_path / "annotations/instances_train.json"
@@ -81,7 +81,7 @@ class TestReadCoco:
         assert group.views[1].balls[0].box == Box(599.5, 300.5, 20.0, 21.0)
 
     def test_a_ball_drawn_in_another_tool_on_a_view_that_had_none_is_read(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group()
         bare = replace(group.views[1], balls=())
@@ -110,7 +110,7 @@ class TestReadCoco:
     )
     @pytest.mark.parametrize("bare", [True, False])
     def test_a_box_added_to_an_export_that_is_no_ball_is_named_and_no_ball(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report, added: dict,
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport, added: dict,
         field: str, bare: bool,
     ) -> None:  # fmt: skip
         group = soccer_group(replays=0)
@@ -128,7 +128,7 @@ class TestReadCoco:
         assert f"annotations[{len(items) - 1}], {field}" in problem
 
     def test_a_ball_that_was_added_twice_is_one(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group(replays=0)
         bare = replace(group.views[0], balls=())
@@ -144,7 +144,7 @@ class TestReadCoco:
         assert "second ball at the same place" in report.problems[0].problem
 
     def test_a_second_ball_added_to_a_view_is_named(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_coco(tmp_path, [solved(soccer_group(replays=0), ball=False)], everything=True)
         path = tmp_path / "annotations/instances_train.json"
@@ -158,7 +158,7 @@ class TestReadCoco:
         ]
 
     def test_an_export_of_ours_that_says_no_origin_has_its_boxes_in_our_frame(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_coco(tmp_path, [solved(soccer_group())], boxes="annotated")
         path = tmp_path / "annotations/instances_train.json"
@@ -176,7 +176,7 @@ class TestReadCoco:
 
     @pytest.mark.parametrize("x", [0.1, 1 / 3, -0.3, 1e-9, 610.0000000001, 959.7])
     def test_import_export_import_changes_no_digit_of_a_box(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report, x: float
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport, x: float
     ) -> None:
         group = soccer_group(replays=0)
         ball = BallAnnotation(box=Box(x, x / 7, 12.1, 11.3))
@@ -190,7 +190,7 @@ class TestReadCoco:
         assert len(texts) == 1
 
     def test_a_group_whose_views_are_in_two_files_is_one(
-        self, tmp_path: Path, solved: Solved, issia_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, issia_group: Make, report: ReaderReport
     ) -> None:
         groups = [issia_group(), issia_group(400)]
         splits = {"cam3": "train", "cam4": "test"}
@@ -214,13 +214,17 @@ class TestReadCoco:
         ],
     )  # fmt: skip
     def test_what_is_wrong_is_named(
-        self, read: Callable[[Any], list[Group]], report: Report, value: Any, field: str | None
+        self,
+        read: Callable[[Any], list[Group]],
+        report: ReaderReport,
+        value: Any,
+        field: str | None,
     ) -> None:
         read(value)
         assert field in [item.field for item in report.problems]
 
     def test_a_state_that_was_tampered_with_leaves_its_image_out(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_coco(tmp_path, [solved(soccer_group(replays=2))], every_view=True)
         path = tmp_path / "annotations/instances_train.json"
@@ -234,7 +238,7 @@ class TestReadCoco:
         assert [item.record for item in report.problems] == [f"images[{n}]" for n in range(3)]
 
     def test_views_outside_come_back_to_their_group(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group(replays=2)
         write_coco(tmp_path, [solved(group)])
@@ -243,7 +247,7 @@ class TestReadCoco:
         assert report.problems == []
 
     def test_the_groups_of_others_are_groups(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         size = {"width": 1280, "height": 720}
         images = [
@@ -265,7 +269,7 @@ class TestReadCoco:
         assert report.problems == []
 
     def test_the_cameras_of_others_are_given_cameras(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_coco(tmp_path, [record := solved(soccer_group())])
         path = tmp_path / "annotations/instances_train.json"
@@ -280,7 +284,7 @@ class TestReadCoco:
         assert report.problems == []
 
     def test_the_cameras_of_synloc_are_given_cameras(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         across = [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 60]]
         image = foreign()["images"][0] | {"camera_matrix": across, "dist_poly": [1.0, 0.0]}
@@ -301,7 +305,7 @@ class TestReadCoco:
     def test_a_camera_that_is_none_is_named_and_its_image_stays(
         self,
         read: Callable[[Any], list[Group]],
-        report: Report,
+        report: ReaderReport,
         changes: dict[str, Any],
         field: str,
     ) -> None:
@@ -309,7 +313,9 @@ class TestReadCoco:
         assert group.views[0].station.given is None
         assert [item.field for item in report.problems] == [field]
 
-    def test_the_split_is_in_the_name_of_the_file(self, tmp_path: Path, report: Report) -> None:
+    def test_the_split_is_in_the_name_of_the_file(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         (tmp_path / "outside_valid.json").write_text(json.dumps(foreign()))
         (group,) = read_coco(tmp_path, report)
         assert group.split == "valid"
@@ -323,14 +329,14 @@ class TestReadCoco:
         ],
     )
     def test_names_that_are_none_are_named(
-        self, read: Callable[[Any], list[Group]], report: Report, changes: Any, field: str
+        self, read: Callable[[Any], list[Group]], report: ReaderReport, changes: Any, field: str
     ) -> None:
         image = foreign()["images"][0] | changes
         assert read(foreign(images=[image])) == []
         assert [item.field for item in report.problems] == [field]
 
     def test_categories_that_are_no_list_are_named(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         (group,) = read(foreign(categories=3.5))
         assert group.views[0].balls == ()
@@ -339,7 +345,7 @@ class TestReadCoco:
         assert "none of its categories (id 37, id 1) is taken for it" in last.problem
 
     def test_a_box_with_infinity_is_left_out_and_the_rest_is_read(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         (group,) = read(json.dumps(foreign()).replace("[1, 2, 3, 4]", "[1, 2, Infinity, 4]"))
         assert group.views[0].balls == ()
@@ -366,7 +372,7 @@ class TestJoins:
     def test_an_annotation(
         self,
         read: Callable[[Any], list[Group]],
-        report: Report,
+        report: ReaderReport,
         annotation: dict[str, Any],
         record: str,
         field: str,
@@ -381,21 +387,21 @@ class TestJoins:
 
     @pytest.mark.parametrize("name", ["a.jpg", "images\\a.jpg", "/x/a.jpg"])
     def test_images_and_categories_may_be_referred_to_by_their_names(
-        self, read: Callable[[Any], list[Group]], report: Report, name: str
+        self, read: Callable[[Any], list[Group]], report: ReaderReport, name: str
     ) -> None:
         (group,) = read(coco([image(identity=7)], [ball(name, category="Ball")]))
         assert len(group.views[0].balls) == 1
         assert report.problems == []
 
     def test_an_annotation_of_no_category_is_kept_as_a_box(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         (group,) = read(coco(annotations=[ball(), ball(identity=2, category="x")]))
         assert [box["class"] for box in group.views[0].extras.boxes] == [None]
         assert [problem.field for problem in report.problems] == ["category_id"]
 
     def test_annotations_of_one_id_are_all_read_and_counted(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         images = [image(), image("b.jpg", 2), image("c.jpg", 3)]
         groups = read(coco(images, [ball(1, 0), ball(2, 0), ball(3, 0)]))
@@ -404,7 +410,7 @@ class TestJoins:
 
     @pytest.mark.parametrize("identity", [1, 1.0, "1", None])
     def test_an_image_whose_id_is_none_or_taken_is_named(
-        self, read: Callable[[Any], list[Group]], report: Report, identity: Any
+        self, read: Callable[[Any], list[Group]], report: ReaderReport, identity: Any
     ) -> None:
         groups = read(coco([image(), image("b.jpg", identity)]))
         assert [len(group.views[0].balls) for group in groups] == [1, 0]
@@ -413,7 +419,7 @@ class TestJoins:
         assert "no annotations are assigned to this image" in problem.problem
 
     def test_an_image_that_is_left_out_says_how_many_annotations_go_with_it(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         images = [image(width=None), image("b.jpg", 2)]
         read(coco(images, [ball(), ball(identity=2), ball(2, 3)]))
@@ -422,19 +428,21 @@ class TestJoins:
         assert problem.problem.endswith("left out with 2 annotations")
 
     def test_annotations_without_an_image_are_counted(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         read(coco(annotations=[ball(), ball(2, 2), ball(3, 3)]))
         assert report.counts["annotations without image"] == 2
 
     def test_a_file_of_sn_gamestate_is_said_to_be_one(
-        self, read: Callable[[Any], list[Group]], report: Report
+        self, read: Callable[[Any], list[Group]], report: ReaderReport
     ) -> None:
         person = {"id": "1", "image_id": "1", "category_id": 1, "bbox_image": {"x": 1, "y": 2}}
         assert read(coco(annotations=[person])) == []
         assert "import it as gamestate" in report.problems[0].problem
 
-    def test_a_json_file_of_something_else_is_said(self, tmp_path: Path, report: Report) -> None:
+    def test_a_json_file_of_something_else_is_said(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         write(tmp_path, {"x.json": coco(), "package.json": {"name": "x"}})
         assert len(list(read_coco(tmp_path, report))) == 1
         assert any("package.json: is no COCO file" in remark for remark in report.remarks)
@@ -455,7 +463,7 @@ class TestSplits:
         ],
     )
     def test_they_are_in_the_name_of_the_file_or_of_a_folder(
-        self, tmp_path: Path, report: Report, file: str, name: str, split: str
+        self, tmp_path: Path, report: ReaderReport, file: str, name: str, split: str
     ) -> None:
         write(tmp_path, {file: coco([image(name)])})
         (group,) = read_coco(tmp_path, report)

@@ -13,7 +13,7 @@ import pytest
 
 from app.formats.camera_json import camera_to_json
 from app.formats.coco_reader import read_coco
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
@@ -110,7 +110,13 @@ def combinations() -> Iterator[tuple[str, str, str, str]]:
 @pytest.mark.parametrize(("ids", "shape", "categories", "names"), sorted(set(combinations())))
 @pytest.mark.parametrize("form", ["NFC", "NFD"])
 def test_the_ball_is_where_it_is_and_the_pictures_are_found(
-    tmp_path: Path, report: Report, ids: str, shape: str, categories: str, names: str, form: Any
+    tmp_path: Path,
+    report: ReaderReport,
+    ids: str,
+    shape: str,
+    categories: str,
+    names: str,
+    form: Any,
 ) -> None:
     folder = NAMES[names][1]
     files: dict[str, Any] = {

@@ -10,7 +10,7 @@ from app.features.exports.service import export_dataset
 from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.parquet import read_parquet
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.group import Station
 from tests.balls import box_around
 from tests.cameras import WIDE_LENSES, wide
@@ -67,7 +67,7 @@ class TestWideLenses:
     def test_camera_files_bring_it_back(self, store, fill, group, lens, tmp_path) -> None:
         fill(group)
         export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
-        found = read_cameras(tmp_path / "out", Report())
+        found = read_cameras(tmp_path / "out", ReaderReport())
         (camera,) = [camera for camera in found.values() if camera.is_wide]
         assert camera == group.views[1].station.given
         (text,) = [path.read_text() for path in tmp_path.rglob("camera_7_1.json")]
@@ -79,5 +79,5 @@ class TestWideLenses:
     ) -> None:
         fill(group)
         out = export_dataset(store, "demo", kind, tmp_path / "out", everything=True).out
-        (again,) = read(out, Report())
+        (again,) = read(out, ReaderReport())
         assert again.views[1].station.given == group.views[1].station.given

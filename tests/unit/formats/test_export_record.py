@@ -28,7 +28,7 @@ class TestExportRecord:
         group = soccer_group(replays=3)
         gone = replace(group.views[3], balls=(BallAnnotation(out_of_view=True),))
         record = solved(replace(group, views=(*group.views[:3], gone)))
-        keys = [view.key for view in record.for_training().group.views]
+        keys = [view.key for view in record.keep_training_views().group.views]
         assert keys == ["7.png", "7_1.png", "7_3.png"]
 
     def test_calibrated_means_through_the_gates_on_cameras(

@@ -9,7 +9,7 @@ from PIL import Image
 from app.config import Settings
 from app.errors import InputError
 from app.formats.frames_reader import check_grouping, read_frames
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.media.images import check_size, read_header
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media
@@ -21,7 +21,7 @@ def size_of(data: bytes, name: str) -> ImageSize:
     return ImageSize(header.width, header.height)
 
 
-def read(root: Path, report: Report, grouping: str = "") -> list[Group]:
+def read(root: Path, report: ReaderReport, grouping: str = "") -> list[Group]:
     return list(read_frames(root, size_of, report, grouping=grouping))
 
 
@@ -42,7 +42,7 @@ def shots(tmp_path: Path) -> Path:
 
 class TestReadFrames:
     def test_each_picture_is_a_group_of_one_view_of_its_own_size(
-        self, shots: Path, report: Report
+        self, shots: Path, report: ReaderReport
     ) -> None:
         first, second = read(shots, report)
         assert (first.key, second.key) == ("b.jpg", "day 2/a.PNG")
@@ -55,7 +55,7 @@ class TestReadFrames:
         assert (report.read, report.imported) == (2, 2)
 
     def test_a_zip_and_a_single_picture_will_do(
-        self, shots: Path, tmp_path: Path, report: Report
+        self, shots: Path, tmp_path: Path, report: ReaderReport
     ) -> None:
         with zipfile.ZipFile(tmp_path / "shots.zip", "w") as archive:
             archive.write(shots / "b.jpg", "x/b.jpg")
@@ -66,7 +66,7 @@ class TestReadFrames:
         assert report.problems == []
 
     def test_what_is_no_picture_is_named_and_files_of_the_system_are_not(
-        self, shots: Path, report: Report
+        self, shots: Path, report: ReaderReport
     ) -> None:
         for name in ("notes.txt", "iphone.heic", "Thumbs.db", ".DS_Store", "match.mp4"):
             (shots / name).write_bytes(b"x")
@@ -80,13 +80,13 @@ class TestReadFrames:
         assert told["c.jpg"] == "is damaged in its header"
         assert told["wide.png"].startswith("declares 600 x 10 pixels")
 
-    def test_a_folder_without_pictures_says_so(self, tmp_path: Path, report: Report) -> None:
+    def test_a_folder_without_pictures_says_so(self, tmp_path: Path, report: ReaderReport) -> None:
         assert read(tmp_path, report) == []
         (problem,) = report.problems
         assert problem.problem == "holds no picture (JPEG, PNG or WebP)"
 
     def test_a_large_profile_before_the_size_is_passed_over(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         Image.new("RGB", (128, 72)).save(tmp_path / "a.jpg", icc_profile=bytes(200_000))
         (group,) = read(tmp_path, report)
@@ -102,7 +102,7 @@ class TestGrouping:
             Image.new("RGB", (128, 72)).save(root / name)
         return root
 
-    def test_pictures_of_a_folder_are_one_group(self, instants: Path, report: Report) -> None:
+    def test_pictures_of_a_folder_are_one_group(self, instants: Path, report: ReaderReport) -> None:
         assert keys(read(instants, report, "folder")) == {
             "pictures": ["1_goal.JPG", "1_main.jpg", "2_main.jpg", "poster.png"],
             "late": ["1_main.jpg"],
@@ -113,7 +113,7 @@ class TestGrouping:
         ]
 
     def test_a_pattern_groups_by_the_instant_within_a_folder(
-        self, instants: Path, report: Report
+        self, instants: Path, report: ReaderReport
     ) -> None:
         groups = read(instants, report, "{instant}_{camera}.jpg")
         assert keys(groups) == {

@@ -15,7 +15,7 @@ from app.formats.camera_json import camera_from_json
 from app.formats.export_record import ExportRecord
 from app.formats.gamestate_reader import read_gamestate, sequence_frame_path
 from app.formats.gamestate_writer import write_gamestate
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import Extras
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -87,7 +87,7 @@ def person(tag: str | None, name: str = "Player team left", **corners: float) ->
 
 
 @pytest.fixture
-def read(tmp_path: Path, report: Report) -> Read:
+def read(tmp_path: Path, report: ReaderReport) -> Read:
     def run(value: Any, folder: str = "test/SNGS-060") -> list[Group]:
         path = tmp_path / "in" / folder
         path.mkdir(parents=True, exist_ok=True)
@@ -114,7 +114,7 @@ class TestReadGamestate:
 
     @pytest.mark.parametrize("spelt", [float, str, lambda n: f"{n}.0"])
     def test_ids_that_are_equal_as_numbers_join(
-        self, read: Read, labels: Value, report: Report, spelt: Callable[[int], Any]
+        self, read: Read, labels: Value, report: ReaderReport, spelt: Callable[[int], Any]
     ) -> None:
         for item in labels["annotations"]:
             item["image_id"] = spelt(int(item["image_id"]))
@@ -124,7 +124,7 @@ class TestReadGamestate:
         assert list(first.views[0].station.lines) == ["Goal left post left"]
 
     def test_a_category_that_is_not_listed_is_named(
-        self, read: Read, labels: Value, report: Report
+        self, read: Read, labels: Value, report: ReaderReport
     ) -> None:
         labels["annotations"][0]["category_id"] = 77
         before = len(report.problems)
@@ -139,7 +139,7 @@ class TestReadGamestate:
         assert len(read(labels)[0].views[0].balls) == 1
 
     def test_one_number_that_is_none_loses_no_sequence(
-        self, read: Read, labels: Value, report: Report
+        self, read: Read, labels: Value, report: ReaderReport
     ) -> None:
         labels["annotations"][0]["score"] = float("nan")
         assert len(read(labels)) == 2
@@ -165,7 +165,7 @@ class TestReadGamestate:
         assert second.views[0].media is None
 
     def test_unsound_records_are_named_and_the_rest_is_read(
-        self, read: Read, labels: Value, report: Report
+        self, read: Read, labels: Value, report: ReaderReport
     ) -> None:
         labels["images"] += [
             {"image_id": "9", "file_name": "../x.jpg", "width": 10, "height": 10},
@@ -187,12 +187,14 @@ class TestReadGamestate:
         ]
 
     @pytest.mark.parametrize("value", [[], {"images": {}, "annotations": []}, "x"])
-    def test_what_is_no_such_file_is_reported(self, read: Read, report: Report, value: Any) -> None:
+    def test_what_is_no_such_file_is_reported(
+        self, read: Read, report: ReaderReport, value: Any
+    ) -> None:
         assert read(value) == []
         assert report.problems
 
     def test_two_sequences_of_one_name_are_not_mixed(
-        self, read: Read, labels: Value, report: Report
+        self, read: Read, labels: Value, report: ReaderReport
     ) -> None:
         read(labels, "a/SNGS-060")
         groups = read(labels, "b/SNGS-060")
@@ -200,7 +202,7 @@ class TestReadGamestate:
         assert "describes the sequence SNGS-060 again" in report.problems[-1].problem
 
     def test_a_match_in_two_splits_is_one_sequence_with_each_image_once(
-        self, tmp_path: Path, soccer_group: Make, report: Report
+        self, tmp_path: Path, soccer_group: Make, report: ReaderReport
     ) -> None:
         pairs = (("7.png", "train"), ("8.png", "test"))
         write(tmp_path, [soccer_group(name, split=split) for name, split in pairs])
@@ -217,7 +219,7 @@ class TestReadGamestate:
 
 class TestWriteGamestate:
     def test_comes_back_as_it_was(
-        self, read: Read, labels: Value, tmp_path: Path, report: Report
+        self, read: Read, labels: Value, tmp_path: Path, report: ReaderReport
     ) -> None:
         groups = read(labels)
         counts = write(tmp_path / "out", groups)
@@ -347,7 +349,12 @@ class TestWhatEvaluatorsAskFor:
         assert third is None
 
     def test_the_camera_is_there_and_comes_back(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, camera: Camera, report: Report
+        self,
+        tmp_path: Path,
+        solved: Solved,
+        soccer_group: Make,
+        camera: Camera,
+        report: ReaderReport,
     ) -> None:
         write_gamestate(tmp_path / "out", [solved(soccer_group(replays=0))])
         (item,) = (
@@ -393,7 +400,7 @@ class TestWhatEvaluatorsAskFor:
             write_gamestate(tmp_path, [solved(soccer_group(match=name)) for name in ("a/b", "a_b")])
 
     def test_frames_lie_where_a_sequence_looks_for_them(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group(replays=0)
         write_gamestate(tmp_path, [solved(group)])

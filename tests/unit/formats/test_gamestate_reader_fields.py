@@ -13,7 +13,7 @@ import pytest
 from app.formats.export_record import ExportRecord
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.gamestate_writer import write_gamestate
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
@@ -185,7 +185,7 @@ def test_what_was_not_annotated_is_not_said_to_be_labelled(
 
 
 @pytest.fixture
-def brought(tmp_path: Path, report: Report) -> Group:
+def brought(tmp_path: Path, report: ReaderReport) -> Group:
     """An image of a sequence with tracks and a camera of its own, to which a ball was added."""
     box = {"x": 10, "y": 20, "x_center": 12, "y_center": 23, "w": 4, "h": 6}
     head = {"image_id": "3060000001", "supercategory": "object", "bbox_image": box}

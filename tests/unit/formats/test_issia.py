@@ -12,7 +12,7 @@ from app.formats.camera_json import camera_to_json
 from app.formats.issia import MIRRORED, find_cameras_with_mirrored_people, mirror_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.viper_reader import ViperTrack
 from app.geometry.camera import Camera
 from tests.cameras import looking
@@ -121,7 +121,7 @@ def people(folder: IssiaFolder) -> list[float]:
 
 class TestReading:
     def test_boxes_are_turned_and_balls_are_not_and_it_is_said(self, tmp_path: Path):
-        report = Report()
+        report = ReaderReport()
         folder = open_issia(issia_folder(tmp_path / "issia"), IssiaOptions(), report)
         right = [box[1] for box in boxes(CAMERAS[2])]
         assert sorted(people(folder)) == pytest.approx(sorted([*right, *right]), abs=1e-6)
@@ -130,13 +130,13 @@ class TestReading:
         assert [text for text in report.remarks if text.startswith("People of cam2 are turned")]
 
     def test_what_is_written_again_is_not_turned_once_more(self, tmp_path: Path):
-        folder = open_issia(issia_folder(tmp_path / "issia"), IssiaOptions(), Report())
+        folder = open_issia(issia_folder(tmp_path / "issia"), IssiaOptions(), ReaderReport())
         (tmp_path / "out").mkdir()
         write_issia(tmp_path / "out", folder.groups(), folder.persons())
         for given in (True, False):
             if not given:
                 (tmp_path / "out" / "issia_calibration.json").unlink()
-            report = Report()
+            report = ReaderReport()
             again = open_issia(tmp_path / "out", IssiaOptions(), report)
             assert people(again) == pytest.approx(people(folder))
             assert not [text for text in report.remarks if "turned" in text]

@@ -14,7 +14,7 @@ from app.formats.cameras import read_cameras
 from app.formats.export_record import ExportRecord
 from app.formats.issia_3d import open_issia_3d, write_issia_3d
 from app.formats.issia_reader import IssiaOptions
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -33,7 +33,7 @@ def folder(tmp_path: Path, camera_json: dict[str, Any]) -> Path:
 
 class TestOpenIssia3d:
     def test_each_camera_with_both_coordinates_annotates_the_ball(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         first, second = open_issia_3d(folder, IssiaOptions(), report).groups()
         assert (first.key, second.key) == ("12", "358")
@@ -44,7 +44,7 @@ class TestOpenIssia3d:
         assert (report.read, report.imported) == (2, 2)
 
     def test_a_camera_is_one_station_with_what_was_given(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         first, second = open_issia_3d(folder, IssiaOptions(), report).groups()
         station = second.views[1].station
@@ -53,7 +53,7 @@ class TestOpenIssia3d:
         assert second.views[0].station.given is None
 
     def test_half_a_point_a_second_row_and_no_frame_are_reported(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         rows = "0,5,1,,2,3,1,,\n1,5,4,5,,,1,,\n2,x,4,5,,,1,,\n"
         (tmp_path / "ISSIA-3D.csv").write_text(HEAD + rows)
@@ -63,7 +63,7 @@ class TestOpenIssia3d:
             ("line 2", "cam1"), ("line 3", "frame"), ("line 4", "frame"),
         ]  # fmt: skip
 
-    def test_a_folder_without_the_table_says_so(self, tmp_path: Path, report: Report) -> None:
+    def test_a_folder_without_the_table_says_so(self, tmp_path: Path, report: ReaderReport) -> None:
         assert list(open_issia_3d(tmp_path, IssiaOptions(), report).groups()) == []
         assert "holds no ISSIA-3D.csv" in report.problems[0].problem
 
@@ -141,7 +141,12 @@ class TestWriteIssia3d:
         assert list(row.items())[-1] == ("verdict", "unreviewed")
 
     def test_the_cameras_come_back(
-        self, tmp_path: Path, solved: Solved, issia_group: Make, camera: Camera, report: Report
+        self,
+        tmp_path: Path,
+        solved: Solved,
+        issia_group: Make,
+        camera: Camera,
+        report: ReaderReport,
     ) -> None:
         write_issia_3d(tmp_path, [solved(issia_group())])
         cameras = read_cameras(tmp_path / "issia_calibration.json", report)

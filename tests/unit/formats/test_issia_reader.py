@@ -8,7 +8,7 @@ import pytest
 
 from app.formats.camera_json import camera_to_json
 from app.formats.issia_reader import IssiaOptions, open_issia, parse_camera_number
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Media
@@ -56,13 +56,13 @@ def lines(tmp_path: Path) -> Path:
     return root
 
 
-def _groups(folder: Path, report: Report, options: IssiaOptions | None = None) -> list[Group]:
+def _groups(folder: Path, report: ReaderReport, options: IssiaOptions | None = None) -> list[Group]:
     return list(open_issia(folder, options or IssiaOptions(), report).groups())
 
 
 class TestGroups:
     def test_frames_with_a_ball_are_groups_by_video_frame(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         first, second = _groups(folder, report)
         assert (first.key, second.key) == ("10", "11")
@@ -73,14 +73,14 @@ class TestGroups:
         assert report.problems == []
         assert (report.read, report.imported) == (2, 2)
 
-    def test_views_of_a_camera_share_one_station(self, folder: Path, report: Report) -> None:
+    def test_views_of_a_camera_share_one_station(self, folder: Path, report: ReaderReport) -> None:
         first, second = _groups(folder, report)
         station = first.views[0].station
         assert station is second.views[0].station
         assert (station.key, station.shared, station.size) == ("cam3", True, ImageSize(1920, 1080))
 
     def test_the_calibration_of_the_folder_is_given(
-        self, folder: Path, report: Report, camera: Camera
+        self, folder: Path, report: ReaderReport, camera: Camera
     ) -> None:
         first, _ = _groups(folder, report)
         assert first.views[0].station.given == camera
@@ -88,7 +88,7 @@ class TestGroups:
         assert first.views[0].station.calibration == "given"
 
     def test_lines_of_static_cameras_are_pixels_and_may_count_instead(
-        self, folder: Path, report: Report, lines: Path
+        self, folder: Path, report: ReaderReport, lines: Path
     ) -> None:
         options = IssiaOptions(lines=lines, calibration="lines")
         station = _groups(folder, report, options)[0].views[0].station
@@ -96,7 +96,9 @@ class TestGroups:
         assert station.calibration == "lines"
         assert station.given is not None
 
-    def test_people_travel_with_a_view_that_has_a_ball(self, folder: Path, report: Report) -> None:
+    def test_people_travel_with_a_view_that_has_a_ball(
+        self, folder: Path, report: ReaderReport
+    ) -> None:
         first, second = _groups(folder, report)
         assert first.views[0].extras.boxes[1] == {
             "class": "Person",
@@ -106,7 +108,7 @@ class TestGroups:
         assert second.views[0].extras.boxes == ()
         assert report.counts == {"ball points": 3, "persons": 6, "frames with persons only": 1}
 
-    def test_the_offset_may_differ_by_camera(self, folder: Path, report: Report) -> None:
+    def test_the_offset_may_differ_by_camera(self, folder: Path, report: ReaderReport) -> None:
         options = IssiaOptions(frame_offset={4: 7})
         groups = _groups(folder, report, options)
         assert [(g.key, [v.key for v in g.views]) for g in groups] == [
@@ -114,11 +116,11 @@ class TestGroups:
             ("11", ["cam3", "cam4"]),
         ]
 
-    def test_a_flip_is_a_setting_of_the_station(self, folder: Path, report: Report) -> None:
+    def test_a_flip_is_a_setting_of_the_station(self, folder: Path, report: ReaderReport) -> None:
         first, _ = _groups(folder, report, IssiaOptions(flipped=frozenset({4})))
         assert [view.station.flipped for view in first.views] == [False, True]
 
-    def test_videos_and_frames_beside_are_found(self, folder: Path, report: Report) -> None:
+    def test_videos_and_frames_beside_are_found(self, folder: Path, report: ReaderReport) -> None:
         (folder / "cam3.mp4").write_bytes(b"")
         (folder / "cam1_cam2_stacked.mp4").write_bytes(b"")
         (folder / "cam4").mkdir()
@@ -129,20 +131,20 @@ class TestGroups:
         assert second.views[0].media == Media(str(folder / "cam3.mp4"), frame=11)
 
     def test_a_zip_of_the_folder_will_do(
-        self, folder: Path, report: Report, make_zip: Callable[..., Path]
+        self, folder: Path, report: ReaderReport, make_zip: Callable[..., Path]
     ) -> None:
         members = {
             str(path.relative_to(folder)): path.read_bytes()
             for path in folder.rglob("*")
             if path.is_file()
         }
-        assert _groups(make_zip(members), report) == _groups(folder, Report())
+        assert _groups(make_zip(members), report) == _groups(folder, ReaderReport())
 
     def test_reading_again_gives_the_same_groups(self, folder: Path) -> None:
-        assert _groups(folder, Report()) == _groups(folder, Report())
+        assert _groups(folder, ReaderReport()) == _groups(folder, ReaderReport())
 
     def test_a_bad_camera_is_reported_and_all_groups_stay(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         text = (folder / "issia_calibration.json").read_text()
         (folder / "issia_calibration.json").write_text(text.replace("2100.5", "-2100.5"))
@@ -151,7 +153,7 @@ class TestGroups:
         assert (report.problems[0].record, report.problems[0].field) == ("cam3", "x_focal_length")
 
     def test_a_file_without_a_number_and_a_second_file_are_reported(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         (folder / "truth" / "truth.xgtf").write_text("<viper/>")
         (folder / "truth" / "cam3.xgtf").write_text("<viper/>")
@@ -162,11 +164,13 @@ class TestGroups:
             "has no camera number in its name", "is left out: another file of camera 3 was read already",
         }  # fmt: skip
 
-    def test_a_folder_without_xgtf_is_reported(self, tmp_path: Path, report: Report) -> None:
+    def test_a_folder_without_xgtf_is_reported(self, tmp_path: Path, report: ReaderReport) -> None:
         assert _groups(tmp_path, report) == []
         assert "holds no XGTF file" in str(report.problems[0])
 
-    def test_a_frame_of_cameras_of_both_splits_has_none(self, folder: Path, report: Report) -> None:
+    def test_a_frame_of_cameras_of_both_splits_has_none(
+        self, folder: Path, report: ReaderReport
+    ) -> None:
         (folder / "cam1.xgtf").write_text(_xgtf({18: (5, 5), 30: (6, 6)}, {}))
         groups = _groups(folder, report)
         assert [(group.key, group.split) for group in groups] == [
@@ -175,13 +179,15 @@ class TestGroups:
 
 
 class TestPersons:
-    def test_people_that_no_view_holds(self, folder: Path, report: Report) -> None:
+    def test_people_that_no_view_holds(self, folder: Path, report: ReaderReport) -> None:
         persons = list(open_issia(folder, IssiaOptions(), report).persons())
         assert [(item.frame, item.camera, len(item.boxes)) for item in persons] == [
             (12, "cam3", 3), (11, "cam4", 1),
         ]  # fmt: skip
 
-    def test_nobody_is_lost_between_views_and_persons(self, folder: Path, report: Report) -> None:
+    def test_nobody_is_lost_between_views_and_persons(
+        self, folder: Path, report: ReaderReport
+    ) -> None:
         found = open_issia(folder, IssiaOptions(), report)
         in_views = sum(len(view.extras.boxes) for group in found.groups() for view in group.views)
         others = sum(len(item.boxes) for item in found.persons())
@@ -221,14 +227,14 @@ class TestSizeOfTheFile:
         return folder
 
     def test_counts_for_its_camera_where_no_size_is_asked_for(
-        self, sized: Path, report: Report
+        self, sized: Path, report: ReaderReport
     ) -> None:
         first = _groups(sized, report)[0]
         assert [view.size for view in first.views] == [ImageSize(1280, 720), ImageSize(1920, 1080)]
         assert report.problems == [] and report.remarks == []
 
     def test_a_size_that_is_asked_for_counts_and_the_difference_is_told(
-        self, sized: Path, report: Report
+        self, sized: Path, report: ReaderReport
     ) -> None:
         first = _groups(sized, report, IssiaOptions(size=ImageSize(960, 540)))[0]
         assert {view.size for view in first.views} == {ImageSize(960, 540)}
@@ -239,7 +245,7 @@ class TestSizeOfTheFile:
         )
 
     def test_lines_are_read_for_the_size_of_their_camera(
-        self, sized: Path, report: Report, tmp_path: Path
+        self, sized: Path, report: ReaderReport, tmp_path: Path
     ) -> None:
         lines = tmp_path / "unit"
         lines.mkdir()
@@ -252,7 +258,7 @@ class TestSizeOfTheFile:
 
 
 class TestFileWithoutABall:
-    def test_is_told(self, folder: Path, report: Report) -> None:
+    def test_is_told(self, folder: Path, report: ReaderReport) -> None:
         (folder / "truth" / "cam5.xgtf").write_text(_xgtf({}, {18: 1}))
         _groups(folder, report)
         (remark,) = report.remarks
@@ -261,7 +267,7 @@ class TestFileWithoutABall:
 
 class TestFilesOfOtherNames:
     def test_xml_that_is_xgtf_is_read_and_other_xml_is_reported(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         path = folder / "truth" / "ground_truth_3.xgtf"
         path.rename(path.with_suffix(".xml"))
@@ -283,7 +289,7 @@ class TestSeveralSources:
         (folder / "truth" / name).write_text(text.replace("</data>", f"{more}</data>"))
 
     def test_sources_that_name_their_cameras_are_those_cameras(
-        self, folder: Path, report: Report
+        self, folder: Path, report: ReaderReport
     ) -> None:
         self._write(folder, "both.xgtf", "cam1.avi", "C:\\videos\\camera_2.avi")
         keys = [view.key for view in _groups(folder, report)[0].views]
@@ -291,7 +297,9 @@ class TestSeveralSources:
         assert report.problems == []
 
     @pytest.mark.parametrize("second", ["part2.avi", "cam1.avi", ""])
-    def test_others_are_left_out_and_named(self, folder: Path, report: Report, second: str) -> None:
+    def test_others_are_left_out_and_named(
+        self, folder: Path, report: ReaderReport, second: str
+    ) -> None:
         self._write(folder, "cam1.xgtf", "cam1.avi", second)
         (view, *_) = _groups(folder, report)[0].views
         assert (view.key, view.balls[0].point) == ("cam1", ImagePoint(1.0, 2.0))

@@ -10,7 +10,7 @@ from app.errors import InputError
 from app.formats.issia import FramePersons
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import ImagePoint
@@ -30,7 +30,7 @@ def with_extras(group: Group, extras: Extras) -> Group:
 
 class TestWriteIssia:
     def test_comes_back_as_it_was(
-        self, tmp_path: Path, issia_group: Make, camera: Camera, report: Report
+        self, tmp_path: Path, issia_group: Make, camera: Camera, report: ReaderReport
     ) -> None:
         extras = Extras((person("2", 5.0), person("10", 1.0)), (), {"ball": {"SHOT": "a < b"}})
         group = with_extras(issia_group(358), extras)
@@ -57,7 +57,7 @@ class TestWriteIssia:
         assert '<data:point framespan="366:366" x="300" y="50.5"/>' in text
 
     def test_several_balls_of_a_frame_all_stay(
-        self, tmp_path: Path, issia_group: Make, report: Report
+        self, tmp_path: Path, issia_group: Make, report: ReaderReport
     ) -> None:
         group = issia_group(1, cameras=(1,))
         balls = tuple(BallAnnotation(point=ImagePoint(x, 2.0)) for x in (9.0, 3.0))
@@ -67,7 +67,7 @@ class TestWriteIssia:
         assert again.views[0].balls == balls
 
     def test_text_cannot_leave_its_attribute(
-        self, tmp_path: Path, issia_group: Make, report: Report
+        self, tmp_path: Path, issia_group: Make, report: ReaderReport
     ) -> None:
         evil = '"/><object name="BALL">\n\x00&lt;'
         extras = Extras((person(evil, 1.0),), (), {"ball": {"SHOT": evil}})

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.errors import DatasetFormatError
 from app.formats.json_reader import MAX_DEPTH, MAX_NAMED, parse_literal, read_json, read_json_lines
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 
 PLAIN = st.recursive(
     st.none()
@@ -48,7 +48,7 @@ class TestReadJson:
     def test_with_a_report_one_bad_number_is_missing_and_the_rest_is_read(
         self, text: str, value: Any, place: str
     ) -> None:
-        report = Report()
+        report = ReaderReport()
         assert read_json(text.encode(), "f", report=report, double_encoded=True) == value
         (remark,) = report.remarks
         assert remark.startswith(place)
@@ -57,7 +57,7 @@ class TestReadJson:
         assert report.problems == []
 
     def test_of_many_bad_numbers_the_first_are_named_and_the_rest_are_counted(self) -> None:
-        report = Report()
+        report = ReaderReport()
         text = json.dumps({"annotations": [{"area": math.nan}] * 150})
         value = read_json(text.encode(), "f", report=report)
         assert value == {"annotations": [{"area": None}] * 150}
@@ -67,7 +67,7 @@ class TestReadJson:
         )
 
     def test_a_python_literal_with_nan_is_read_alike(self) -> None:
-        report = Report()
+        report = ReaderReport()
         text = json.dumps("{'a': [nan, -inf, 1.5], 'b': 'nan'}").encode()
         value = read_json(text, "f", report=report, double_encoded=True)
         assert value == {"a": [None, None, 1.5], "b": "nan"}
@@ -77,7 +77,7 @@ class TestReadJson:
                 read_json(json.dumps(bad).encode(), "f", report=report, double_encoded=True)
 
     def test_words_in_texts_are_no_numbers(self) -> None:
-        report = Report()
+        report = ReaderReport()
         text = b'{"NaN": "Infinity", "a": 1e10, "b": 1.5e+20}'
         assert read_json(text, "f", report=report) == json.loads(text)
         assert report.problems == []
@@ -161,7 +161,7 @@ class TestNan:
     @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999"])
     def test_is_kept_or_null_as_the_reader_wants(self, text: str) -> None:
         content = f'{{"a": {text}, "b": 1.5}}'.encode()
-        report = Report()
+        report = ReaderReport()
         assert read_json(content, "f", report=report) == {"a": None, "b": 1.5}
         assert [remark.startswith("f, a: ") for remark in report.remarks] == [True]
         assert not math.isfinite(read_json(content, "f", nan="keep")["a"])
@@ -174,17 +174,17 @@ class TestNan:
 
 class TestReadJsonLines:
     def test_an_object_a_line(self) -> None:
-        report = Report()
+        report = ReaderReport()
         assert read_json_lines(b'{"a": 1}\n\n{"a": 2}\n', "f", report) == [{"a": 1}, {"a": 2}]
         assert report.problems == []
 
     def test_a_bad_line_is_named(self) -> None:
-        report = Report()
+        report = ReaderReport()
         assert read_json_lines(b'{"a": 1}\n{"a": \n', "f", report) == [{"a": 1}]
         assert (report.read, report.problems[0].record) == (1, "line 2")
 
     @pytest.mark.parametrize("text", ['{\n"a": [\n{}\n', "1\n2\n", '{"a": 1}', ""])
     def test_anything_else_is_none(self, text: str) -> None:
-        report = Report()
+        report = ReaderReport()
         assert read_json_lines(text.encode(), "f", report) is None
         assert report.problems == []

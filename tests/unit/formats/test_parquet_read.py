@@ -12,7 +12,7 @@ import pytest
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Limits
 from app.formats.parquet import read_parquet, write_parquet
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.group import Group, LeftOut
 from app.soccer.picture import PictureGeometry
@@ -25,7 +25,7 @@ COVARIANCE = tuple(np.diag(np.arange(1, 9) / 7).ravel().tolist())
 class TestReadParquet:
     def test_a_file_alone_a_folder_and_a_zip_give_the_same(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, make_zip: Callable[..., Path],
-        report: Report, camera: Camera,
+        report: ReaderReport, camera: Camera,
     ) -> None:  # fmt: skip
         groups = [soccer_group(), soccer_group("8.png", split="test", label="x")]
         why = LeftOut("other", "another match")
@@ -49,21 +49,21 @@ class TestReadParquet:
 
     @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + b"\x00" * 200 + b"PAR1"])
     def test_a_damaged_file_is_reported(
-        self, tmp_path: Path, report: Report, content: bytes
+        self, tmp_path: Path, report: ReaderReport, content: bytes
     ) -> None:
         (tmp_path / "a.parquet").write_bytes(content)
         assert list(read_parquet(tmp_path, report)) == []
         assert "not a sound Parquet file" in report.problems[0].problem
 
     def test_another_table_is_refused_by_its_first_missing_column(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         pq.write_table(pa.table({"group": ["a"]}), tmp_path / "a.parquet")
         assert list(read_parquet(tmp_path, report)) == []
         assert report.problems[0].field == "view"
 
     def test_a_row_that_is_wrong_is_named_and_left_out(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         write_parquet(tmp_path, [solved(soccer_group()), solved(soccer_group("8.png"))])
         path = tmp_path / "views.parquet"
@@ -78,7 +78,7 @@ class TestReadParquet:
 
     def test_a_member_beyond_the_limit_is_refused(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, make_zip: Callable[..., Path],
-        report: Report,
+        report: ReaderReport,
     ) -> None:  # fmt: skip
         write_parquet(tmp_path, [solved(soccer_group())])
         packed = make_zip({"views.parquet": (tmp_path / "views.parquet").read_bytes()})

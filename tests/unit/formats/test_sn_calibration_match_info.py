@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import (
     MatchInfoWriter,
     match_info_of_view,
@@ -18,7 +18,7 @@ from app.formats.trees import open_tree
 from app.soccer.group import Group
 
 
-def read(root: Path, report: Report) -> Any:
+def read(root: Path, report: ReaderReport) -> Any:
     tree = open_tree(root, report)
     assert tree is not None
     return read_match_info(tree, tree.names(), report)
@@ -26,7 +26,7 @@ def read(root: Path, report: Report) -> Any:
 
 class TestReadMatchInfo:
     def test_images_by_their_place_and_both_files_together(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         (tmp_path / "valid").mkdir()
         first = {"00001.jpg": {"match": "m"}, "00002.jpg": "league/season/match", "00003.jpg": 3}
@@ -38,7 +38,9 @@ class TestReadMatchInfo:
         assert match_of_record(found["valid/00002"]) == "league/season/match"
         assert [item.record for item in report.problems] == ["00003.jpg"]
 
-    def test_a_file_that_is_no_object_is_reported(self, tmp_path: Path, report: Report) -> None:
+    def test_a_file_that_is_no_object_is_reported(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         (tmp_path / "match_info.json").write_text("[]")
         assert read(tmp_path, report) == {}
         assert "not an object" in report.problems[0].problem
@@ -64,7 +66,7 @@ class TestMatchOf:
 
 class TestMatchInfoWriter:
     def test_writes_what_it_reads(
-        self, tmp_path: Path, soccer_group: Callable[..., Group], report: Report
+        self, tmp_path: Path, soccer_group: Callable[..., Group], report: ReaderReport
     ) -> None:
         group = soccer_group(match="l/s/m")
         with MatchInfoWriter(tmp_path) as info:

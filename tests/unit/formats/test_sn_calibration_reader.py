@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.errors import DatasetFormatError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import DEFAULT_SIZE
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.soccer.frames import ImageSize
@@ -21,31 +21,35 @@ NAMED_WITH_SPACE = json.dumps(
 
 
 class TestLinesFromJson:
-    def test_normalised_points_scale_by_size_less_one(self, report: Report) -> None:
+    def test_normalised_points_scale_by_size_less_one(self, report: ReaderReport) -> None:
         lines, _ = lines_from_json({"Middle line": LINE}, ImageSize(961, 541), "f", report)
         assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
 
-    def test_a_file_with_half_of_its_points_beyond_two_is_in_pixels(self, report: Report) -> None:
+    def test_a_file_with_half_of_its_points_beyond_two_is_in_pixels(
+        self, report: ReaderReport
+    ) -> None:
         value = {"Middle line": [{"x": 1.5, "y": 0.5}, {"x": 640, "y": 2}]}
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "f", report)
         assert lines["Middle line"] == ((1.5, 0.5), (640.0, 2.0))
 
-    def test_a_trailing_space_does_not_matter(self, report: Report) -> None:
+    def test_a_trailing_space_does_not_matter(self, report: ReaderReport) -> None:
         lines, _ = lines_from_json({"Goal left post left ": LINE}, DEFAULT_SIZE, "f", report)
         assert list(lines) == ["Goal left post left"]
 
-    def test_both_spellings_of_one_marking_are_joined(self, report: Report) -> None:
+    def test_both_spellings_of_one_marking_are_joined(self, report: ReaderReport) -> None:
         value = {"Goal left post left ": LINE, "Goal left post left": LINE}
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "f", report)
         assert len(lines["Goal left post left"]) == 4
 
-    def test_a_line_without_geometry_is_kept_silently(self, report: Report) -> None:
+    def test_a_line_without_geometry_is_kept_silently(self, report: ReaderReport) -> None:
         lines, others = lines_from_json({"Line unknown": LINE}, ImageSize(961, 541), "f", report)
         assert not lines
         assert others == ({"class": "Line unknown", "points": [240.0, 270.0, 960.0, -67.5]},)
         assert report.problems == []
 
-    def test_an_unknown_marking_is_reported_and_kept_beside_the_rest(self, report: Report) -> None:
+    def test_an_unknown_marking_is_reported_and_kept_beside_the_rest(
+        self, report: ReaderReport
+    ) -> None:
         value = {"Corner flag": LINE, "Middle line": LINE}
         lines, others = lines_from_json(value, DEFAULT_SIZE, "a.json", report)
         assert list(lines) == ["Middle line"]
@@ -56,7 +60,7 @@ class TestLinesFromJson:
         "line", [5, [5], [{"x": 1}], [{"x": "a", "y": 1}], [{"x": None, "y": 1}], "text"]
     )
     def test_an_unreadable_line_is_reported_and_the_rest_kept(
-        self, report: Report, line: Any
+        self, report: ReaderReport, line: Any
     ) -> None:
         value = {"Circle left": line, "Middle line": LINE}
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "a.json", report)
@@ -64,7 +68,7 @@ class TestLinesFromJson:
         assert [problem.field for problem in report.problems] == ["Circle left"]
 
     def test_one_far_point_does_not_make_a_normalised_file_one_of_pixels(
-        self, report: Report
+        self, report: ReaderReport
     ) -> None:
         value = {"Middle line": [*LINE, {"x": 2.31, "y": 0.2}], "Circle left": LINE}
         lines, _ = lines_from_json(value, ImageSize(961, 541), "a.json", report)
@@ -76,7 +80,7 @@ class TestLinesFromJson:
 
     @pytest.mark.parametrize("far", [2.5, 900.0, -1e5])
     def test_points_near_the_corner_of_a_file_of_pixels_are_pixels(
-        self, report: Report, far: float
+        self, report: ReaderReport, far: float
     ) -> None:
         value = {"Middle line": [{"x": 0.5, "y": 1.5}, {"x": 300, "y": 2}, {"x": far, "y": 400}]}
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "f", report)
@@ -84,7 +88,7 @@ class TestLinesFromJson:
         assert report.problems == []
 
     @pytest.mark.parametrize("bad", [float("nan"), float("inf"), None, "a", 1e300])
-    def test_a_bad_number_costs_its_own_point_alone(self, report: Report, bad: Any) -> None:
+    def test_a_bad_number_costs_its_own_point_alone(self, report: ReaderReport, bad: Any) -> None:
         value = {"Middle line": [LINE[0], {"x": bad, "y": 0.5}, LINE[1]]}
         lines, _ = lines_from_json(value, ImageSize(961, 541), "a.json", report)
         assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
@@ -95,23 +99,23 @@ class TestLinesFromJson:
     @pytest.mark.parametrize(
         "name", ["Goal_left_post_left", "goal left post left", "Goal left post left "]
     )
-    def test_capitals_and_underscores_do_not_matter(self, report: Report, name: str) -> None:
+    def test_capitals_and_underscores_do_not_matter(self, report: ReaderReport, name: str) -> None:
         lines, _ = lines_from_json({name: LINE}, DEFAULT_SIZE, "f", report)
         assert list(lines) == ["Goal left post left"]
 
-    def test_pairs_are_points(self, report: Report) -> None:
+    def test_pairs_are_points(self, report: ReaderReport) -> None:
         value = {"Middle line": [[0.25, 0.5], [1.0, -0.125]]}
         lines, _ = lines_from_json(value, ImageSize(961, 541), "f", report)
         assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
 
-    def test_a_list_is_no_line_file(self, report: Report) -> None:
+    def test_a_list_is_no_line_file(self, report: ReaderReport) -> None:
         with pytest.raises(DatasetFormatError, match="not an object"):
             lines_from_json([], DEFAULT_SIZE, "f", report)
 
 
 class TestReadLineFiles:
     def test_a_zip_is_read_by_name_without_cameras_and_match_infos(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         text = json.dumps({"Middle line": LINE})
         path = make_zip(
@@ -124,7 +128,7 @@ class TestReadLineFiles:
         assert files[1].media is None
         assert (report.read, report.imported) == (2, 2)
 
-    def test_a_folder_is_read_alike(self, tmp_path: Path, report: Report) -> None:
+    def test_a_folder_is_read_alike(self, tmp_path: Path, report: ReaderReport) -> None:
         (tmp_path / "test").mkdir()
         (tmp_path / "test" / "00002.json").write_text(json.dumps({"Middle line": LINE}))
         (tmp_path / "test" / "00002.png").write_bytes(b"x")
@@ -133,14 +137,14 @@ class TestReadLineFiles:
         assert file.media == Media(str(tmp_path / "test" / "00002.png"))
 
     def test_equal_stems_in_two_folders_keep_their_folder(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"test/1.json": "{}", "train/1.json": "{}"})
         stems = [file.stem for file in read_line_files(path, DEFAULT_SIZE, report)]
         assert stems == ["test/1", "train/1"]
 
     def test_a_broken_file_is_reported_and_the_rest_read(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"1.json": '{"Middle line": [', "2.json": "[]", "3.json": "{}"})
         assert [file.stem for file in read_line_files(path, DEFAULT_SIZE, report)] == ["3"]
@@ -160,7 +164,9 @@ class TestReadLineFiles:
         ],
         ids=["object", "list"],
     )
-    def test_a_file_may_hold_many_images(self, tmp_path: Path, report: Report, value: Any) -> None:
+    def test_a_file_may_hold_many_images(
+        self, tmp_path: Path, report: ReaderReport, value: Any
+    ) -> None:
         (tmp_path / "lines.json").write_text(json.dumps(value))
         (tmp_path / "00001.jpg").write_bytes(b"x")
         first, second = read_line_files(tmp_path, DEFAULT_SIZE, report)
@@ -170,7 +176,7 @@ class TestReadLineFiles:
         assert (report.read, report.imported, report.problems) == (2, 2, [])
 
     def test_lines_inside_an_object_are_of_the_size_that_it_says(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         value = {"image": "00001.jpg", "width": 1281, "height": 721, "lines": {"Middle line": LINE}}
         (tmp_path / "00001.json").write_text(json.dumps(value))
@@ -181,7 +187,7 @@ class TestReadLineFiles:
         assert usual.lines["Middle line"][0] == pytest.approx(DEFAULT_SIZE.unit_to_pixel(0.25, 0.5))
 
     def test_pixels_of_another_size_are_scaled_about_the_corner_of_the_first_pixel(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         line = [{"x": -0.5, "y": 539.5}, {"x": 100, "y": 100}]
         lines = {"Middle line": line, "Line unknown": line}
@@ -195,7 +201,7 @@ class TestReadLineFiles:
         assert same.lines["Middle line"] == ((-0.5, 539.5), (100.0, 100.0))
 
     def test_a_bad_image_of_many_is_named_and_the_others_are_read(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         value = {"1.jpg": {"Middle line": LINE}, "2.jpg": None}
         (tmp_path / "all.json").write_text(json.dumps(value))
@@ -216,7 +222,7 @@ class TestReadLineFiles:
         ],
     )
     def test_a_file_that_holds_no_lines_says_what_it_is(
-        self, tmp_path: Path, report: Report, value: Any, what: str
+        self, tmp_path: Path, report: ReaderReport, value: Any, what: str
     ) -> None:
         (tmp_path / "00001.json").write_text(json.dumps(value))
         assert list(read_line_files(tmp_path, DEFAULT_SIZE, report)) == []
@@ -227,7 +233,7 @@ class TestReadLineFiles:
 
 
 class TestReadSnCalibration:
-    def test_each_frame_is_a_group_of_one_view(self, tmp_path: Path, report: Report) -> None:
+    def test_each_frame_is_a_group_of_one_view(self, tmp_path: Path, report: ReaderReport) -> None:
         (tmp_path / "00002.json").write_text(
             json.dumps({"Middle line": LINE, "Line unknown": LINE})
         )
@@ -239,7 +245,7 @@ class TestReadSnCalibration:
         assert view.size == DEFAULT_SIZE
 
     def test_the_match_the_split_and_the_record_of_an_image(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         for split in ("train", "test"):
             (tmp_path / split).mkdir()
@@ -258,7 +264,7 @@ class TestReadSnCalibration:
         assert report.problems == []
 
     def test_the_name_with_a_space_and_points_outside_are_kept(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         (tmp_path / "00001.json").write_text(NAMED_WITH_SPACE)
         (group,) = read_sn_calibration(tmp_path, DEFAULT_SIZE, report)

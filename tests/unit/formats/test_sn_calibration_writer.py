@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from app.errors import InputError, UnsafePathError
 from app.formats.cameras import read_cameras
 from app.formats.export_record import ExportRecord
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import DEFAULT_SIZE, LineFile, line_frame_path
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.formats.sn_calibration_writer import lines_to_json, write_line_files, write_sn_calibration
@@ -42,7 +42,7 @@ Make = Callable[..., Group]
 
 class TestWriteSnCalibration:
     def test_lines_and_cameras_lie_in_folders_of_their_own_and_come_back(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group(split="test")
         counts = write_sn_calibration(tmp_path, [solved(group)])
@@ -74,7 +74,7 @@ class TestWriteSnCalibration:
             assert all(re.fullmatch(prefix + r"[0-9a-f]{12}_7(_1)?\.json", name) for name in files)
 
     def test_what_came_from_sn_calibration_keeps_its_name(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         for split in ("train", "valid"):
             write_line_files(tmp_path / "in", [LineFile(f"{split}/00002", DEFAULT_SIZE, {})])
@@ -106,7 +106,7 @@ class TestWriteSnCalibration:
             write_sn_calibration(tmp_path, map(solved, groups))
 
     def test_the_layout_of_before_is_read_all_the_same(
-        self, tmp_path: Path, soccer_group: Make, camera: Camera, report: Report
+        self, tmp_path: Path, soccer_group: Make, camera: Camera, report: ReaderReport
     ) -> None:
         view = soccer_group(replays=0).views[0]
         write_line_files(tmp_path, [LineFile(f"{MATCH}/7", view.size, view.station.lines)])
@@ -123,7 +123,7 @@ class TestWriteSnCalibration:
 
 class TestTheFramesOfAnExport:
     def test_they_lie_beside_their_lines_where_they_are_found(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
         group = soccer_group(replays=0)
         write_sn_calibration(tmp_path, [solved(group)])
@@ -142,7 +142,7 @@ class TestLinesToJson:
         lines = make_lines({"Goal left post left": [(1.0, 2.0)]})
         assert list(lines_to_json(lines, DEFAULT_SIZE)) == ["Goal left post left "]
 
-    def test_points_far_outside_make_a_file_in_pixels(self, report: Report) -> None:
+    def test_points_far_outside_make_a_file_in_pixels(self, report: ReaderReport) -> None:
         lines = make_lines({"Middle line": [(5000.0, 1.0), (3.0, 4.0)]})
         value = lines_to_json(lines, DEFAULT_SIZE)
         assert value["Middle line"][0] == {"x": 5000.0, "y": 1.0}
@@ -152,7 +152,7 @@ class TestLinesToJson:
     def test_import_export_import_gives_the_same_lines(
         self, value: dict[str, Any], size: ImageSize
     ) -> None:
-        report = Report()
+        report = ReaderReport()
         first = lines_from_json(value, size, "f", report)
         text = json.dumps(lines_to_json(first[0], size, first[1]))
         assert lines_from_json(json.loads(text), size, "f", report) == first
@@ -160,7 +160,7 @@ class TestLinesToJson:
 
 
 class TestWriteLineFiles:
-    def test_what_is_written_is_read_the_same(self, tmp_path: Path, report: Report) -> None:
+    def test_what_is_written_is_read_the_same(self, tmp_path: Path, report: ReaderReport) -> None:
         lines = make_lines({"Middle line": [(0.0, 0.0), (959.0, 539.0)]})
         others = ({"class": "Line unknown", "points": [0.0, 539.0]},)
         files = [LineFile("a/00002", DEFAULT_SIZE, lines, others)]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.formats.file_tree import DEFAULT_LIMITS, Limits
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3 import MatchFrames, group_label, parse_image_numbers
 from app.formats.trees import open_tree
 from app.soccer.group import Media
@@ -40,7 +40,7 @@ class TestImageNumbers:
         assert parse_image_numbers("cam3") is None
 
 
-def _frames(folder: Path, report: Report) -> MatchFrames:
+def _frames(folder: Path, report: ReaderReport) -> MatchFrames:
     tree = open_tree(folder, report)
     assert tree is not None
     return MatchFrames(tree, "", tree.names(), report)
@@ -49,7 +49,7 @@ def _frames(folder: Path, report: Report) -> MatchFrames:
 class TestMatchFrames:
     @pytest.mark.parametrize("inside", ["", "v3_frames/", "Frames-v3/", "frames/"])
     def test_members_are_found_wherever_the_archive_has_them(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report, inside: str
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport, inside: str
     ) -> None:
         path = make_zip({f"{inside}7.png": b"x"}, tmp_path / "Frames-v3.zip")
         frames = _frames(tmp_path, report)
@@ -58,14 +58,14 @@ class TestMatchFrames:
         assert frames.has_frames
 
     def test_members_with_backslashes_keep_the_name_by_which_they_are_opened(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"frames\\7.png": b"x"}, tmp_path / "Frames-v3.zip")
         assert _frames(tmp_path, report).find_frame("7.png") == Media(str(path), "frames\\7.png")
 
     @pytest.mark.parametrize("inside", ["", "v3_frames/", "Frames-v3/", "frames/"])
     def test_loose_frames_are_found_alike(
-        self, tmp_path: Path, report: Report, inside: str
+        self, tmp_path: Path, report: ReaderReport, inside: str
     ) -> None:
         path = tmp_path / inside / "7.png"
         path.parent.mkdir(exist_ok=True)
@@ -73,7 +73,7 @@ class TestMatchFrames:
         assert _frames(tmp_path, report).find_frame("7.png") == Media(str(path))
 
     def test_a_truncated_archive_is_one_problem_and_loose_frames_still_serve(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"7.png": b"x" * 100}, tmp_path / "Frames-v3.zip")
         path.write_bytes(path.read_bytes()[:-30])
@@ -86,7 +86,7 @@ class TestMatchFrames:
         assert "not a complete zip file" in problem.problem
 
     def test_a_zip_of_a_whole_dataset_has_its_loose_frames(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"m/frames/7.png": b"x"})
         tree = open_tree(path, report)
@@ -98,7 +98,7 @@ class TestMatchFrames:
 class TestFramesOfAZippedTree:
     @pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
     def test_the_archive_inside_the_zip_is_read_in_place(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report, compression: int
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport, compression: int
     ) -> None:
         path = _nested(tmp_path, make_zip, {"v3_frames/7.png": b"x"}, compression)
         frames = _zipped(path, report)
@@ -108,7 +108,7 @@ class TestFramesOfAZippedTree:
         assert report.problems == []
 
     def test_a_damaged_archive_inside_is_one_problem(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"m/Frames-v3.zip": b"PK nothing", "m/8.png": b"x"})
         frames = _zipped(path, report)
@@ -129,7 +129,7 @@ class TestFramesOfAZippedTree:
         self,
         tmp_path: Path,
         make_zip: Callable[..., Path],
-        report: Report,
+        report: ReaderReport,
         limits: Limits,
         said: str,
     ) -> None:
@@ -140,7 +140,7 @@ class TestFramesOfAZippedTree:
         assert said in report.problems[0].problem
 
     def test_unsafe_members_inside_are_left_out(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = _nested(tmp_path, make_zip, {"../7.png": b"x", "8.png": b"x"}, zipfile.ZIP_STORED)
         frames = _zipped(path, report)
@@ -148,7 +148,7 @@ class TestFramesOfAZippedTree:
         assert [item.record for item in report.problems] == ["../7.png"]
 
     def test_an_archive_inside_the_archive_is_not_opened(
-        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         deep = make_zip({"7.png": b"x"}, tmp_path / "deep.zip").read_bytes()
         path = _nested(tmp_path, make_zip, {"Frames-v3.zip": deep}, zipfile.ZIP_STORED)
@@ -166,7 +166,7 @@ def _nested(
     return path
 
 
-def _zipped(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> MatchFrames:
+def _zipped(path: Path, report: ReaderReport, limits: Limits = DEFAULT_LIMITS) -> MatchFrames:
     tree = open_tree(path, report, limits)
     assert tree is not None
     inside = [name.removeprefix("m/") for name in tree.names()]

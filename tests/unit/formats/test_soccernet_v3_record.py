@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import DatasetFormatError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3 import ImageRecord, record_from_json, record_to_json
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -33,8 +33,8 @@ def _view(record: ImageRecord) -> View:
     return View("7.png", station, record.balls, extras=record.extras)
 
 
-def _read(value: Any, report: Report | None = None) -> ImageRecord:
-    return record_from_json(value, "Labels-v3.json", "7.png", report or Report())
+def _read(value: Any, report: ReaderReport | None = None) -> ImageRecord:
+    return record_from_json(value, "Labels-v3.json", "7.png", report or ReaderReport())
 
 
 class TestRecordFromJson:
@@ -84,7 +84,7 @@ class TestRecordFromJson:
         assert len(_read(image(lines=[line, line])).lines["Middle line"]) == 4
 
     def test_an_unknown_marking_is_reported_and_kept(
-        self, image: MakeImage, report: Report
+        self, image: MakeImage, report: ReaderReport
     ) -> None:
         lines = [
             {"class": "Corner flag", "points": [1, 2]},
@@ -109,7 +109,7 @@ class TestRecordFromJson:
         ],
     )
     def test_a_line_of_wrong_types_is_reported_by_place(
-        self, image: MakeImage, report: Report, line: Any, where: str
+        self, image: MakeImage, report: ReaderReport, line: Any, where: str
     ) -> None:
         good = {"class": "Circle left", "points": [1, 2]}
         record = _read(image(lines=[line, good]), report)
@@ -121,7 +121,7 @@ class TestRecordFromJson:
         "points", [None, [], {}, {"x1": 1}, BALL | {"x1": "left"}, BALL | {"y2": None}]
     )
     def test_a_ball_of_wrong_types_is_reported_and_kept(
-        self, image: MakeImage, report: Report, points: Any
+        self, image: MakeImage, report: ReaderReport, points: Any
     ) -> None:
         box = {"class": "Ball", "points": points}
         record = _read(image(bboxes=[box]), report)
@@ -131,7 +131,7 @@ class TestRecordFromJson:
 
     @pytest.mark.parametrize("name", ["bboxes", "lines"])
     def test_a_list_of_wrong_type_is_reported_and_the_rest_read(
-        self, image: MakeImage, report: Report, name: str
+        self, image: MakeImage, report: ReaderReport, name: str
     ) -> None:
         _read(image(**{name: 5}), report)
         assert [problem.field for problem in report.problems] == [name]

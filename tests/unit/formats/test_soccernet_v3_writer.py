@@ -14,7 +14,7 @@ import pytest
 from app.errors import InputError, UnsafePathError
 from app.formats.camera_json import camera_from_json
 from app.formats.export_record import ExportRecord
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3_writer import (
     COLUMNS,
@@ -124,7 +124,7 @@ class TestWriteSoccernetV3d:
         assert "ball_3D" not in third
 
     def test_the_labels_still_hold_the_annotations(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, report: Report
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, report: ReaderReport
     ) -> None:
         group = soccer_group()
         write_soccernet_v3d(tmp_path, [solved(group)], boxes="annotated")
@@ -208,13 +208,13 @@ class TestWriteSoccernetV3d:
 Write = Callable[[Any], Path]
 
 
-def _read(root: Path, report: Report) -> list[Group]:
+def _read(root: Path, report: ReaderReport) -> list[Group]:
     return list(read_soccernet_v3(root, report))
 
 
 class TestWriteSoccernetV3:
     def test_import_export_import_gives_the_same_groups(
-        self, labels: dict[str, Any], write_labels: Write, report: Report, tmp_path: Path
+        self, labels: dict[str, Any], write_labels: Write, report: ReaderReport, tmp_path: Path
     ) -> None:
         labels["version"] = 3
         labels["actions"]["7.png"]["extra"] = [1]
@@ -225,7 +225,7 @@ class TestWriteSoccernetV3:
         assert report.problems == []
 
     def test_what_readers_of_the_format_follow_is_there(
-        self, labels: dict[str, Any], write_labels: Write, report: Report, match: str
+        self, labels: dict[str, Any], write_labels: Write, report: ReaderReport, match: str
     ) -> None:
         value = labels_to_json(match, _read(write_labels(labels), report))
         assert value["GameMetadata"] == {
@@ -238,7 +238,7 @@ class TestWriteSoccernetV3:
         assert value["replays"]["7_0.png"]["linked_action"] == "7.png"
 
     def test_a_match_that_comes_again_is_added_to_its_file(
-        self, soccer_group: Callable[..., Group], tmp_path: Path, report: Report, match: str
+        self, soccer_group: Callable[..., Group], tmp_path: Path, report: ReaderReport, match: str
     ) -> None:
         other = match.replace("Alder", "Cedar")
         groups = [soccer_group("7.png"), soccer_group("7.png", match=other), soccer_group("8.png")]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3d_reader import read_soccernet_v3d
 from app.soccer.frames import Box
 from app.soccer.group import Group
@@ -30,7 +30,7 @@ def solved_labels(labels: Value, camera_json: Value) -> Value:
 
 
 @pytest.fixture
-def read(tmp_path: Path, match: str, report: Report) -> Callable[..., list[Group]]:
+def read(tmp_path: Path, match: str, report: ReaderReport) -> Callable[..., list[Group]]:
     def run(text: str | None, table: str | None = None, **options: Any) -> list[Group]:
         folder = tmp_path / match
         folder.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,11 @@ def table(match: str, *rows: str) -> str:
 class TestReadSoccernetV3d:
     @pytest.mark.parametrize("spell", [json.dumps, lambda value: json.dumps(repr(value))])
     def test_plain_json_and_a_json_string_with_a_python_dict_in_it(
-        self, read: Callable[..., list[Group]], solved_labels: Value, report: Report, spell: Any
+        self,
+        read: Callable[..., list[Group]],
+        solved_labels: Value,
+        report: ReaderReport,
+        spell: Any,
     ) -> None:
         first, second = read(spell(solved_labels))
         assert [view.key for view in first.views] == ["7.png", "7_1.png", "7_0.png"]
@@ -71,7 +75,7 @@ class TestReadSoccernetV3d:
             assert "pan_degrees" not in text and "calibrated_replays" not in text
 
     def test_code_in_the_string_is_not_run(
-        self, read: Callable[..., list[Group]], report: Report, tmp_path: Path
+        self, read: Callable[..., list[Group]], report: ReaderReport, tmp_path: Path
     ) -> None:
         mark = tmp_path / "mark"
         assert read(json.dumps(f"open({str(mark)!r}, 'w').close()")) == []
@@ -79,7 +83,7 @@ class TestReadSoccernetV3d:
         assert "neither JSON nor a Python literal" in report.problems[0].problem
 
     def test_a_camera_that_is_wrong_is_left_out_and_named(
-        self, read: Callable[..., list[Group]], solved_labels: Value, report: Report
+        self, read: Callable[..., list[Group]], solved_labels: Value, report: ReaderReport
     ) -> None:
         del solved_labels["actions"]["7.png"]["imageMetadata"]["calibration"]["x_focal_length"]
         first, _ = read(json.dumps(solved_labels))
@@ -97,7 +101,7 @@ class TestReadSoccernetV3d:
         assert first.split == "test"
 
     def test_the_table_alone_makes_groups_without_lines(
-        self, read: Callable[..., list[Group]], match: str, report: Report, tmp_path: Path
+        self, read: Callable[..., list[Group]], match: str, report: ReaderReport, tmp_path: Path
     ) -> None:
         (tmp_path / match).mkdir(parents=True)
         (tmp_path / match / "7_2.png").write_bytes(b"x")
@@ -120,7 +124,11 @@ class TestReadSoccernetV3d:
         assert {view.station.calibration for view in first.views} == {"lines"}
 
     def test_a_view_of_the_table_that_the_labels_do_not_have_is_reported(
-        self, read: Callable[..., list[Group]], solved_labels: Value, match: str, report: Report
+        self,
+        read: Callable[..., list[Group]],
+        solved_labels: Value,
+        match: str,
+        report: ReaderReport,
     ) -> None:
         rows = table(match, "7,0,5,1280,720,,train")
         read(json.dumps(solved_labels), rows)
@@ -132,7 +140,7 @@ class TestReadSoccernetV3d:
         solved_labels: Value,
         match: str,
         tmp_path: Path,
-        report: Report,
+        report: ReaderReport,
     ) -> None:
         folder = match.rpartition("/")[2]
         lines = [f"{folder}/7", f"{folder}/7_1", f"{folder}/99", f"{folder}/99_1", "Other/1"]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.formats.file_tree import DEFAULT_LIMITS
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3d_reader import SnTable, read_snv3d_table
 from app.formats.trees import open_tree
 from app.soccer.frames import Box, ImageSize
@@ -34,7 +34,7 @@ def row(number: int = 0, **cells: Any) -> str:
 
 
 @pytest.fixture
-def read(tmp_path: Path, report: Report) -> Read:
+def read(tmp_path: Path, report: ReaderReport) -> Read:
     def run(text: str, **files: str) -> SnTable:
         (tmp_path / "SNv3D.csv").write_text(text, encoding="utf-8")
         for name, content in files.items():
@@ -47,7 +47,7 @@ def read(tmp_path: Path, report: Report) -> Read:
 
 
 class TestReadSnv3dTable:
-    def test_a_row_with_nan_and_array_in_it(self, read: Read, report: Report) -> None:
+    def test_a_row_with_nan_and_array_in_it(self, read: Read, report: ReaderReport) -> None:
         table = read(HEAD + row())
         (found,) = table.rows[MATCH]["7.png"].values()
         assert (found.image, found.size, found.split) == ("7.png", ImageSize(1280, 720), "train")
@@ -75,7 +75,7 @@ class TestReadSnv3dTable:
     def test_a_byte_order_mark_is_tolerated(self, read: Read) -> None:
         assert read("\ufeff" + HEAD + row()).rows
 
-    def test_columns_may_stand_in_any_order(self, read: Read, report: Report) -> None:
+    def test_columns_may_stand_in_any_order(self, read: Read, report: ReaderReport) -> None:
         # Quoted commas: through the reader and the writer of the standard library.
         rows = [list(reversed(cells)) for cells in csv.reader(StringIO(HEAD + row()))]
         text = StringIO()
@@ -97,7 +97,7 @@ class TestReadSnv3dTable:
         ],
     )
     def test_code_in_a_cell_is_reported_and_never_run(
-        self, read: Read, report: Report, cell: str
+        self, read: Read, report: ReaderReport, cell: str
     ) -> None:
         table = read(HEAD + row(camera=cell))
         assert table.rows[MATCH]["7.png"]["7.png"].camera is None
@@ -117,7 +117,7 @@ class TestReadSnv3dTable:
         ],
     )
     def test_a_row_that_is_wrong_is_left_out_and_named(
-        self, read: Read, report: Report, cells: dict[str, Any], field: str
+        self, read: Read, report: ReaderReport, cells: dict[str, Any], field: str
     ) -> None:
         table = read(HEAD + row(**cells) + row(1, main_action=8))
         assert list(table.rows[MATCH]) == ["8.png"]
@@ -125,27 +125,27 @@ class TestReadSnv3dTable:
 
     @pytest.mark.parametrize("box", ['"[1, 2, 3]"', '"[1, 2, 0, 4]"', '"1; 2"', '"[1,2,3,1e999]"'])
     def test_a_box_that_is_none_costs_the_box_alone(
-        self, read: Read, report: Report, box: str
+        self, read: Read, report: ReaderReport, box: str
     ) -> None:
         table = read(HEAD + row(box=box))
         assert table.rows[MATCH]["7.png"]["7.png"].ball is None
         assert [item.field for item in report.problems] == ["ball_bbox"]
 
-    def test_the_split_lists_come_before_the_column(self, read: Read, report: Report) -> None:
+    def test_the_split_lists_come_before_the_column(self, read: Read, report: ReaderReport) -> None:
         folder = MATCH.split("/")[-1]
         table = read(HEAD + row(), test=f"{folder}/7\n{folder}/7_1\n\nnot a view\n")
         assert table.split(MATCH, "7.png") == "test"
         assert [item.record for item in report.problems] == ["line 4"]
 
-    def test_a_view_in_both_lists_is_reported(self, read: Read, report: Report) -> None:
+    def test_a_view_in_both_lists_is_reported(self, read: Read, report: ReaderReport) -> None:
         table = read(HEAD + row(), train="m/7\n", test="m/7\n")
         assert table.lists["m", "7"] == "train"
         assert len(report.problems) == 1
 
-    def test_another_table_is_refused(self, read: Read, report: Report) -> None:
+    def test_another_table_is_refused(self, read: Read, report: ReaderReport) -> None:
         assert read("frame,x\n1,2\n").rows == {}
         assert report.problems[0].field == "league"
 
-    def test_a_second_row_of_a_view_is_reported(self, read: Read, report: Report) -> None:
+    def test_a_second_row_of_a_view_is_reported(self, read: Read, report: ReaderReport) -> None:
         read(HEAD + row() + row(1))
         assert "second row" in report.problems[0].problem

@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import DatasetFormatError
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.synloc import camera_from_synloc
 from app.geometry.camera import rotation_from_pan_tilt_roll
 
@@ -101,7 +101,7 @@ class TestReadCameras:
         bad = record(file_name="images/000004.jpg", dist_poly=[])
         path = tmp_path / "val.json"
         path.write_text(json.dumps({"images": [record(), bad], "annotations": []}))
-        report = Report()
+        report = ReaderReport()
         cameras = read_cameras(path, report)
         assert list(cameras) == ["000003"]
         assert cameras["000003"].lens == "arctan_polynomial"

@@ -12,7 +12,7 @@ import pytest
 from app.formats.camera_json import camera_to_json
 from app.formats.issia_3d import open_issia_3d
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.geometry.camera import Camera
@@ -23,7 +23,7 @@ Spoil = Callable[[Value], object]
 Told = tuple[str | None, str | None, str]
 
 
-def told(report: Report) -> list[Told]:
+def told(report: ReaderReport) -> list[Told]:
     return [(problem.record, problem.field, problem.problem) for problem in report.problems]
 
 
@@ -87,7 +87,7 @@ SOCCERNET: dict[str, tuple[Spoil, list[Told], list[int]]] = {
 
 @pytest.mark.parametrize("case", SOCCERNET)
 def test_soccernet_v3(
-    labels: Value, write_labels: Callable[[Any], Path], report: Report, case: str
+    labels: Value, write_labels: Callable[[Any], Path], report: ReaderReport, case: str
 ) -> None:
     spoil, expected, views = SOCCERNET[case]
     spoil(labels)
@@ -116,12 +116,12 @@ def folder(tmp_path: Path, camera: Camera) -> Path:
     return root
 
 
-def issia(folder: Path, report: Report, **options: Any) -> int:
+def issia(folder: Path, report: ReaderReport, **options: Any) -> int:
     return len(list(open_issia(folder, IssiaOptions(**options), report).groups()))
 
 
 def test_a_second_calibration_of_an_issia_folder_is_told_and_the_first_counts(
-    folder: Path, report: Report
+    folder: Path, report: ReaderReport
 ) -> None:
     (folder / "z").mkdir()
     (folder / "z" / "issia_calibration.json").write_text("{}")
@@ -130,7 +130,7 @@ def test_a_second_calibration_of_an_issia_folder_is_told_and_the_first_counts(
     assert problem == "is a second issia_calibration.json; issia_calibration.json is used"
 
 
-def test_a_calibration_that_is_no_json_is_told(folder: Path, report: Report) -> None:
+def test_a_calibration_that_is_no_json_is_told(folder: Path, report: ReaderReport) -> None:
     (folder / "issia_calibration.json").write_text("{")
     assert issia(folder, report) == 1
     (problem,) = report.problems
@@ -139,7 +139,7 @@ def test_a_calibration_that_is_no_json_is_told(folder: Path, report: Report) -> 
 
 @pytest.mark.parametrize("beside", [False, True])
 def test_lines_of_an_issia_camera_that_cannot_be_read_are_told(
-    folder: Path, tmp_path: Path, report: Report, beside: bool
+    folder: Path, tmp_path: Path, report: ReaderReport, beside: bool
 ) -> None:
     """Those that were named as well as those that lie beside the ground truth."""
     lines = folder / "lines" if beside else tmp_path / "lines"
@@ -151,7 +151,7 @@ def test_lines_of_an_issia_camera_that_cannot_be_read_are_told(
     assert "cam3.json" in str(problem)
 
 
-def test_an_xgtf_file_without_a_number_says_which(folder: Path, report: Report) -> None:
+def test_an_xgtf_file_without_a_number_says_which(folder: Path, report: ReaderReport) -> None:
     (folder / "ball.xgtf").write_text(XGTF)
     assert issia(folder, report) == 1
     (problem,) = report.problems
@@ -159,7 +159,7 @@ def test_an_xgtf_file_without_a_number_says_which(folder: Path, report: Report) 
 
 
 def test_cameras_and_lines_that_join_no_ground_truth_are_said(
-    folder: Path, tmp_path: Path, camera: Camera, report: Report
+    folder: Path, tmp_path: Path, camera: Camera, report: ReaderReport
 ) -> None:
     value = camera_to_json(camera)
     cameras = {"cam3": value, "camera_3": value, "cam5": value, "stand": value}
@@ -181,7 +181,7 @@ def test_cameras_and_lines_that_join_no_ground_truth_are_said(
     ]
 
 
-def test_half_a_pair_of_columns_is_named(tmp_path: Path, report: Report) -> None:
+def test_half_a_pair_of_columns_is_named(tmp_path: Path, report: ReaderReport) -> None:
     (tmp_path / "ISSIA-3D.csv").write_text("frame,x_cam1,y_cam1,x_cam2,y_cam4\n7,1,2,3,4\n")
     found = open_issia_3d(tmp_path, IssiaOptions(), report)
     assert len(list(found.groups())) == 1
@@ -191,7 +191,7 @@ def test_half_a_pair_of_columns_is_named(tmp_path: Path, report: Report) -> None
     ]
 
 
-def test_images_of_match_info_without_lines_are_said(tmp_path: Path, report: Report) -> None:
+def test_images_of_match_info_without_lines_are_said(tmp_path: Path, report: ReaderReport) -> None:
     (tmp_path / "00001.json").write_text(json.dumps({"Middle line": [{"x": 0.5, "y": 0.5}]}))
     (tmp_path / "match_info.json").write_text(json.dumps({"00001.jpg": "a", "00002.jpg": "b"}))
     groups = list(read_sn_calibration(tmp_path, ImageSize(960, 540), report))

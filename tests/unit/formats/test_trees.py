@@ -15,7 +15,7 @@ from app.config import Settings
 from app.errors import DatasetFormatError, ImageError
 from app.formats.file_tree import Limits, list_files_in_folder
 from app.formats.guess_format import guess_format
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.safe_path import is_hidden, read_regular_file
 from app.formats.soccernet_v3 import MatchFrames
 from app.formats.soccernet_v3_reader import read_soccernet_v3
@@ -32,11 +32,11 @@ class TestLimits:
 
 
 class TestOpenTree:
-    def test_a_missing_path_is_one_problem(self, tmp_path: Path, report: Report) -> None:
+    def test_a_missing_path_is_one_problem(self, tmp_path: Path, report: ReaderReport) -> None:
         assert open_tree(tmp_path / "none", report) is None
         assert [problem.problem for problem in report.problems] == ["does not exist"]
 
-    def test_one_file_is_a_tree_of_one(self, tmp_path: Path, report: Report) -> None:
+    def test_one_file_is_a_tree_of_one(self, tmp_path: Path, report: ReaderReport) -> None:
         (tmp_path / "a.json").write_text("{}")
         (tmp_path / "b.json").write_text("{}")
         tree = open_tree(tmp_path / "a.json", report)
@@ -44,13 +44,17 @@ class TestOpenTree:
         assert tree.names() == ["a.json"]
         assert tree.read_bytes("a.json") == b"{}"
 
-    def test_a_zip_is_known_by_its_content_too(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_zip_is_known_by_its_content_too(
+        self, make_zip: MakeZip, report: ReaderReport
+    ) -> None:
         path = make_zip({"a": "1"})
         tree = open_tree(path.rename(path.with_suffix(".data")), report)
         assert tree is not None
         assert tree.read_bytes("a") == b"1"
 
-    def test_a_truncated_zip_is_one_clear_problem(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_truncated_zip_is_one_clear_problem(
+        self, make_zip: MakeZip, report: ReaderReport
+    ) -> None:
         path = make_zip({f"{index}.json": os.urandom(500) for index in range(20)})
         path.write_bytes(path.read_bytes()[:4000])
         assert open_tree(path, report) is None
@@ -65,16 +69,16 @@ class TestOpenedTree:
         path = tmp_path / "a.zip"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("a.json", "{}")
-        with open_tree_while_read(path, Report()) as tree:
+        with open_tree_while_read(path, ReaderReport()) as tree:
             assert tree is not None and tree.read_bytes("a.json") == b"{}"
         with pytest.raises(ValueError, match="closed"):
             tree.open("a.json")
-        with open_tree_while_read(tmp_path / "none", Report()) as tree:
+        with open_tree_while_read(tmp_path / "none", ReaderReport()) as tree:
             assert tree is None
 
 
 class TestFolderTree:
-    def test_hidden_files_are_left_out(self, tmp_path: Path, report: Report) -> None:
+    def test_hidden_files_are_left_out(self, tmp_path: Path, report: ReaderReport) -> None:
         for name in ("b/1.json", "a.json", ".git/x", "b/.DS_Store", "__MACOSX/a.json"):
             path = tmp_path / name
             path.parent.mkdir(exist_ok=True)
@@ -84,7 +88,7 @@ class TestFolderTree:
         assert tree.names() == ["a.json", "b/1.json"]
 
     def test_a_file_behind_a_link_out_of_the_folder_is_refused(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         (tmp_path / "root").mkdir()
         (tmp_path / "secret").write_text("x")
@@ -99,14 +103,14 @@ class TestFolderTree:
         with pytest.raises(DatasetFormatError, match="leads out"):
             tree.read_bytes("a")
 
-    def test_a_pipe_is_refused_without_waiting(self, tmp_path: Path, report: Report) -> None:
+    def test_a_pipe_is_refused_without_waiting(self, tmp_path: Path, report: ReaderReport) -> None:
         os.mkfifo(tmp_path / "a")
         tree = open_tree(tmp_path, report)
         assert tree is not None
         with pytest.raises(DatasetFormatError, match="not a regular file"):
             tree.read_bytes("a")
 
-    def test_a_file_beyond_the_limit_is_refused(self, tmp_path: Path, report: Report) -> None:
+    def test_a_file_beyond_the_limit_is_refused(self, tmp_path: Path, report: ReaderReport) -> None:
         (tmp_path / "a").write_bytes(b"x" * 11)
         tree = open_tree(tmp_path, report, Limits(file_bytes=10))
         assert tree is not None
@@ -131,7 +135,7 @@ class TestReadPlain:
 
 
 class TestZipTree:
-    def test_members_are_read_in_place(self, make_zip: MakeZip, report: Report) -> None:
+    def test_members_are_read_in_place(self, make_zip: MakeZip, report: ReaderReport) -> None:
         tree = ZipTree(make_zip({"b/2": "two", "a": "one", "b/": ""}), report, Limits())
         assert tree.names() == ["a", "b/2"]
         assert tree.read_bytes("b/2") == b"two"
@@ -139,7 +143,7 @@ class TestZipTree:
 
     @pytest.mark.parametrize("name", ["../a", "/a", "a/../../b", "c:/a", "%2e%2e/a", "a\\..\\b"])
     def test_an_unsafe_member_is_left_out_and_the_rest_is_read(
-        self, make_zip: MakeZip, report: Report, name: str
+        self, make_zip: MakeZip, report: ReaderReport, name: str
     ) -> None:
         tree = ZipTree(make_zip({name: "evil", "good": "1"}), report, Limits())
         assert tree.names() == ["good"]
@@ -156,7 +160,7 @@ class TestZipTree:
         ],
     )
     def test_names_of_other_programs_are_read_as_they_were_meant_and_opened_as_they_are(
-        self, make_zip: MakeZip, report: Report, written: bytes, marked: int, name: str
+        self, make_zip: MakeZip, report: ReaderReport, written: bytes, marked: int, name: str
     ) -> None:
         stand_in = "x" * len(written)
         path = make_zip({stand_in: "one", "folder\\": ""})
@@ -172,12 +176,12 @@ class TestZipTree:
         assert ArchiveMembers().read(Path(media.path), media.member, 10) == b"one"
         assert report.problems == []
 
-    def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: ReaderReport) -> None:
         path = make_zip({"aXb.json": "evil", "good": "1"})
         path.write_bytes(path.read_bytes().replace(b"aXb.json", b"a\x00b.json"))
         assert ZipTree(path, report, Limits()).names() == ["good"]
 
-    def test_a_link_is_left_out(self, tmp_path: Path, report: Report) -> None:
+    def test_a_link_is_left_out(self, tmp_path: Path, report: ReaderReport) -> None:
         path = tmp_path / "a.zip"
         with zipfile.ZipFile(path, "w") as archive:
             entry = zipfile.ZipInfo("link")
@@ -187,7 +191,9 @@ class TestZipTree:
         assert "link or device" in str(report.problems[0])
 
     @pytest.mark.filterwarnings("ignore:Duplicate name")
-    def test_names_that_collide_are_all_left_out(self, tmp_path: Path, report: Report) -> None:
+    def test_names_that_collide_are_all_left_out(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         path = tmp_path / "a.zip"
         with zipfile.ZipFile(path, "w") as archive:
             for name in ("a.json", "a.json", "B.json", "b.json", "c.json"):
@@ -195,25 +201,27 @@ class TestZipTree:
         assert ZipTree(path, report, Limits()).names() == ["c.json"]
         assert len(report.problems) == 4
 
-    def test_too_many_members_are_refused(self, make_zip: MakeZip, report: Report) -> None:
+    def test_too_many_members_are_refused(self, make_zip: MakeZip, report: ReaderReport) -> None:
         with pytest.raises(DatasetFormatError, match="has 3 members"):
             ZipTree(make_zip({"a": "", "b": "", "c": ""}), report, Limits(members=2))
 
-    def test_too_large_a_total_is_refused(self, make_zip: MakeZip, report: Report) -> None:
+    def test_too_large_a_total_is_refused(self, make_zip: MakeZip, report: ReaderReport) -> None:
         with pytest.raises(DatasetFormatError, match="unpacks to 12 bytes"):
             ZipTree(make_zip({"a": "123456", "b": "123456"}), report, Limits(total_bytes=11))
 
-    def test_a_bomb_is_left_out(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_bomb_is_left_out(self, make_zip: MakeZip, report: ReaderReport) -> None:
         path = make_zip({"bomb": b"0" * 8_000_000, "good": "1"})
         assert ZipTree(path, report, Limits()).names() == ["good"]
         assert "grows more than 200 times" in str(report.problems[0])
 
-    def test_a_member_beyond_the_limit_is_refused(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_member_beyond_the_limit_is_refused(
+        self, make_zip: MakeZip, report: ReaderReport
+    ) -> None:
         tree = ZipTree(make_zip({"a": os.urandom(100)}), report, Limits(file_bytes=99))
         with pytest.raises(DatasetFormatError, match="longer than 99 bytes"):
             tree.read_bytes("a")
 
-    def test_a_damaged_member_says_so(self, make_zip: MakeZip, report: Report) -> None:
+    def test_a_damaged_member_says_so(self, make_zip: MakeZip, report: ReaderReport) -> None:
         path = make_zip({"a": os.urandom(1000)})
         content = bytearray(path.read_bytes())
         content[200:210] = bytes(10)
@@ -222,7 +230,7 @@ class TestZipTree:
             ZipTree(path, report, Limits()).read_bytes("a")
 
     def test_a_member_that_lies_about_its_size_is_refused(
-        self, make_zip: MakeZip, report: Report
+        self, make_zip: MakeZip, report: ReaderReport
     ) -> None:
         path = make_zip({"a": b"0" * 100_000})
         size = (100_000).to_bytes(4, "little")
@@ -245,7 +253,7 @@ class TestZipTree:
         if data.draw(st.integers(0, 3)) == 0:
             del content[data.draw(st.integers(1, len(content) - 1)) :]
         path.write_bytes(content)
-        report, read = Report(), []
+        report, read = ReaderReport(), []
         tree = open_tree(path, report)
         for name in tree.names() if tree else ():
             try:
@@ -277,7 +285,7 @@ class TestNamesThatAreNoText:
         path.write_bytes(content.replace("\u00e9".encode(), b"\xe9\xff"))
         return path
 
-    def test_one_of_them_condemns_no_other_member(self, marked: Path, report: Report) -> None:
+    def test_one_of_them_condemns_no_other_member(self, marked: Path, report: ReaderReport) -> None:
         tree = open_tree(marked, report)
         assert tree is not None
         with closing(tree):
@@ -289,7 +297,7 @@ class TestNamesThatAreNoText:
         assert guess_format(marked) == "sn-calibration"
 
     def test_one_of_them_inside_a_nested_zip_condemns_no_other_member(
-        self, marked: Path, make_zip: MakeZip, report: Report
+        self, marked: Path, make_zip: MakeZip, report: ReaderReport
     ) -> None:
         path = make_zip({"inner.zip": marked.read_bytes()}, marked.with_name("outer.zip"))
         outer = ZipTree(path, report, Limits())
@@ -304,7 +312,7 @@ class TestNamesThatAreNoText:
         ],
     )
     def test_what_nested_zips_hold_counts_toward_the_limits_of_the_one_around_them(
-        self, tmp_path: Path, make_zip: MakeZip, report: Report, limits: Limits, said: str
+        self, tmp_path: Path, make_zip: MakeZip, report: ReaderReport, limits: Limits, said: str
     ) -> None:
         inner = make_zip({"a": "x" * 1_000, "b": "y" * 1_000}, tmp_path / "inner.zip").read_bytes()
         path = make_zip({"one.zip": inner, "two.zip": inner}, tmp_path / "outer.zip")
@@ -327,24 +335,24 @@ class TestPipesAndDevices:
 
     @pytest.mark.parametrize("name", ["a", "a.zip", "a.json"])
     def test_a_pipe_that_is_named_is_refused_at_once(
-        self, tmp_path: Path, report: Report, name: str
+        self, tmp_path: Path, report: ReaderReport, name: str
     ) -> None:
         os.mkfifo(tmp_path / name)
         assert open_tree(tmp_path / name, report) is None
         assert report.problems[0].problem == "is not a regular file"
         guess_format(tmp_path / name)
 
-    def test_a_device_is_refused_at_once(self, report: Report) -> None:
+    def test_a_device_is_refused_at_once(self, report: ReaderReport) -> None:
         assert open_tree(Path("/dev/zero"), report) is None
         assert report.problems[0].problem == "is not a regular file"
 
-    def test_a_pipe_in_a_folder_is_left_out(self, tmp_path: Path, report: Report) -> None:
+    def test_a_pipe_in_a_folder_is_left_out(self, tmp_path: Path, report: ReaderReport) -> None:
         os.mkfifo(tmp_path / "Labels-v3.json")
         assert [*read_soccernet_v3(tmp_path, report)] == []
         assert "is not a regular file" in report.problems[0].problem
 
     def test_a_pipe_in_the_place_of_the_frames_costs_the_frames(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         os.mkfifo(tmp_path / "Frames-v3.zip")
         frames = MatchFrames(FolderTree(tmp_path, report, Limits()), "", ["Frames-v3.zip"], report)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_writer import labels_to_json
 from app.formats.view_state import (
     GroupHead,
@@ -130,7 +130,7 @@ def placed(key: str, group: str = "g", position: int = 0, views: int = 2) -> Pla
 
 class TestViewGroups:
     def test_a_group_comes_when_its_last_view_does_in_the_order_of_positions(
-        self, report: Report
+        self, report: ReaderReport
     ) -> None:
         groups = ViewGroups(report)
         assert list(groups.add(placed("b", position=1), "a.json")) == []
@@ -144,14 +144,14 @@ class TestViewGroups:
             "1 group has fewer views than when it was written: other (1 of 2)"
         ]
 
-    def test_static_cameras_of_one_key_are_one_station(self, report: Report) -> None:
+    def test_static_cameras_of_one_key_are_one_station(self, report: ReaderReport) -> None:
         groups = ViewGroups(report)
         first, second = (
             group for name in "ab" for group in groups.add(placed("v", name, views=1), "a.json")
         )
         assert first.views[0].station is second.views[0].station
 
-    def test_a_view_that_comes_twice_counts_once(self, report: Report) -> None:
+    def test_a_view_that_comes_twice_counts_once(self, report: ReaderReport) -> None:
         groups = ViewGroups(report)
         assert list(groups.add(placed("a"), "a.json")) == []
         assert list(groups.add(placed("a"), "a.json")) == []
@@ -159,7 +159,7 @@ class TestViewGroups:
         assert (problem.path, "comes twice" in problem.problem) == ("a.json", True)
 
     def test_a_group_that_comes_again_in_another_file_is_not_handed_on_twice(
-        self, report: Report
+        self, report: ReaderReport
     ) -> None:
         groups = ViewGroups(report)
         found = [

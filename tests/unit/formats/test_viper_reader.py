@@ -9,7 +9,7 @@ import pytest
 
 from app.formats import viper_reader
 from app.formats.file_tree import Limits
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -39,7 +39,9 @@ def person(identity: int, numbers: str, span: str = "9:9") -> str:
 BOX = 'x="1" y="2" width="30" height="40"'
 
 
-def _read(tmp_path: Path, content: str | bytes, report: Report, name: str = "1.xgtf") -> ViperTrack:
+def _read(
+    tmp_path: Path, content: str | bytes, report: ReaderReport, name: str = "1.xgtf"
+) -> ViperTrack:
     content = content.encode() if isinstance(content, str) else content
     (tmp_path / name).write_bytes(content)
     tree = open_tree(tmp_path, report)
@@ -58,7 +60,7 @@ ENDLESS = {
 class TestReadViper:
     @pytest.mark.parametrize("what", ENDLESS)
     def test_a_megabyte_without_an_element_is_refused(
-        self, tmp_path: Path, report: Report, what: str
+        self, tmp_path: Path, report: ReaderReport, what: str
     ) -> None:
         points = ball('<data:point framespan="9:9" x="100" y="50"/>')
         text = HEAD + points + ENDLESS[what](900_000) + points + TAIL
@@ -76,7 +78,7 @@ class TestReadViper:
 
     @pytest.mark.parametrize("name", ["1.xgtf", "1.xgtf.gz"])
     def test_ball_points_and_boxes_plain_or_packed(
-        self, tmp_path: Path, report: Report, name: str
+        self, tmp_path: Path, report: ReaderReport, name: str
     ) -> None:
         text = HEAD + ball('<data:point framespan="9:9" x="100" y="50"/>') + person(7, BOX) + TAIL
         content = gzip.compress(text.encode()) if name.endswith("gz") else text.encode()
@@ -87,12 +89,14 @@ class TestReadViper:
 
     @pytest.mark.parametrize("span", ["3:5", "3:3 4:5", "3:3,4:4, 5:5"])
     def test_a_framespan_may_be_a_range_or_several(
-        self, tmp_path: Path, report: Report, span: str
+        self, tmp_path: Path, report: ReaderReport, span: str
     ) -> None:
         text = HEAD + ball(f'<data:point framespan="{span}" x="1" y="2"/>') + TAIL
         assert _read(tmp_path, text, report).balls == {n: [(1.0, 2.0)] for n in (3, 4, 5)}
 
-    def test_blank_numbers_lose_their_own_entry_alone(self, tmp_path: Path, report: Report) -> None:
+    def test_blank_numbers_lose_their_own_entry_alone(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         blank = 'x="1" y=" " width="" height=" "'
         text = HEAD + person(7, blank) + person(8, BOX) + TAIL
         track = _read(tmp_path, text, report)
@@ -101,13 +105,15 @@ class TestReadViper:
         assert str(problem).endswith("1.xgtf, Person 7, framespan 9:9: y is blank")
 
     @pytest.mark.parametrize("span", ["", "5:3", "a:b", "1", "0:99999999", "0:99999", "-1:3"])
-    def test_a_wrong_framespan_is_reported(self, tmp_path: Path, report: Report, span: str) -> None:
+    def test_a_wrong_framespan_is_reported(
+        self, tmp_path: Path, report: ReaderReport, span: str
+    ) -> None:
         text = HEAD + person(7, BOX, span) + person(8, BOX) + TAIL
         assert _read(tmp_path, text, report).person_boxes == 1
         assert report.problems[0].field == f"framespan {span}"
 
     def test_a_framespan_beyond_the_limit_is_named_with_file_object_and_limit(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         spans = ("0:99999", "0:9999 10000:10000", "0:9999")
         points = "".join(f'<data:point framespan="{span}" x="1" y="2"/>' for span in spans)
@@ -119,7 +125,7 @@ class TestReadViper:
         assert "covers 10,001 frames" in parts
 
     def test_a_file_has_a_bounded_number_of_frames_with_a_ball(
-        self, tmp_path: Path, report: Report, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, report: ReaderReport, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(viper_reader, "MAX_FRAMES", 10)
         points = "".join(
@@ -132,14 +138,16 @@ class TestReadViper:
         assert problem.problem == "has more than 10 frames with a ball"
 
     def test_two_balls_in_one_frame_are_both_kept_and_a_repeated_one_once(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         points = "".join(f'<data:point framespan="9:9" x="{x}" y="2"/>' for x in (1, 1, 5))
         assert _read(tmp_path, HEAD + ball(points) + TAIL, report).balls == {
             9: [(1.0, 2.0), (5.0, 2.0)]
         }
 
-    def test_other_attributes_of_the_ball_are_kept(self, tmp_path: Path, report: Report) -> None:
+    def test_other_attributes_of_the_ball_are_kept(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
         text = (
             '<object name="BALL" id="0"><attribute name="BallShot">'
             '<data:bvalue framespan="9:9" value="true"/></attribute></object>'
@@ -147,14 +155,14 @@ class TestReadViper:
         assert _read(tmp_path, HEAD + text + TAIL, report).ball_notes == {9: {"BallShot": "true"}}
 
     def test_a_file_that_ends_early_keeps_what_was_read(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         text = HEAD + person(7, BOX) + person(8, BOX)[:40]
         assert _read(tmp_path, text, report).person_boxes == 1
         assert "0 ball points and 1 persons before it are kept" in str(report.problems[0])
 
     def test_a_packed_file_that_ends_early_keeps_what_was_read(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         text = HEAD + "".join(person(number, BOX) for number in range(3000)) + TAIL
         content = gzip.compress(text.encode())
@@ -170,18 +178,18 @@ class TestReadViper:
             '<!DOCTYPE a [<!ENTITY x "xx"><!ENTITY y "&x;&x;">]>',
         ],
     )
-    def test_a_dtd_is_refused(self, tmp_path: Path, report: Report, doctype: str) -> None:
+    def test_a_dtd_is_refused(self, tmp_path: Path, report: ReaderReport, doctype: str) -> None:
         text = HEAD.replace("<viper", doctype + "<viper", 1) + person(7, BOX) + TAIL
         assert _read(tmp_path, text, report).person_boxes == 0
         assert "DTD or an entity" in str(report.problems[0])
 
-    def test_a_packed_bomb_is_refused(self, tmp_path: Path, report: Report) -> None:
+    def test_a_packed_bomb_is_refused(self, tmp_path: Path, report: ReaderReport) -> None:
         content = gzip.compress(HEAD.encode() + b" " * 5_000_000)
         _read(tmp_path, content, report, "1.xgtf.gz")
         assert "longer than 1,000,000 bytes" in str(report.problems[0])
 
     def test_spans_that_unfold_without_end_are_refused(
-        self, tmp_path: Path, report: Report, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, report: ReaderReport, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("app.formats.viper_reader.MAX_ENTRIES", 1000)
         text = HEAD + "".join(person(number, BOX, "1:400") for number in range(5)) + TAIL
@@ -190,13 +198,13 @@ class TestReadViper:
 
     @pytest.mark.parametrize("encoding", ["shift_jis", "no-such-code"])
     def test_another_encoding_is_reported(
-        self, tmp_path: Path, report: Report, encoding: str
+        self, tmp_path: Path, report: ReaderReport, encoding: str
     ) -> None:
         _read(tmp_path, HEAD.replace("UTF-8", encoding) + TAIL, report)
         assert len(report.problems) == 1
 
     def test_a_member_of_a_zip_that_is_damaged_is_reported(
-        self, make_zip: Callable[..., Path], report: Report
+        self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
         path = make_zip({"1.xgtf": HEAD + person(7, BOX) * 2000 + TAIL})
         content = bytearray(path.read_bytes())
@@ -208,7 +216,7 @@ class TestReadViper:
         tree.close()
         assert len(report.problems) == 1
 
-    def test_memory_does_not_grow_with_the_file(self, tmp_path: Path, report: Report) -> None:
+    def test_memory_does_not_grow_with_the_file(self, tmp_path: Path, report: ReaderReport) -> None:
         text = HEAD + "<object>" + "<a/>" * 20_000 + "</object>" + "<a/>" * 20_000 + TAIL
         tracemalloc.start()
         try:
@@ -217,7 +225,7 @@ class TestReadViper:
         finally:
             tracemalloc.stop()
 
-    def test_something_else_is_reported(self, tmp_path: Path, report: Report) -> None:
+    def test_something_else_is_reported(self, tmp_path: Path, report: ReaderReport) -> None:
         _read(tmp_path, b"\x89PNG\r\n", report)
         assert "not sound XML" in str(report.problems[0])
 
@@ -249,14 +257,14 @@ class TestShapes:
         ],
     )
     def test_a_ball_may_be_a_point_a_box_or_a_circle(
-        self, tmp_path: Path, report: Report, entry: str, balls: list[ImagePoint | Box]
+        self, tmp_path: Path, report: ReaderReport, entry: str, balls: list[ImagePoint | Box]
     ) -> None:
         assert _read(tmp_path, ball_as(entry), report).balls == {9: balls}
         assert report.problems == []
 
     @pytest.mark.parametrize("boxed_first", [False, True])
     def test_a_centre_inside_a_box_is_the_same_ball(
-        self, tmp_path: Path, report: Report, boxed_first: bool
+        self, tmp_path: Path, report: ReaderReport, boxed_first: bool
     ) -> None:
         entries = [
             '<data:point framespan="9:9" x="640" y="319"/>',
@@ -269,7 +277,9 @@ class TestShapes:
         "name",
         ["BALL", "Football", "soccer ball", "Soccer-Ball", "ball_1", "BALLS", "Ballon", "pelota"],
     )
-    def test_a_ball_has_several_names(self, tmp_path: Path, report: Report, name: str) -> None:
+    def test_a_ball_has_several_names(
+        self, tmp_path: Path, report: ReaderReport, name: str
+    ) -> None:
         text = ball_as('<data:point framespan="9:9" x="1" y="2"/>', name)
         assert _read(tmp_path, text, report).ball_points == 1
 
@@ -286,7 +296,7 @@ class TestShapes:
         ],
     )
     def test_what_is_left_out_is_named_with_object_and_shape(
-        self, tmp_path: Path, report: Report, name: str, entry: str, what: str
+        self, tmp_path: Path, report: ReaderReport, name: str, entry: str, what: str
     ) -> None:
         track = _read(tmp_path, ball_as(entry * 3, name), report)
         assert (track.ball_points, track.person_boxes) == (0, 0)
@@ -295,7 +305,7 @@ class TestShapes:
         assert problem.problem.startswith("3 entries are left out: balls are read as point, bbox")
 
     def test_a_file_of_endless_kinds_of_objects_names_a_hundred(
-        self, tmp_path: Path, report: Report
+        self, tmp_path: Path, report: ReaderReport
     ) -> None:
         objects = "".join(
             f'<object name="thing {number}"><attribute name="A"><data:bvalue value="true"/>'
@@ -318,13 +328,13 @@ class TestNamespaces:
         ],
     )
     def test_elements_count_under_any_namespace(
-        self, tmp_path: Path, report: Report, head: str, prefix: str
+        self, tmp_path: Path, report: ReaderReport, head: str, prefix: str
     ) -> None:
         text = head + ball(f'<{prefix}:point framespan="9:9" x="1" y="2"/>') + TAIL
         assert _read(tmp_path, text, report).balls == {9: [(1.0, 2.0)]}
         assert report.problems == []
 
-    def test_all_elements_may_have_a_prefix(self, tmp_path: Path, report: Report) -> None:
+    def test_all_elements_may_have_a_prefix(self, tmp_path: Path, report: ReaderReport) -> None:
         text = (
             '<v:viper xmlns:v="http://lamp.cfar.umd.edu/viper#" xmlns:d="urn:d"><v:data>'
             '<v:sourcefile filename="a.avi"><v:object name="BALL" id="0">'
@@ -344,19 +354,19 @@ def sized(width: str, height: str) -> str:
 
 
 class TestSize:
-    def test_the_size_of_the_frames_is_read(self, tmp_path: Path, report: Report) -> None:
+    def test_the_size_of_the_frames_is_read(self, tmp_path: Path, report: ReaderReport) -> None:
         assert _read(tmp_path, sized("1280", "720") + TAIL, report).size == ImageSize(1280, 720)
 
     @pytest.mark.parametrize(("width", "height"), [("", ""), ("1280", "")])
     def test_a_blank_side_is_no_size(
-        self, tmp_path: Path, report: Report, width: str, height: str
+        self, tmp_path: Path, report: ReaderReport, width: str, height: str
     ) -> None:
         assert _read(tmp_path, sized(width, height) + TAIL, report).size is None
         assert report.problems == []
 
     @pytest.mark.parametrize("side", ["0", "-720", "huge", "1e9", "7.5"])
     def test_an_impossible_side_is_reported(
-        self, tmp_path: Path, report: Report, side: str
+        self, tmp_path: Path, report: ReaderReport, side: str
     ) -> None:
         assert _read(tmp_path, sized("1280", side) + TAIL, report).size is None
         (problem,) = report.problems
@@ -364,7 +374,7 @@ class TestSize:
 
 
 class TestSources:
-    def test_each_source_is_a_track(self, tmp_path: Path, report: Report) -> None:
+    def test_each_source_is_a_track(self, tmp_path: Path, report: ReaderReport) -> None:
         point = ball('<data:point framespan="9:9" x="1" y="2"/>')
         text = (
             HEAD
@@ -395,7 +405,7 @@ class TestIsViper:
         ],
     )
     def test_is_told_by_the_root(
-        self, tmp_path: Path, report: Report, content: str, is_one: bool
+        self, tmp_path: Path, report: ReaderReport, content: str, is_one: bool
     ) -> None:
         (tmp_path / "1.xml").write_text(content)
         (tmp_path / "2.xml.gz").write_bytes(gzip.compress(content.encode()))

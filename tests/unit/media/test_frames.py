@@ -187,7 +187,7 @@ class TestFrames:
         folder.mkdir()
         for number in (1, 2, 3):
             (folder / f"00000{number}.png").write_bytes(PNG)
-        task = frames.ask_neighbours(Media(str(folder / "000002.png")), "2", False)
+        task = frames.request_neighbours(Media(str(folder / "000002.png")), "2", False)
         assert sorted(task.future.result()) == [-1, 1]
 
 

@@ -179,7 +179,7 @@ class TestFramesOfTheServer:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
         frames = Frames(settings)
         try:
-            assert frames.ask_of(media, False, is_indexed).future.result(60)
+            assert frames.request_work_on_frame(media, False, is_indexed).future.result(60)
             write_video(tmp_path / "cam1.mp4", "mp4v", 21)
             assert frames.ask_to(media, is_indexed_here, media).future.result(60)
         finally:
@@ -191,9 +191,9 @@ class TestFramesOfTheServer:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
         frames = Frames(settings)
         try:
-            asked = frames.ask_of(media, False, is_indexed)
+            asked = frames.request_work_on_frame(media, False, is_indexed)
             asked.abandon()
-            indexing = frames.ask_fetch(media)
+            indexing = frames.request_fetch(media)
             assert indexing is None or indexing.future.result(60)
             assert asked.future.cancelled() and frames._readers.tasks == 0
             assert has_index(media, settings)
@@ -209,7 +209,7 @@ class TestFramesOfTheServer:
             for name, error in (("cam1.mp4", ImageError), ("cam2.mp4", NotFoundError)):
                 media = Media(str(tmp_path / name), frame=0)
                 with pytest.raises(error):
-                    frames.ask_of(media, False, decode_frame_of).future.result(60)
+                    frames.request_work_on_frame(media, False, decode_frame_of).future.result(60)
         finally:
             frames.close()
 
@@ -223,10 +223,10 @@ class TestFramesOfTheServer:
         try:
             data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
             assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 35
-            assert frames.ask_fetch(media) is None
-            assert frames.ask_of(media, False, is_indexed).future.result(60)
+            assert frames.request_fetch(media) is None
+            assert frames.request_work_on_frame(media, False, is_indexed).future.result(60)
             write_video(tmp_path / "cam1.mp4", "mp4v", 41)
-            assert frames.ask_fetch(media) is not None
+            assert frames.request_fetch(media) is not None
         finally:
             frames.close()
 
@@ -236,9 +236,9 @@ class TestFramesOfTheServer:
         path = vary_times(write_video(tmp_path / "cam1.mp4", "MPG2"), RATES["any duration"])
         media, frames = Media(str(path), frame=55), Frames(settings)
         try:
-            indexing = frames.ask_fetch(media)
+            indexing = frames.request_fetch(media)
             assert indexing is not None and indexing.future.result(60)
-            assert frames.ask_fetch(media) is None
+            assert frames.request_fetch(media) is None
             data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
             assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 55
         finally:
@@ -250,7 +250,7 @@ class TestFramesOfTheServer:
         path = write_video(tmp_path / "cam1.mp4", "MPG2")
         media, frames = Media(str(path), frame=55), Frames(settings)
         try:
-            first, second = frames.ask_fetch(media), frames.ask_fetch(media)
+            first, second = frames.request_fetch(media), frames.request_fetch(media)
             assert first is not None and second is not None
             assert frames._videos.pool.tasks == 1
             first.abandon()
@@ -265,7 +265,7 @@ class TestFramesOfTheServer:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
         media, frames = Media(str(tmp_path / "cam1.mp4"), frame=0), Frames(settings)
         try:
-            for waiting in (frames.ask_fetch(media), frames.ask_fetch(media)):
+            for waiting in (frames.request_fetch(media), frames.request_fetch(media)):
                 assert waiting is not None
                 with pytest.raises(ImageError, match="not a video that can be read"):
                     waiting.future.result(60)

@@ -9,7 +9,7 @@ from app.paint.candidates import (
     KNOWN,
     MAIN,
     WIDE,
-    Library,
+    CameraLibrary,
     candidate_cameras,
     make_library_of_known_cameras,
 )
@@ -17,7 +17,7 @@ from app.soccer.pitch import Segment
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE
 
 FOCAL = TRUE.focal_length[0]
-EXACT = Library(
+EXACT = CameraLibrary(
     "exact",
     # A copy, as the product's: for an array that is only read all would be compiled once more.
     np.array([TRUE.position]),

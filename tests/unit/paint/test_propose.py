@@ -9,7 +9,7 @@ import pytest
 
 from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.paint.agreement import PaintAgreement
-from app.paint.candidates import Library
+from app.paint.candidates import CameraLibrary
 from app.paint.evidence import find_paint, read_picture, to_paint_evidence, trace_visible_markings
 from app.paint.propose import (
     RankedCamera,
@@ -61,7 +61,7 @@ class TestPropose:
     def test_what_the_match_knows_is_enough(
         self, scene: Scene, frame: Image, monkeypatch: pytest.MonkeyPatch
     ):
-        nowhere = Library("nowhere", np.array([[0.0, 500.0, -5.0]]), (1.0, 1.0), np.ones(3))
+        nowhere = CameraLibrary("nowhere", np.array([[0.0, 500.0, -5.0]]), (1.0, 1.0), np.ones(3))
         monkeypatch.setattr("app.paint.propose.MAIN", nowhere)
         monkeypatch.setattr("app.paint.propose.WIDE", nowhere)
         true = scene.truth.views[0].camera

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.sample.scene import read_truth
 from app.sample.write import write_sample
@@ -47,7 +47,7 @@ class TestWriteSample:
         assert _digests(tmp_path) == _digests(written)
 
     def test_what_is_read_back_is_what_was_made(self, written: Path):
-        report = Report()
+        report = ReaderReport()
         groups = {group.key: group for group in read_soccernet_v3(written, report)}
         assert not report.problems
         scenes = make_scenes(2, 21)
@@ -80,7 +80,7 @@ class TestWriteSample:
         assert (report.matches, report.groups) == (4, 50)
         assert seen[-1] == (50, 50)
         assert not list(tmp_path.rglob("*.zip"))
-        groups = list(read_soccernet_v3(tmp_path, Report()))
+        groups = list(read_soccernet_v3(tmp_path, ReaderReport()))
         assert len(groups) == 50
         assert sum(len(group.views) for group in groups) == report.views
         assert {group.split for group in groups} == {"train", "valid", "test"}

@@ -49,13 +49,13 @@ class TestRefineMain:
     def test_a_replay_is_left_alone(self, camera):
         observations = observations_of_lines(click(camera, 1.0), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
-        assert PROBLEM.refine_main(fit, observations) is fit
+        assert PROBLEM.refine_with_main_prior(fit, observations) is fit
 
     def test_a_camera_that_its_lines_determine_hardly_moves_even_in_an_unusual_stadium(self):
         unusual = looking((9.0, 95.0, -27.0), (34.0, -4.0, 0.0), 3200.0, bend=BEND)
         observations = observations_of_lines(click(unusual, 0.5, seed=2), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
-        refined = PROBLEM.refine_main(fit, observations)
+        refined = PROBLEM.refine_with_main_prior(fit, observations)
         spread = PROBLEM.line_noise(fit.parameters, observations).parameters
         spread = spread[X : Z + 1, X : Z + 1]
         moved = position(refined) - position(fit)
@@ -70,7 +70,7 @@ class TestRefineMain:
                 make_lines({name: clicks[name] for name in FEW}), PITCH, SIZE
             )
             fit = PROBLEM.resect(observations)
-            refined = PROBLEM.refine_main(fit, observations)
+            refined = PROBLEM.refine_with_main_prior(fit, observations)
             before.append(np.linalg.norm(position(fit) - usual.position))
             after.append(np.linalg.norm(position(refined) - usual.position))
         assert np.mean(after) < 0.8 * np.mean(before)

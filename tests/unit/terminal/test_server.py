@@ -36,7 +36,7 @@ from app.features.solve.jobs import solve_fully
 from app.features.versions.service import list_versions
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.http.server import make_server, open_listening_socket
-from app.http.team import Team
+from app.http.team import TeamLogin
 from app.json_text import json_text
 from app.log import log_to_stderr
 from app.main import create_app
@@ -61,7 +61,7 @@ class Place:
     home: Path
     files: Path
     store: Store
-    team: Team
+    team: TeamLogin
 
     def token(self, *scopes: Scope) -> Path:
         path = self.files / "-".join(scopes)

@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.errors import BusyError, InputError, StorageError
 from app.features.datasets.tables import DatasetModel
 from app.features.independent_annotations.tables import CopyDatasetModel
-from app.features.people.queries import Rights, find_rights
+from app.features.people.queries import DatasetRights, find_rights
 from app.features.people.tables import DatasetRoleModel, PersonModel
 from tests.databases import POSTGRESQL
 from tests.unit.db.homes import say
@@ -165,7 +165,7 @@ class TestRights:
         person |= {"created": "", "created_by": ""}
         with filled.write() as session:
             session.execute(insert(PersonModel), [{**person, "id": 1}])
-            assert find_rights(session, 1, ["lead"]) == Rights({}, {})
+            assert find_rights(session, 1, ["lead"]) == DatasetRights({}, {})
             own = {"person_id": 1, "dataset_id": 1, "role": "lead"}
             own |= {"given": "", "given_by": ""}
             session.execute(insert(DatasetRoleModel), [own])
@@ -173,7 +173,7 @@ class TestRights:
             session.execute(insert(DatasetModel), [{**other, "id": 2}])
             copies = {"dataset_id": 2, "of_id": 1, "batch_id": 0, "person": "bob"}
             session.execute(insert(CopyDatasetModel), [copies])
-            assert find_rights(session, 1, ["lead"]) == Rights({1: "lead"}, {2: 1})
+            assert find_rights(session, 1, ["lead"]) == DatasetRights({1: "lead"}, {2: 1})
 
 
 class TestInterrupted:

@@ -11,15 +11,21 @@ from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of, make_engine
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.recovery import anchor
-from app.db.recovery.anchor import Anchor, anchor_file, make_anchor, read_anchor, renew_anchor
+from app.db.recovery.anchor import (
+    DatabaseAnchor,
+    anchor_file,
+    make_anchor,
+    read_anchor,
+    renew_anchor,
+)
 from app.db.store import Store
 from app.errors import DamagedError
 from tests.unit.db.homes import log_ids, say
 
 
-def anchored(own_store: Store) -> Anchor:
+def anchored(own_store: Store) -> DatabaseAnchor:
     found = read_anchor(own_store.settings.database_file)
     assert found is not None
     return found
@@ -40,7 +46,7 @@ _OPENED_ON_SERVER = "ALTER TABLE log DISABLE TRIGGER USER"
 def say_at_once(own_store: Store, times: int) -> None:
     with own_store.write() as session:
         for _ in range(times):
-            append_entries(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
+            append_entries(session, [NewLogEntry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
 
 
 def refuse(*_: object) -> None:

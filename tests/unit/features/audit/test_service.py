@@ -29,7 +29,7 @@ from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
 from app.features.jobs.service import Jobs
 from app.features.people.links import set_password_by_link
-from app.features.people.logins import Logins
+from app.features.people.logins import LoginSessions
 from app.features.people.roles import DatasetRoles, Role
 from app.features.people.service import find_person, give_role, invite
 from app.features.people.visibility_queries import EVERYTHING
@@ -50,7 +50,7 @@ def said(store: Store, fill, make_group) -> int:
     (group,) = fill(make_group())
     bob, link = invite(store, "bob", Role.NONE, actor="anna")
     set_password_by_link(store, link.token, "three plain words")
-    Logins(store).log_in("bob", "three plain words", address="192.0.2.7")
+    LoginSessions(store).log_in("bob", "three plain words", address="192.0.2.7")
     give_role(store, "demo", bob.id, Role.LEAD, actor="anna")
     begin_thread(store, group, "Behind the post?", actor="anna (token lens)")
     state = load(store, group)

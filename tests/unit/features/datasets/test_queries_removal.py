@@ -4,7 +4,7 @@ import pytest
 from sqlalchemy import text
 
 from app.db.dialects.dialect import dialect_in
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.features.datasets.queries import (
     count_contents,
@@ -50,7 +50,7 @@ class TestDismissals:
 
     def test_they_go_with_their_dataset_once_the_log_says_so(self, dismissed: Store) -> None:
         with dismissed.write() as session:
-            append_entries(session, [Entry("dataset_deleted", "ann", "2026-01-02", {}, 1)])
+            append_entries(session, [NewLogEntry("dataset_deleted", "ann", "2026-01-02", {}, 1)])
             delete_rows(session, 1)
             assert dialect_in(session).count_lost_references(session) == 0
             assert session.scalar(text("SELECT count(*) FROM dismissal")) == 0

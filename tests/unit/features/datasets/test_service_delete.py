@@ -18,7 +18,7 @@ from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.logins import Login, Logins, read_roles
+from app.features.people.logins import Login, LoginSessions, read_roles
 from app.features.people.roles import DatasetRoles, Role, Scope
 from app.features.people.service import give_role, invite
 from app.features.queue.service import list_groups
@@ -166,7 +166,7 @@ class TestDeleteDataset:
     def test_one_that_begins_afresh_keeps_who_may_what_in_it(self, two: Store) -> None:
         person, _ = invite(two, "zoe", Role.VIEWER, actor="eve")
         give_role(two, "demo", person.id, Role.NONE, actor="eve")
-        seen = Logins(two)._clock()
+        seen = LoginSessions(two)._clock()
         zoe = Login(1, person.id, "zoe", DatasetRoles(Role.VIEWER), seen)
         AccessTokens(two).make(zoe, "demo alone", [Scope.READ], dataset_id=1)
         with two.write() as session:

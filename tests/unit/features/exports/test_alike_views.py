@@ -27,7 +27,7 @@ from app.formats.coco_reader import read_coco
 from app.formats.export_formats import FORMATS, TRACKS, list_options_of_format
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.parquet import read_parquet
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box
@@ -110,7 +110,7 @@ def told_apart(view: View) -> int:
     return round(view.station.lines["Middle line"][0].x / 10)
 
 
-READERS: dict[str, Callable[[Path, Report], Iterator[Group]]] = {
+READERS: dict[str, Callable[[Path, ReaderReport], Iterator[Group]]] = {
     "coco": read_coco,
     "parquet": read_parquet,
     "gamestate": read_gamestate,
@@ -208,7 +208,9 @@ class TestEveryFormat:
             views = touchline.open(out).views
             assert [int(view.image()[9, 9, 0]) for view in views] == [*map(shade, numbers)]
         if name in ("cameras", "sn-calibration"):
-            heights = sorted(float(c.position[2]) for c in read_cameras(out, Report()).values())
+            heights = sorted(
+                float(c.position[2]) for c in read_cameras(out, ReaderReport()).values()
+            )
             wanted = [view.station.given.position[2] for group in groups for view in group.views]
             assert heights == pytest.approx(sorted(wanted))
             assert report.counts["cameras"] == len(numbers)
@@ -225,7 +227,7 @@ class TestEveryFormat:
         assert sum(is_picture(item["path"]) for item in manifest["files"]) == len(pictures)
 
     def require_read_again(self, name: str, out: Path, numbers: list[int]) -> None:
-        report = Report()
+        report = ReaderReport()
         views = [view for group in READERS[name](out, report) for view in group.views]
         assert report.problems == []
         assert sorted(map(told_apart, views)) == numbers
@@ -286,7 +288,7 @@ class TestWhatIsWrittenIsFoundAgain:
         fill(*made("alike", tmp_path / "in"))
         for name in ("cameras", "sn-calibration"):
             export_dataset(store, "demo", name, tmp_path / name, everything=True)
-            cameras = read_cameras(tmp_path / name, Report())
+            cameras = read_cameras(tmp_path / name, ReaderReport())
             report = import_given_cameras(store, "demo", cameras, source="x", actor="ann")
             assert (report.unchanged, report.changed, report.problems) == (6, 0, [])
 
@@ -305,7 +307,7 @@ class TestWhatIsWrittenIsFoundAgain:
         )
         for file in filter(is_picture, on_disk(tmp_path / "out")):
             found = known.find(file)
-            assert found is not None, known.why_not(file)
+            assert found is not None, known.explain_unknown(file)
             assert grey_of(tmp_path / "out" / file) == shade(found.id)
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import insert, literal, select, update
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.exports.queries import (
@@ -73,6 +73,6 @@ class TestNewestWord:
     def test_freezing_does_not_count_as_a_change(self, filled) -> None:
         with filled.write() as session:
             assert find_newest_entry_time(session, 1) is None
-            append_entries(session, [Entry("edit", "ann", "2026-01-02", {}, 1)])
-            append_entries(session, [Entry("freeze", "ann", "2026-01-03", {}, 1)])
+            append_entries(session, [NewLogEntry("edit", "ann", "2026-01-02", {}, 1)])
+            append_entries(session, [NewLogEntry("freeze", "ann", "2026-01-03", {}, 1)])
             assert find_newest_entry_time(session, 1) == "2026-01-02"

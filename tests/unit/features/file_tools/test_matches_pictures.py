@@ -11,7 +11,7 @@ from app.errors import DatasetFormatError
 from app.features.file_tools.calibrate import calibrate_files
 from app.features.file_tools.matches import choose_picture, estimate_picture_of_files, read_picture
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_writer import write_line_files
 from app.soccer.picture import PictureGeometry
@@ -47,7 +47,7 @@ class TestCalibrateFiles:
         options = {"picture": file} if by_file else {"guess_picture": True}
         summary = calibrate(lines, tmp_path / "out", **options)
         assert summary["picture"]["aspect"] == pytest.approx(1.06, abs=0.015)
-        cameras = read_cameras(tmp_path / "out", Report()).values()
+        cameras = read_cameras(tmp_path / "out", ReaderReport()).values()
         assert len(cameras) == 4
         for camera in cameras:
             assert camera.focal_length[0] / camera.focal_length[1] == pytest.approx(

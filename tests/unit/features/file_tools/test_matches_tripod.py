@@ -12,7 +12,7 @@ import pytest
 from app.errors import InputError
 from app.features.file_tools.matches import DrawnFrame, share_tripods
 from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.geometry.arrays import row_by_row
 from app.geometry.resection import LOG_FOCAL, PAN, camera_from_parameters, parameters_from_camera
 from app.paint.evidence import Evidence
@@ -45,7 +45,7 @@ def drawn(number: int, out: Path) -> DrawnFrame:
 
 def known(out: Path) -> dict[str, Any]:
     covariances: dict[str, Any] = {}
-    read_cameras(out, Report(), covariances=covariances)
+    read_cameras(out, ReaderReport(), covariances=covariances)
     return {name: np.reshape(each, (8, 8)) for name, each in covariances.items()}
 
 

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.errors import InputError
 from app.features.file_tools.paint import UniqueNames, measure_paint_agreement_of_files, snap_files
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
 from app.formats.sn_calibration_writer import write_line_files
@@ -74,10 +74,14 @@ class TestSnapFiles:
             assert by_frame[name]["reason"], name
         assert json.loads((tmp_path / "snap.json").read_text()) == rows
         known: dict[str, object] = {}
-        assert set(read_cameras(tmp_path, Report(), covariances=known)) >= {"good", "grey", "crowd"}
+        assert set(read_cameras(tmp_path, ReaderReport(), covariances=known)) >= {
+            "good",
+            "grey",
+            "crowd",
+        }
         assert set(known) == {"good", "grey", "crowd"}
         (file,) = (
-            f for f in read_line_files(tmp_path / "lines", SIZE, Report()) if f.stem == "good"
+            f for f in read_line_files(tmp_path / "lines", SIZE, ReaderReport()) if f.stem == "good"
         )
         assert all(2 <= len(points) <= 12 for points in file.lines.values() if len(points) > 1)
 

@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.features.file_tools import track
 from app.features.file_tools.track import count_outcomes, frame_to_row, pitch_to_row, track_files
 from app.formats.cameras import read_cameras
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -81,7 +81,7 @@ def test_files_of_cameras_and_the_outcome_of_each_frame_are_written(
     assert rows[2]["pan"] is None and rows[2]["reason"] == "no_paint"
     names = sorted(file.name for file in out.iterdir())
     assert names == ["camera_0.json", "camera_1.json", "track.json"]
-    cameras = read_cameras(out, Report())
+    cameras = read_cameras(out, ReaderReport())
     assert cameras["0"].position == pytest.approx(CAMERA.position)
     code, told, _ = touchline("track", clip, out)
     assert code == 0
@@ -123,7 +123,7 @@ def test_cameras_of_the_far_side_are_turned_where_no_lines_say_it(
     clip.touch()
     assert touchline("track", clip, out, "--turn")[0] == 0
     x, y, z = CAMERA.position
-    assert read_cameras(out, Report())["0"].position == pytest.approx([-x, -y, z])
+    assert read_cameras(out, ReaderReport())["0"].position == pytest.approx([-x, -y, z])
     code, _, err = touchline("track", clip, out, "--turn", "--lines", "lines.json@0")
     assert code == 1 and "the given lines already say which half of the pitch is left" in err
 

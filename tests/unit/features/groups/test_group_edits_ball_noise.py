@@ -21,7 +21,7 @@ from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates.queries import (
     NOISE,
-    Factor,
+    NoiseFactor,
     factors_to_json,
     find_noise_factor,
     read_factors,
@@ -35,14 +35,14 @@ from app.soccer.frames import Box
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 OTHER = BallAnnotation(box=Box(510.0, 300.0, 14.0, 14.0))
 FACTORS = (
-    Factor(None, None, 1.0),
-    Factor(None, "ann", 1.5),
-    Factor("cam2", None, 2.0),
-    Factor("cam2", "ann", 4.0),
+    NoiseFactor(None, None, 1.0),
+    NoiseFactor(None, "ann", 1.5),
+    NoiseFactor("cam2", None, 2.0),
+    NoiseFactor("cam2", "ann", 4.0),
 )
 
 
-def give(store: Store, *factors: Factor) -> int:
+def give(store: Store, *factors: NoiseFactor) -> int:
     with store.write() as session:
         return apply_noise_factors(session, 1, factors, "lea")
 
@@ -121,7 +121,7 @@ class TestGiveFactors:
         place(store, static, "ann", replace(BALL, predicted_by="yolo"))
         with store.read() as session:
             assert read_last_ball_actors(session, [static]) == {static: {}}
-        give(store, Factor(None, None, 3.0))
+        give(store, NoiseFactor(None, None, 3.0))
         assert key not in noise(store, static)
         assert set(noise(store, static).values()) == {3.0}
 

@@ -24,7 +24,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import freeze_annotations
 from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.codec import group_inputs_hash, hash_imported_group
 from app.soccer.frames import Box, ImagePoint
@@ -213,7 +213,7 @@ class TestCarried:
     def test_another_installation_learns_why(self, store, there, state, tmp_path) -> None:
         change(store, LEAVE)
         export_dataset(store, "demo", "touchline", tmp_path / "carried.zip")
-        report = Report()
+        report = ReaderReport()
         carried = tmp_path / "carried.zip"
         merge_edits(there, "demo", carried, report, DEFAULT_LIMITS, source="here", actor="zoe")
         assert (why(there), report.problems) == (WHY, [])

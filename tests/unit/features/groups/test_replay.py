@@ -15,7 +15,7 @@ from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
-from app.features.match_estimates.queries import Factor
+from app.features.match_estimates.queries import NoiseFactor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict
@@ -51,7 +51,7 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
     undo_station(store, station.id, if_match=station.etag, actor="ann")
     with store.write() as session:
         apply_noise_factors(
-            session, 1, (Factor("cam2", None, 2.0), Factor("cam2", "ann", 3.0)), "ann"
+            session, 1, (NoiseFactor("cam2", None, 2.0), NoiseFactor("cam2", "ann", 3.0)), "ann"
         )
     state = load(store, ids[2])
     submit(

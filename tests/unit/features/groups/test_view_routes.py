@@ -327,7 +327,7 @@ class TestImage:
         self, app, api, frames, monkeypatch
     ) -> None:
         task = PoolTask(lambda error: error)
-        monkeypatch.setattr(app.state.services.frames, "ask_neighbours", lambda *_: task)
+        monkeypatch.setattr(app.state.services.frames, "request_neighbours", lambda *_: task)
         row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
         view = api.get(f"{API}/groups/{row['id']}").json()["views"][0]["id"]
 

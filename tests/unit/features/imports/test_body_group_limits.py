@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, GroupLimits, count_points
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group
 
@@ -26,18 +26,18 @@ def with_lines(group: Group, lines: Lines, proposed: tuple[str, ...] = ()) -> Gr
 
 
 @pytest.fixture
-def report() -> Report:
-    return Report()
+def report() -> ReaderReport:
+    return ReaderReport()
 
 
 @pytest.fixture
-def limits(report: Report) -> GroupLimits:
+def limits(report: ReaderReport) -> GroupLimits:
     return GroupLimits("files", report)
 
 
 class TestViews:
     def test_as_many_as_a_group_may_have_stay(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         view = make_group(7).views[0]
         views = tuple(replace(view, key=str(number)) for number in range(MAX_VIEWS))
@@ -46,7 +46,7 @@ class TestViews:
         assert report.problems == []
 
     def test_a_group_of_more_is_left_out_and_named(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         group = make_group(7)
         assert limits.limit_group(replace(group, views=group.views[:1] * (MAX_VIEWS + 1))) is None
@@ -57,7 +57,7 @@ class TestViews:
 
 class TestPoints:
     def test_as_many_as_a_view_may_have_stay(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS - 10, Side_line_top=10)
         group = with_lines(make_group(7), lines)
@@ -65,7 +65,7 @@ class TestPoints:
         assert report.problems == []
 
     def test_a_marking_of_more_is_left_out_and_named(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS + 1, Side_line_top=4)
         held = limits.limit_group(
@@ -82,7 +82,7 @@ class TestPoints:
         ]
 
     def test_the_densest_markings_go_until_the_others_may_stay(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=600, Side_line_top=500, Circle_central=450, Side_line_left=50)
         held = limits.limit_group(with_lines(make_group(7), lines))
@@ -94,7 +94,7 @@ class TestPoints:
         assert len(report.problems) == 1
 
     def test_a_static_camera_is_told_once_and_held_in_every_group(
-        self, limits: GroupLimits, report: Report, make_static: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_static: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS + 1, Side_line_top=4)
         for frame in (10, 11):
@@ -105,7 +105,7 @@ class TestPoints:
         assert (problem.record, problem.field) == ("10", "camera cam1, Middle line")
 
     def test_cameras_of_single_views_are_told_each_time(
-        self, limits: GroupLimits, report: Report, make_group: MakeGroup
+        self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         for number in (7, 8):
             limits.limit_group(with_lines(make_group(number), lines_of(Middle_line=MAX_POINTS + 1)))

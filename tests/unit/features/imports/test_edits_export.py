@@ -42,7 +42,7 @@ from app.features.stations.service import load_station, submit_station, undo_sta
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.file_tree import DEFAULT_LIMITS
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import Pitch
@@ -63,7 +63,7 @@ def bring(tmp_path: Path) -> Callable:
 
 
 def bring_file(store: Store, path: Path, dry_run: bool = False):
-    report = Report()
+    report = ReaderReport()
     result = merge_edits(
         store, "demo", path, report, DEFAULT_LIMITS, source="there", actor="zoe", dry_run=dry_run
     )

@@ -21,7 +21,7 @@ from app.features.imports.ingest import (
     read_unassigned_frames,
 )
 from app.features.stations.service import load_station, submit_station
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media
@@ -152,7 +152,7 @@ class TestIngest:
         again(store, make_group(7), make_group(8))
         monkeypatch.setattr("app.features.imports.body.MAX_VIEWS", 1)
         one = replace(make_group(9), views=make_group(9).views[:1])
-        told = Report()
+        told = ReaderReport()
         groups = [make_group(7), make_group(8), one]
         report = import_groups(store, "demo", groups, source="test", actor="ann", limit_report=told)
         assert (report.new, report.missing) == (1, 0)

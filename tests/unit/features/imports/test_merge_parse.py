@@ -19,7 +19,7 @@ from app.features.imports.merge_parse import (
     parse_group,
     read_merge_header,
 )
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
 from app.soccer.codec import policy_to_json, station_to_json
 from app.soccer.frames import ImageSize
@@ -43,7 +43,7 @@ class TestReadHead:
         policy = {**policy_to_json(PAPER), "name": "theirs", threshold: value}
         head = {"format": FORMAT, "version": FORMAT_VERSION, "dataset": "demo", "policy": policy}
         (tmp_path / HEAD).write_text(json.dumps(head))
-        tree = open_tree(tmp_path, Report())
+        tree = open_tree(tmp_path, ReaderReport())
         assert tree is not None
         with pytest.raises(DatasetFormatError, match=f"is not a policy: {said}"):
             read_merge_header(tree)
@@ -52,7 +52,7 @@ class TestReadHead:
     def test_a_policy_that_is_none_is_named(self, tmp_path: Path, policy: Any) -> None:
         head = {"format": FORMAT, "version": FORMAT_VERSION, "dataset": "demo", "policy": policy}
         (tmp_path / HEAD).write_text(json.dumps(head))
-        tree = open_tree(tmp_path, Report())
+        tree = open_tree(tmp_path, ReaderReport())
         assert tree is not None
         with pytest.raises(DatasetFormatError, match=r"touchline\.json, policy: is not a policy"):
             read_merge_header(tree)

@@ -18,7 +18,7 @@ from app.features.findings.queries import read_noticed_by_imports
 from app.features.imports.picture_check import NAMED, PictureCheck
 from app.features.imports.sources import ImportSource, import_source
 from app.features.queue.tables import QueueModel
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.media import video as video_index
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -43,7 +43,7 @@ def group_of(media: Media | None, **said: object) -> Group:
 
 @pytest.fixture
 def check(tmp_path: Path) -> PictureCheck:
-    return PictureCheck(Report(), Settings(home=tmp_path / "home"))
+    return PictureCheck(ReaderReport(), Settings(home=tmp_path / "home"))
 
 
 @pytest.fixture
@@ -120,7 +120,9 @@ class TestShapes:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 25)), frame=5)
         told: list[tuple[int, str]] = []
         settings = Settings(home=tmp_path / "home")
-        check = PictureCheck(Report(), settings, lambda done, _, said: told.append((done, said)))
+        check = PictureCheck(
+            ReaderReport(), settings, lambda done, _, said: told.append((done, said))
+        )
         groups = [group_of(None), group_of(media), group_of(media)]
         assert list(check.watch(groups)) == groups
         counting = "Counting the frames of cam1.mp4: {} so far."
@@ -139,7 +141,7 @@ class TestShapes:
             if len(told) == 2:
                 raise JobCancelled("cancelled")
 
-        check = PictureCheck(Report(), Settings(home=tmp_path / "home"), progress)
+        check = PictureCheck(ReaderReport(), Settings(home=tmp_path / "home"), progress)
         with pytest.raises(JobCancelled):
             list(check.watch([group_of(media)]))
         assert told[-1] == "Counting the frames of cam1.mp4: 10 so far."

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.features.imports.queries import (
     VERDICT,
     KnownGroup,
@@ -30,8 +30,10 @@ class TestNewestImports:
     def test_finds_the_last_import_of_each_group(self, filled) -> None:
         with filled.write() as session:
             for source in ("old", "new"):
-                append_entries(session, [Entry("import", "ann", "t", {"source": source}, 1, 1)])
-            append_entries(session, [Entry("edit", "ann", "t", {}, 1, 1)])
+                append_entries(
+                    session, [NewLogEntry("import", "ann", "t", {"source": source}, 1, 1)]
+                )
+            append_entries(session, [NewLogEntry("edit", "ann", "t", {}, 1, 1)])
             found = find_newest_imports(session, [1, 2])
         assert [(entry.group_id, entry.body["source"]) for entry in found] == [(1, "new")]
 

@@ -23,7 +23,7 @@ from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.formats.issia_reader import IssiaOptions, open_issia
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Media
@@ -37,7 +37,7 @@ ANN = BatchMember("ann", may_review=False)
 @pytest.fixture
 def film(store: Store, tmp_path: Path) -> dict[int, int]:
     """Groups by frame: four instants of six cameras' videos, solved; a lead has judged one."""
-    read = open_issia(write_film(tmp_path / "film"), IssiaOptions(), Report())
+    read = open_issia(write_film(tmp_path / "film"), IssiaOptions(), ReaderReport())
     groups = []
     for group in read.groups():
         frame = int(group.key)

@@ -387,7 +387,7 @@ class TestCopies:
         copies = load(store, begin_take(store, state.id, person="ann").copy_id).dataset_id
         with store.read() as session:
             roles = {name: read_roles(session, *who) for name, who in people.items()}
-        assert {name: str(one.role_in(copies)) for name, one in roles.items()} == {
+        assert {name: str(one.find_role_in(copies)) for name, one in roles.items()} == {
             "ann": "annotator",
             "ben": "none",
             "lea": "lead",

@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.home import make_home
 from app.db.store import Store
 from app.features.imports.upload_queries import UploadWriter, save_upload
@@ -33,7 +33,7 @@ def settings(tmp_path: Path) -> Settings:
     return settings
 
 
-def faults(settings: Settings) -> dict[str, Check]:
+def faults(settings: Settings) -> dict[str, CheckResult]:
     return {check.name: check for check in examine_home(settings) if not check.ok}
 
 
@@ -93,7 +93,7 @@ class TestSignOn:
             assert around(store)["admins"].ok
 
 
-def around(store: Store) -> dict[str, Check]:
+def around(store: Store) -> dict[str, CheckResult]:
     return {check.name: check for check in examine_surroundings(store)}
 
 

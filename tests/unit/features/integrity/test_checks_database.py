@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
 from app.features.findings.service import FindingName, set_dismissal
@@ -31,7 +31,7 @@ def ids(store: Store, fill, make_group) -> list[int]:
     return ids
 
 
-def faults(store: Store) -> dict[str, Check]:
+def faults(store: Store) -> dict[str, CheckResult]:
     return {check.name: check for check in examine_database(store) if not check.ok}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
 from app.features.guidelines.service import write_guidelines
@@ -22,7 +22,7 @@ def told(store: Store, fill, make_group) -> Store:
     return store
 
 
-def found(store: Store) -> Check:
+def found(store: Store) -> CheckResult:
     return next(check for check in examine_database(store) if check.name == "guidelines")
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.check import Check
-from app.db.log import Entry
+from app.db.check import CheckResult
+from app.db.log import NewLogEntry
 from app.db.session import Session
 from app.db.store import Store
 from app.features.audit.service import assign_local_work
@@ -44,7 +44,7 @@ def team(store: Store, fill, make_group) -> Store:
     return store
 
 
-def found(store: Store) -> dict[str, Check]:
+def found(store: Store) -> dict[str, CheckResult]:
     return {check.name: check for check in examine_database(store) if check.name in PARTS}
 
 
@@ -80,7 +80,7 @@ class TestExaminePeople:
     ) -> None:
         plain = delete.append_entries
 
-        def without_heir(session: Session, entries: list[Entry]) -> object:
+        def without_heir(session: Session, entries: list[NewLogEntry]) -> object:
             for entry in entries:
                 entry.body.pop("heir", None)
             return plain(session, entries)

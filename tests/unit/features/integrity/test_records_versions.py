@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
@@ -21,7 +21,7 @@ def version(store, fill, make_group, make_static):
     return freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
-def faults(store: Store) -> dict[str, Check]:
+def faults(store: Store) -> dict[str, CheckResult]:
     return {check.name: check for check in examine_versions(store) if not check.ok}
 
 

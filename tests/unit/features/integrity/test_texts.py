@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.store import Store
 from app.features.integrity.checks import examine_database
 
 pytestmark = pytest.mark.file_of_sqlite("PostgreSQL has never kept U+0000")
 
 
-def texts_check(store: Store) -> Check:
+def texts_check(store: Store) -> CheckResult:
     (found,) = (check for check in examine_database(store) if check.name == "texts")
     return found
 
@@ -20,7 +20,9 @@ def texts_check(store: Store) -> Check:
 class TestTexts:
     def test_texts_that_both_can_keep_are_counted_as_whole(self, store: Store, fill, make_group):
         fill(make_group(7))
-        assert texts_check(store) == Check("texts", True, "SQLite and PostgreSQL can keep each")
+        assert texts_check(store) == CheckResult(
+            "texts", True, "SQLite and PostgreSQL can keep each"
+        )
 
     def test_a_text_with_u_0000_is_named_by_table_row_and_column(
         self, store: Store, fill, make_group

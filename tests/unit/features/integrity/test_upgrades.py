@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.check import Check
+from app.db.check import CheckResult
 from app.db.home import make_home
 from app.db.migrate import KNOWN_REVISIONS, migrate_database
 from app.db.store import Store
@@ -62,7 +62,7 @@ def numbers(settings: Settings) -> list[tuple[object, ...]]:
         return [tuple(row) for row in session.execute(text(NUMBERS))]
 
 
-def commands(checks: list[Check]) -> list[list[str]]:
+def commands(checks: list[CheckResult]) -> list[list[str]]:
     """Commands of the product that the advice consists of."""
     advice = [check.mend for check in checks if check.mend and check.mend.startswith("touchline ")]
     return [shlex.split(sentence)[1:] for sentence in advice]

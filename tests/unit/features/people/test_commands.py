@@ -25,7 +25,7 @@ from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.login_queries import put_identity
-from app.features.people.logins import Login, Logins
+from app.features.people.logins import Login, LoginSessions
 from app.features.people.roles import Role, Scope
 from app.features.people.second_factor import SecondFactors
 from app.features.people.service import list_people
@@ -61,7 +61,7 @@ def token_in(text: str) -> str:
     return text.partition("/join#")[2].split()[0].strip('",')
 
 
-def found(logins: Logins, name: str) -> Login:
+def found(logins: LoginSessions, name: str) -> Login:
     login = logins.find(logins.log_in(name, SECRET))
     assert login is not None
     return login
@@ -72,7 +72,7 @@ class TestUsers:
         done = run("users", "add", "anna", "--role", "lead")
         assert done.exit_code == 0, done.output
         links.set_password_by_link(store, token_in(done.stdout), SECRET)
-        logins = Logins(store)
+        logins = LoginSessions(store)
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None
         assert login.role is Role.LEAD
@@ -107,7 +107,7 @@ class TestUsers:
         done = run("users", "invite-many", str(file))
         assert '"boss" is not a role' in done.stdout
         links.set_password_by_link(store, token_in(done.stdout), SECRET)
-        assert found(Logins(store), "anna").role is Role.LEAD
+        assert found(LoginSessions(store), "anna").role is Role.LEAD
 
     def test_the_list_says_where_everybody_is(self, store: Store) -> None:
         for name in ("anna", "bob"):
@@ -130,7 +130,7 @@ class TestUsers:
         links.set_password_by_link(
             store, token_in(run("users", "reset", "anna").stdout), "other plain words"
         )
-        assert Logins(store).log_in("anna", "other plain words")
+        assert LoginSessions(store).log_in("anna", "other plain words")
 
     def test_a_role_in_one_dataset_is_granted_and_taken(self, store: Store) -> None:
         for dataset in ("issia", "league"):
@@ -139,14 +139,14 @@ class TestUsers:
             store, token_in(run("users", "add", "anna", "--role", "none").stdout), SECRET
         )
         assert run("users", "grant", "anna", "issia", "reviewer").exit_code == 0
-        logins = Logins(store)
+        logins = LoginSessions(store)
         roles = found(logins, "anna").roles
-        assert [roles.role_in(key) for key in (1, 2)] == [Role.REVIEWER, Role.NONE]
+        assert [roles.find_role_in(key) for key in (1, 2)] == [Role.REVIEWER, Role.NONE]
         listed = json.loads(run("users", "list", "--json").stdout)
         assert listed[0]["datasets"] == {"issia": "reviewer"}
         assert "issia: reviewer" in run("users", "list").stdout
         assert run("users", "take", "anna", "issia").exit_code == 0
-        assert found(logins, "anna").roles.role_in(1) is Role.NONE
+        assert found(logins, "anna").roles.find_role_in(1) is Role.NONE
         assert "the whole server" in str(run("users", "grant", "anna", "1", "admin").exception)
 
     def test_what_was_done_before_there_were_accounts_is_given_to_one_person_once(
@@ -167,7 +167,7 @@ class TestUsers:
 
     def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:
         links.set_password_by_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
-        logins, factors = Logins(store), SecondFactors(store)
+        logins, factors = LoginSessions(store), SecondFactors(store)
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None and not login.must_enrol
         assert run("users", "require-second-factor", "on").exit_code == 0
@@ -204,7 +204,7 @@ class TestUsers:
     def test_tokens_are_listed_and_ended(self, store: Store) -> None:
         for name in ("anna", "bob"):
             links.set_password_by_link(store, token_in(run("users", "add", name).stdout), SECRET)
-            logins, tokens = Logins(store), AccessTokens(store)
+            logins, tokens = LoginSessions(store), AccessTokens(store)
             login = logins.find(logins.log_in(name, SECRET))
             assert login is not None
             made, text = tokens.make(login, "deploy", [Scope.EXPORT])

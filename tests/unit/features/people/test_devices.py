@@ -8,7 +8,7 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import AttemptWindow, Challenges, StoredPending
+from app.features.people.devices import AttemptWindow, PasskeyChallenges, StoredPending
 
 
 class TestAttempts:
@@ -35,7 +35,8 @@ class TestWritten:
     def test_another_process_takes_what_was_begun_once(self, store: Store) -> None:
         at = [datetime.now(UTC)]
         one, other = (
-            Challenges(StoredPending(store, lambda: at[0], LASTS, "passkey")) for _ in range(2)
+            PasskeyChallenges(StoredPending(store, lambda: at[0], LASTS, "passkey"))
+            for _ in range(2)
         )
         made = one.make("ann")
         assert (other.take("ann"), one.take("ann")) == (made, None)

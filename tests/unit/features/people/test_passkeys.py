@@ -18,8 +18,8 @@ from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInErro
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import MOST, Challenges, InMemoryPending
-from app.features.people.logins import Login, Logins
+from app.features.people.devices import MOST, InMemoryPending, PasskeyChallenges
+from app.features.people.logins import Login, LoginSessions
 from app.features.people.passkeys import Passkeys, PasskeySite
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
@@ -44,7 +44,7 @@ class Desk:
 
     def __init__(self, store: Store):
         self.store, self.at = store, datetime.now(UTC)
-        self.logins = Logins(store, lambda: self.at)
+        self.logins = LoginSessions(store, lambda: self.at)
         self.factors = SecondFactors(store, lambda: self.at)
         self.passkeys = Passkeys(store, self.logins, lambda: self.at)
         self.device = Authenticator()
@@ -253,7 +253,7 @@ class TestChallenges:
     def test_old_ones_make_room(self) -> None:
         at = [datetime.now(UTC)]
         waiting = InMemoryPending(lambda: at[0], LASTS)
-        challenges = Challenges(waiting)
+        challenges = PasskeyChallenges(waiting)
         for number in range(MOST + 2):
             challenges.make(str(number))
         assert len(waiting._open) == MOST

@@ -19,7 +19,7 @@ from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInErro
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.devices import AttemptWindow
-from app.features.people.logins import Login, Logins
+from app.features.people.logins import Login, LoginSessions
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
 from app.features.people.service import find_person, invite
@@ -49,7 +49,10 @@ class Desk:
 
     def __init__(self, store: Store):
         self.store, self.clock = store, Clock()
-        self.logins, self.factors = Logins(store, self.clock), SecondFactors(store, self.clock)
+        self.logins, self.factors = (
+            LoginSessions(store, self.clock),
+            SecondFactors(store, self.clock),
+        )
         _, link = invite(store, "anna", Role.LEAD, actor="local")
         links.set_password_by_link(store, link.token, SECRET)
         self.totp = pyotp.TOTP(pyotp.random_base32())
@@ -207,7 +210,7 @@ class TestEnrolling:
             assert text not in kept
         key.unlink()
         with closing(Store.open(desk.store.settings)) as store:
-            logins = Logins(store, desk.clock)
+            logins = LoginSessions(store, desk.clock)
             with pytest.raises(NotLoggedInError):
                 logins.log_in("anna", SECRET, code=desk.code())
             assert logins.log_in("anna", SECRET, code=desk.codes[0])

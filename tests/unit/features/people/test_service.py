@@ -23,7 +23,7 @@ from app.errors import (
 from app.features.groups.replay import replay_log
 from app.features.people import links
 from app.features.people import links as passwords
-from app.features.people.logins import IDLE, LASTS, Login, Logins
+from app.features.people.logins import IDLE, LASTS, Login, LoginSessions
 from app.features.people.queries import update_person
 from app.features.people.roles import (
     Action,
@@ -67,8 +67,8 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def logins(home, clock) -> Logins:
-    return Logins(home, clock)
+def logins(home, clock) -> LoginSessions:
+    return LoginSessions(home, clock)
 
 
 def join(store: Store, name: str, role: Role = Role.REVIEWER) -> None:
@@ -77,7 +77,7 @@ def join(store: Store, name: str, role: Role = Role.REVIEWER) -> None:
     links.set_password_by_link(store, link.token, SECRET)
 
 
-def found(logins: Logins, token: str) -> Login:
+def found(logins: LoginSessions, token: str) -> Login:
     login = logins.find(token)
     assert login is not None
     return login
@@ -327,12 +327,16 @@ class TestDatasetRoles:
     def test_a_single_role_takes_the_place_of_the_one_everywhere(self) -> None:
         for single in (Role.NONE, Role.VIEWER, Role.LEAD):
             roles = DatasetRoles(Role.REVIEWER, {1: single})
-            assert [roles.role_in(key) for key in (1, 2)] == [single, Role.REVIEWER]
-        assert DatasetRoles(Role.ADMIN, {1: Role.NONE}).role_in(1) is Role.ADMIN
+            assert [roles.find_role_in(key) for key in (1, 2)] == [single, Role.REVIEWER]
+        assert DatasetRoles(Role.ADMIN, {1: Role.NONE}).find_role_in(1) is Role.ADMIN
 
     def test_rights_in_one_dataset_alone_are_none_elsewhere(self) -> None:
         one = DatasetRoles(Role.ADMIN).only(1)
-        assert (one.role_in(1), one.role_in(2), one.is_admin) == (Role.ADMIN, Role.NONE, False)
+        assert (one.find_role_in(1), one.find_role_in(2), one.is_admin) == (
+            Role.ADMIN,
+            Role.NONE,
+            False,
+        )
 
     @pytest.mark.parametrize(
         ("everywhere", "single", "seen"),

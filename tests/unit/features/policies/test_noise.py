@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
 from app.features.datasets.queries import group_ids
@@ -69,13 +69,13 @@ def own_lines(view: View, name: str, rng: np.random.Generator) -> View:
     return replace(view, station=Station(name, SIZE, lines=make_lines(lines)))
 
 
-def placings(states: Sequence[GroupState]) -> Iterator[Entry]:
+def placings(states: Sequence[GroupState]) -> Iterator[NewLogEntry]:
     """Ann placed every ball; then Bea those of every other group once more, and Cleo the others."""
     for state in states:
         for view in state.group.views:
             body = {"edit": edit_to_json(set_ball(view.key, view.balls[0]))}
             for actor in ("ann", "bea" if state.id % 2 else "cleo"):
-                yield Entry("edit", actor, "2026-01-01T00:00:00Z", body, 1, state.id)
+                yield NewLogEntry("edit", actor, "2026-01-01T00:00:00Z", body, 1, state.id)
 
 
 def read_states_of(store: Store) -> list[GroupState]:

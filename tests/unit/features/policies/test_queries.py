@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.db.log import Entry, append_entries
+from app.db.log import NewLogEntry, append_entries
 from app.features.policies.queries import PolicyVersion, read_policy_history
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import PAPER
@@ -18,7 +18,7 @@ class TestPolicyHistory:
                 ("c", "policy", other),
             ):
                 append_entries(
-                    session, [Entry(kind, "ann", at, {"policy": policy_to_json(policy)}, 1)]
+                    session, [NewLogEntry(kind, "ann", at, {"policy": policy_to_json(policy)}, 1)]
                 )
             assert read_policy_history(session, 1) == (
                 PolicyVersion(1, "a", "ann", PAPER),

@@ -13,7 +13,7 @@ from app.db.store import Store
 from app.features.imports.ingest import import_groups
 from app.features.predictions.evaluation import run_tables
 from app.features.solutions.service import solve_dataset
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from tests.scenes import make_scenes
@@ -31,7 +31,7 @@ def home(tmp_path_factory: pytest.TempPathFactory, scenes) -> Path:
     write_soccernet_v3(home / "tree", [scene.group for scene in scenes])
     store = Store.open(Settings(home=home / "home"))
     import_groups(
-        store, "small", read_soccernet_v3(home / "tree", Report()), source="t", actor="local"
+        store, "small", read_soccernet_v3(home / "tree", ReaderReport()), source="t", actor="local"
     )
     solve_dataset(store, "small")
     store.close()

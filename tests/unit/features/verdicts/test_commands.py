@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.bulk import list_batches
-from app.formats.report import Report
+from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from tests.scenes import make_scenes
@@ -29,7 +29,7 @@ def filled_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_soccernet_v3(home / "tree", [scene.group for scene in make_scenes(2, 4, faults=False)])
     with closing(Store.open(Settings(home=home))) as store:
         import_groups(
-            store, "demo", read_soccernet_v3(home / "tree", Report()), source="t", actor="ann"
+            store, "demo", read_soccernet_v3(home / "tree", ReaderReport()), source="t", actor="ann"
         )
         solve_dataset(store, "demo")
     return home

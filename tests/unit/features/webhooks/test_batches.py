@@ -18,15 +18,15 @@ from app.features.groups.submit import load, submit
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.verdicts.service import set_verdict
-from app.features.webhooks.messages import CHOSEN, Kind
+from app.features.webhooks.messages import CHOSEN, MessageKind
 from app.features.webhooks.sender import WebhookSender
 from app.features.webhooks.service import make_webhook
 from tests.unit.features.pending import stored_by
 from tests.unit.features.webhooks.conftest import Receiver
 
 OF_WORK = {
-    *(Kind.GIVEN_OUT, Kind.HANDED_ON, Kind.DONE, Kind.STALLED),
-    *(Kind.DISPUTED, Kind.HANDED_BACK),
+    *(MessageKind.GIVEN_OUT, MessageKind.HANDED_ON, MessageKind.DONE, MessageKind.STALLED),
+    *(MessageKind.DISPUTED, MessageKind.HANDED_BACK),
 }
 
 
@@ -40,7 +40,7 @@ class Told:
     def new(self) -> list[tuple[str, dict]]:
         self.at = max(self.at, datetime.now(UTC))
         self.sender.look()
-        self.sender.look_for_stalls()
+        self.sender.queue_stall_messages()
         self.at = max(self.at, datetime.now(UTC))
         while self.sender.send():
             pass
@@ -87,7 +87,7 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     change_batch(allowed, batch, actor="lea", name="Derby day")
     change_batch(allowed, batch, actor="lea", annotators=["bo"])
     (made, (kind, handed_on)) = told.new()
-    assert made[0] == Kind.GIVEN_OUT and kind == Kind.HANDED_ON
+    assert made[0] == MessageKind.GIVEN_OUT and kind == MessageKind.HANDED_ON
     said = {"id": batch, "name": "Derby", "due": "2031-01-02", "verdicts": 1, "blind": True}
     counts = {"annotators": ["ada"], "reviewers": [], "groups": 2, "submitted": 0, "settled": 0}
     assert made[1] == {"dataset": "demo", "actor": "lea", "batch": {**said, **counts}}
@@ -96,9 +96,9 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     Leases(allowed).submit(batch, groups[0], BatchMember("bo"), actor="bo")
     Leases(allowed).return_group(batch, groups[0], BatchMember("cy"), "no ball", actor="cy")
     ((kind, back),) = told.new()
-    assert (kind, back["actor"], back["person"]) == (Kind.HANDED_BACK, "cy", "bo")
+    assert (kind, back["actor"], back["person"]) == (MessageKind.HANDED_BACK, "cy", "bo")
     assert (back["group"], back["batch"]["id"]) == (groups[0], batch) and "no ball" not in str(back)
-    assert Kind.DATASET not in told.receiver.kinds
+    assert MessageKind.DATASET not in told.receiver.kinds
 
     judge(allowed, groups[0], "accepted", "cy")
     judge(allowed, groups[1], "deferred", "cy")
@@ -106,7 +106,7 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     judge(allowed, groups[1], "rejected", "cy")
     judge(allowed, groups[1], "accepted", "cy")
     ((kind, done),) = told.new()
-    assert (kind, done["actor"], done["batch"]["settled"]) == (Kind.DONE, "cy", 2)
+    assert (kind, done["actor"], done["batch"]["settled"]) == (MessageKind.DONE, "cy", 2)
 
 
 def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, told, groups) -> None:
@@ -117,7 +117,7 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     assert compare_or_adopt_submission(allowed, copy) == "open"
     assert compare_submitted(allowed, groups[0], batch) == "open"
     (_, (kind, case)) = told.new()
-    assert (kind, case["group"], case["people"]) == (Kind.DISPUTED, groups[0], ["ada", "bo"])
+    assert (kind, case["group"], case["people"]) == (MessageKind.DISPUTED, groups[0], ["ada", "bo"])
     assert case["batch"]["id"] == batch and case["disagreements"] > 0 and case["worst"] > 1
     bo = next(
         take
@@ -126,12 +126,12 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     )
     return_for_correction(allowed, groups[0], bo.id, "look again", actor="cy")
     ((kind, back),) = told.new()
-    assert (kind, back["group"], back["copy"]) == (Kind.HANDED_BACK, groups[0], copy)
+    assert (kind, back["group"], back["copy"]) == (MessageKind.HANDED_BACK, groups[0], copy)
 
     judge(allowed, copy, "accepted", "bo")
     assert compare_or_adopt_submission(allowed, copy) == "open"
     adjudicate_case(allowed, groups[0], bo.id, actor="cy")
-    assert [kind for kind, _ in told.new()] == [Kind.DISPUTED, Kind.DONE]
+    assert [kind for kind, _ in told.new()] == [MessageKind.DISPUTED, MessageKind.DONE]
 
 
 def test_a_batch_that_stands_still_or_is_late_is_told_of_once(allowed, told, groups) -> None:
@@ -139,7 +139,7 @@ def test_a_batch_that_stands_still_or_is_late_is_told_of_once(allowed, told, gro
     for name, due in (("idle", None), ("late", date(2020, 1, 2))):
         new = NewBatch(name, annotators=["ada"], due=due, skip_given=False)
         make_batch(allowed, "demo", new, actor="lea")
-    late = [data for kind, data in told.new() if kind == Kind.STALLED]
+    late = [data for kind, data in told.new() if kind == MessageKind.STALLED]
     assert [(data["batch"]["name"], data["why"]) for data in late] == [("late", "overdue")]
     assert (late[0]["since"], late[0]["actor"]) == ("2020-01-02", "script:batches")
     told.at += timedelta(hours=23)

@@ -20,7 +20,7 @@ from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.maintenance.upkeep import forget_old_deliveries
 from app.features.verdicts.service import set_verdict
 from app.features.webhooks import sender as module
-from app.features.webhooks.messages import CHOSEN, Kind, sign_message
+from app.features.webhooks.messages import CHOSEN, MessageKind, sign_message
 from app.features.webhooks.sender import AGAIN, WebhookSender
 from app.features.webhooks.service import (
     change_webhook,
@@ -96,16 +96,16 @@ class TestTelling:
         assert sender.look() == 3
         assert sender.send() == 3
         assert sorted(receiver.kinds) == [
-            Kind.CHANGED,
-            Kind.JUDGED,
-            Kind.JOB_FAILED,
+            MessageKind.CHANGED,
+            MessageKind.JUDGED,
+            MessageKind.JOB_FAILED,
         ]
         by_kind = {body["type"]: body["data"] for _, body in receiver.got}
-        changed = by_kind[Kind.CHANGED]
+        changed = by_kind[MessageKind.CHANGED]
         assert [entry["kind"] for entry in changed["entries"]] == ["edit", "undo"]
         assert {entry["group"] for entry in changed["entries"]} == {state.id}
         assert (changed["dataset"], changed["actor"]) == ("demo", "ann")
-        assert by_kind[Kind.JOB_FAILED]["job"]["kind"] == "export"
+        assert by_kind[MessageKind.JOB_FAILED]["job"]["kind"] == "export"
         assert (sender.look(), sender.send()) == (0, 0)
         (webhook,) = list_webhooks(allowed, "demo")
         assert (webhook.waiting, webhook.delivered, webhook.failed) == (0, 3, 0)
@@ -130,13 +130,13 @@ class TestTelling:
         self, allowed, sender, receiver, state
     ) -> None:
         state = judge(allowed, state)
-        make_webhook(allowed, "demo", receiver.url, [Kind.JOB_DONE], actor="ann")
+        make_webhook(allowed, "demo", receiver.url, [MessageKind.JOB_DONE], actor="ann")
         state = judge(allowed, state, "deferred")
         end_job(allowed, "done")
         end_job(allowed, "cancelled")
         sender.look()
         sender.send()
-        assert receiver.kinds == [Kind.JOB_DONE]
+        assert receiver.kinds == [MessageKind.JOB_DONE]
 
     def test_a_sender_that_died_before_it_sent_is_followed_by_one_that_does(
         self, allowed, sender, receiver, hook, state, clock
@@ -145,7 +145,7 @@ class TestTelling:
         sender.look()
         later = WebhookSender(allowed, clock)
         assert (later.look(), later.send()) == (0, 1)
-        assert receiver.kinds == [Kind.JUDGED]
+        assert receiver.kinds == [MessageKind.JUDGED]
 
     def test_a_server_sends_by_itself(self, allowed, receiver, hook, state) -> None:
         running = WebhookSender(allowed)
@@ -155,7 +155,7 @@ class TestTelling:
         while not receiver.got and datetime.now(UTC) < deadline:
             running._closing.wait(0.02)
         running.close()
-        assert receiver.kinds == [Kind.JUDGED]
+        assert receiver.kinds == [MessageKind.JUDGED]
 
 
 class TestTryingAgain:
@@ -177,7 +177,7 @@ class TestTryingAgain:
         assert (delivery.state, delivery.attempts, delivery.status) == ("delivered", 3, 204)
         assert delivery.problem is None
         assert {headers["webhook-id"] for headers, _ in receiver.got} == {delivery.message}
-        assert receiver.kinds == [Kind.PING] * 3
+        assert receiver.kinds == [MessageKind.PING] * 3
 
     def test_who_takes_nothing_for_days_is_told_no_more(
         self, allowed, sender, receiver, hook, clock, state
@@ -221,7 +221,7 @@ class TestTryingAgain:
         (delivery,) = list_deliveries(allowed, "demo", hook)
         send_again(allowed, "demo", hook, delivery.id)
         assert sender.send() == 1
-        assert receiver.kinds == [Kind.PING, Kind.PING]
+        assert receiver.kinds == [MessageKind.PING, MessageKind.PING]
         with pytest.raises(NotFoundError):
             send_again(allowed, "demo", hook, delivery.id + 1)
 
@@ -253,7 +253,7 @@ class TestTogether:
         monkeypatch.setattr(module, "SECONDS", 0.5)
         send_ping(allowed, "demo", hook, actor="ann")
         assert sender.send() == 2
-        assert receiver.kinds == [Kind.PING]
+        assert receiver.kinds == [MessageKind.PING]
         (delivery,) = list_deliveries(allowed, "demo", slow)
         assert "no answer" in (delivery.problem or "")
 
@@ -266,7 +266,7 @@ class TestTogether:
             state = judge(allowed, state, verdict)
             sender.look()
         assert sender.send() == 2
-        assert receiver.kinds == [Kind.JUDGED]
+        assert receiver.kinds == [MessageKind.JUDGED]
 
     def test_a_server_that_stops_does_not_wait_for_it(
         self, allowed, sender, receiver, slow
@@ -292,7 +292,7 @@ class TestTogether:
         judge(allowed, state)
         sender.look()
         assert (sender.send(), sender.send()) == (2, 0)
-        assert receiver.kinds == [Kind.JUDGED]
+        assert receiver.kinds == [MessageKind.JUDGED]
         (_, pinged) = list_deliveries(allowed, "demo", hook)
         assert (pinged.attempts, pinged.problem) == (
             1,
@@ -350,7 +350,7 @@ class TestSecrets:
         receiver.secret = renewed
         send_ping(allowed, "demo", hook, actor="ann")
         sender.send()
-        assert receiver.kinds == [Kind.PING]
+        assert receiver.kinds == [MessageKind.PING]
 
 
 class TestForgetting:
@@ -376,4 +376,4 @@ class TestForgetting:
         clock.now += timedelta(days=31)
         assert forget_old_deliveries(allowed, clock.now) == 2
         assert sender.look() == 0
-        assert receiver.kinds == [Kind.JOB_DONE] * 2
+        assert receiver.kinds == [MessageKind.JOB_DONE] * 2
