@@ -148,5 +148,5 @@ class TestPitch:
 
     @pytest.mark.parametrize("size", [(60.0, 68.0), (105.0, 100.0)])
     def test_a_size_that_the_laws_do_not_allow_is_refused(self, size):
-        with pytest.raises(InputError, match="the Laws allow"):
+        with pytest.raises(InputError, match="the Laws of the Game allow"):
             Pitch(*size)

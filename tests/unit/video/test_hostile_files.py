@@ -147,7 +147,7 @@ class TestFullDisk:
         try:
             # A disk on which no file gets any larger.
             resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
-            with pytest.raises(StorageError, match=r"index of final\.mp4 cannot be kept"):
+            with pytest.raises(StorageError, match=r"index of final\.mp4 cannot be stored"):
                 index_file(path, settings, lambda _: None)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)

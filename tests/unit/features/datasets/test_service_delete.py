@@ -141,7 +141,7 @@ class TestDeleteDataset:
 
     @pytest.mark.parametrize("confirm", ["", "Demo", "other", "1"])
     def test_without_typing_its_name_nothing_is_deleted(self, two: Store, confirm: str) -> None:
-        with pytest.raises(ConflictError, match='called "demo"'):
+        with pytest.raises(ConflictError, match='which is "demo"'):
             delete_dataset(two, "demo", confirm=confirm, actor="eve")
         assert rows(two, "dataset") == 2
         assert rows(two, "solution") > 2

@@ -152,7 +152,7 @@ def test_the_worker_process_reads_clip_and_lines_and_says_what_is_wrong(
     lines = tmp_path / "lines.json"
     lines.write_text(json.dumps({"Side line left": [{"x": 0.1, "y": 0.2}, {"x": 0.1, "y": 0.8}]}))
     code, _, err = touchline("track", clip, tmp_path / "out", "--lines", f"{lines}@0")
-    assert code == 1 and "the lines of frame 0 make no camera" in err
+    assert code == 1 and "no camera can be computed from the lines of frame 0" in err
     clip.write_bytes(b"RIFF")
     code, _, err = touchline("track", clip, tmp_path / "out")
     assert code == 1 and "clip.avi is not a video that can be read" in err

@@ -91,7 +91,7 @@ def test_each_lesson_is_open_until_it_is_mended_and_says_what_is_right_in_number
     assert last["shots"].feedback == "5 of 5 shots are right."
     assert last["cameras"].right == last["cameras"].total and last["cameras"].off < 1.0
     assert last["side"].off < 1.0
-    assert last["link"].off < 1.0 and "in truth it is 0.5" in last["link"].feedback
+    assert last["link"].off < 1.0 and "the true speed is 0.5" in last["link"].feedback
 
     again = make_recording_practice(store, lambda *_: None, actor="ann")
     assert again == {**made, "made": False}

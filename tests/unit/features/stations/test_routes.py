@@ -34,7 +34,7 @@ class TestStations:
         )
         assert answer.status_code == 409
         assert answer.json()["station"] == view["station"]["id"]
-        assert f"station {view['station']['id']}" in answer.json()["hint"]
+        assert f"static camera {view['station']['id']}" in answer.json()["hint"]
 
     def test_an_edit_of_a_station_is_seen_in_every_group(self, api, document) -> None:
         view = document["views"][0]

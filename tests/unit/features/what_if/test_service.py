@@ -45,7 +45,7 @@ def test_a_column_with_another_bit_is_found_and_named(settings: Settings, array:
     path = settings.yields / "1" / "ab.facts"
     spoil(path, array)
     map_arrays(path)
-    with pytest.raises(ValueError, match=r"ab\.facts is not what was written"):
+    with pytest.raises(ValueError, match=r"ab\.facts is damaged"):
         map_arrays(path, whole=True)
     check = examine_yields(settings)
     assert not check.ok
