@@ -11,7 +11,7 @@ from typing import Any
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
-from app.features.people.devices import CHALLENGE_LASTS, Devices
+from app.features.people.devices import CHALLENGE_LASTS, DeviceTokens
 from app.features.people.devices import LASTS as DEVICE_LASTS
 from app.features.people.logins import LASTS as SESSION_LASTS
 from app.features.people.sign_on import LASTS as SIGN_ON_LASTS
@@ -37,7 +37,7 @@ class Cookies:
     """
 
     secure: bool
-    devices: Devices
+    devices: DeviceTokens
 
     @property
     def session_name(self) -> str:
