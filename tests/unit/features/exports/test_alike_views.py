@@ -321,6 +321,6 @@ class TestLinks:
         report = export_dataset(
             store, "demo", "coco", tmp_path / "out", everything=True, images="link"
         )
-        assert report.missing_images == ("kick-1, north: picture-2.png is not there",)
+        assert report.missing_images == ("kick-1, north: the image file picture-2.png is missing",)
         assert report.counts["pictures"] == 5
         assert len([name for name in on_disk(tmp_path / "out") if is_picture(name)]) == 5
