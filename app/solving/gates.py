@@ -189,7 +189,7 @@ def _gate_of_worst_view(
 _FALLEN_AT = {
     "calibratable": "no camera",
     "jac": "lines do not fit",
-    "agreement": "paint does not agree",
+    "agreement": "paint contradicts the camera",
 }
 """Why a view does not count."""
 

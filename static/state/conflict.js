@@ -81,7 +81,7 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 	}
 	if (edit.kind === 'picture') {
 		return [{
-			...about, key: `picture ${view.key}`, name: `Picture of ${view.letter}`, edit,
+			...about, key: `picture ${view.key}`, name: `Shape of the picture of ${view.letter}`, edit,
 			base: base?.picture ?? null, mine: edit.picture, theirs: view.station.picture ?? null,
 		}];
 	}

@@ -51,7 +51,7 @@ function SplitFields({ split, change }) {
 				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="any" min="0.01" max="0.99" value=${split.test_share} onChange=${withValue((text) => change({ ...split, test_share: Number(text) }))} /></div>
 			</div>` : null}
 		${split.kind === 'camera' ? html`
-			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${withValue((text) => change({ ...split, test_cameras: text.split(/[\s,]+/).filter(Boolean) }))} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
+			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${withValue((text) => change({ ...split, test_cameras: text.split(/[\s,]+/).filter(Boolean) }))} /><small>Names of views, separated by spaces, for example cam1 cam2</small></div>` : null}
 	`;
 }
 

@@ -12,7 +12,7 @@ export const COUNTED = new Set(['calibratable', 'two_views', 'ball']);
 export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',
 	jac: 'Field lines do not fit',
-	agreement: 'The paint does not agree with the cameras',
+	agreement: 'The paint contradicts the cameras',
 	two_views: 'Fewer than two views are usable',
 	ball: 'The ball is drawn in fewer than two views',
 	baseline: 'The cameras stand too close together',

@@ -19,7 +19,7 @@ const COLUMNS = [
 	{ name: 'error_percent', field: 'error_percent', label: 'ball error, %', title: 'Reprojection error of the best pair of views, in per cent of the picture’s diagonal; logarithmic' },
 	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
 	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },
-	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', title: 'Drawn diameter of the ball over the expected one' },
+	{ name: 'size_ratio', field: 'size_ratio', label: 'ball size ÷ expected', title: 'Drawn diameter of the ball over the expected one' },
 ];
 const WIDTH = 200;
 const HEIGHT = 44;

@@ -15,7 +15,7 @@ import { TIMELINE_KEYS } from './timeline/keys.js';
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
-const TABS = [{ tab: 'ball', label: 'Ball and lines' }, { tab: 'timeline', label: 'Timeline' }];
+const TABS = [{ tab: 'ball', label: 'Close-ups' }, { tab: 'timeline', label: 'Timeline' }];
 
 /** Most groups have no timeline: what draws it is loaded when it is first shown. */
 const Timeline = lazy(async () => (await import('./timeline/timeline.js')).Timeline);

@@ -27,8 +27,8 @@ export function SwapAsk({ group }) {
 	const named = group.views.find(({ key }) => swappedViews(solution.value).includes(key));
 	const warning = view ? swapWarning(group, solution.value, view) : null;
 	useKeys(useMemo(() => [
-		{ keys: ['Enter'], label: 'Swap the view named by the finding', group: 'Edit', run: () => (named ? swap(named) : cancelAsking()) },
-		{ keys: ['m'], label: 'Swap the focused view anyway', group: 'Edit', run: () => swap(view) },
+		{ keys: ['Enter'], label: 'Swap left and right in the view that the finding names', group: 'Edit', run: () => (named ? swap(named) : cancelAsking()) },
+		{ keys: ['m'], label: 'Swap left and right in the focused view anyway', group: 'Edit', run: () => swap(view) },
 	], [view, named]));
 	if (!view) return null;
 	const title = named && named !== view ? `The finding is about view ${named.letter}, not ${view.letter}.` : `Swap left and right of all lines in view ${view.letter}?`;

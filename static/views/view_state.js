@@ -11,7 +11,7 @@ import { leftOutText } from '../state/reasons.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FAILED = /** @type {Record<string, string>} */ ({
-	calibratable: 'no camera', jac: 'lines do not fit', agreement: 'paint does not agree', ball: 'no ball', reprojection: '', baseline: 'too close to another camera',
+	calibratable: 'no camera', jac: 'lines do not fit', agreement: 'paint contradicts the camera', ball: 'no ball', reprojection: '', baseline: 'too close to another camera',
 });
 
 /** Why the camera is that of the clicks. */

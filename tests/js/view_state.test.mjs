@@ -91,9 +91,9 @@ describe('gradeOfView', () => {
 		assert.deepEqual(gradeOfView(placed), { grade: 'warn', sentence: 'ball placed, not counted' });
 	});
 
-	it('says that a view whose paint does not agree is not counted', () => {
+	it('says that a view whose paint contradicts the camera is not counted', () => {
 		const { grade, sentence } = gradeOfView(picture({ solved: { failed: 'agreement', included: false } }));
-		assert.deepEqual([grade, sentence], ['bad', 'paint does not agree']);
+		assert.deepEqual([grade, sentence], ['bad', 'paint contradicts the camera']);
 	});
 
 	it('tells a view without a camera from one without a ball', () => {

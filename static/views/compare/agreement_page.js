@@ -47,7 +47,7 @@ function WaitingCard({ dataset }) {
 				<p class="agreement__text"><a class="button button--primary" href=${`/adjudicate/${items[0].group}`}>Decide the worst one</a></p>
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Groups that wait for a decision">
 					<table class="table">
-						<thead><tr><th>group</th><th>annotated by</th><th data-numeric="true">differences</th><th data-numeric="true">worst, × limit</th><th>waiting since</th></tr></thead>
+						<thead><tr><th>group</th><th>annotated by</th><th data-numeric="true">differences</th><th data-numeric="true">largest, × its limit</th><th>waiting since</th></tr></thead>
 						<tbody>${items.map((/** @type {WaitingJson} */ one) => html`
 							<tr key=${`${one.group} ${one.batch}`}>
 								<th scope="row"><a href=${`/adjudicate/${one.group}`}>${one.number}</a></th><td>${one.people.join(', ')}</td>
@@ -85,7 +85,7 @@ function PeopleCard({ found, dataset, batch }) {
 			<p class="agreement__text">Groups whose annotations agree (the first one is used): ${found.agreed}${unjudged ? html` (<a class="link" href=${queueAddress(dataset, 'annotations:agreed status:unreviewed')}>${unjudged} without a verdict</a>)` : null}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Agreement by pair of people">
 				<table class="table">
-					<thead><tr><th>people</th><th data-numeric="true">groups</th><th data-numeric="true">κ of verdicts</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th><th data-numeric="true">cameras, m</th></tr></thead>
+					<thead><tr><th>people</th><th data-numeric="true">groups</th><th data-numeric="true">verdicts, κ</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th><th data-numeric="true">cameras, m</th></tr></thead>
 					<tbody>
 						<${PeopleRow} one=${found.overall} name="all" />
 						${found.pairs.map((one) => html`<${PeopleRow} key=${one.people.join(' ')} one=${one} name=${one.people.join(' and ')} />`)}

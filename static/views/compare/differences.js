@@ -55,7 +55,7 @@ export function NumberCard({ names, limits, letter }) {
 	const view = numbers.value;
 	const ball = pair.value?.distance.ball ?? null;
 	if (!view) return null;
-	const explained = ball?.explained === null || !ball ? '' : ball.explained ? ' · within their σ' : ' · beyond their σ';
+	const explained = ball?.explained === null || !ball ? '' : ball.explained ? ' · within the σ of both' : ' · beyond the σ of both';
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-numbers">
 			<h2 id="compare-numbers">In numbers<span class="card__aside">view <${Letter} letter=${letter} /></span></h2>
@@ -66,7 +66,7 @@ export function NumberCard({ names, limits, letter }) {
 					<${Row} label=${`JaC, camera of ${names[1]} on lines of ${names[0]}`} value=${fixed(view.jac[1], 2)} grade=${gradeOf(view.jac[1], limits.jac, true)} />
 					<${Row} label="cameras apart" value=${metres(view.position_m)} />
 					<${Row} label=${`3D balls apart${explained}`} value=${metres(ball?.distance_m ?? null)} grade=${gradeOf(ball?.distance_m ?? null, limits.ball_m)} />
-					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="their σ" value=${ball.sigmas_m.map((one) => metres(one)).join(' and ')} />` : null}
+					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="σ of both 3D balls" value=${ball.sigmas_m.map((one) => metres(one)).join(' and ')} />` : null}
 					${view.lines.map((line) => html`<${Row}
 						key=${line.marking} label=${line.marking}
 						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixelText(line.mean_px)}, at most ${pixels(line.largest_px)}`}

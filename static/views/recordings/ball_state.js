@@ -92,7 +92,7 @@ export function useBalls(one, shot) {
 	function decide(accepted) {
 		if (busy) return;
 		if (!run) announce('No ball is followed in this frame.');
-		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This ball is accepted already.' : 'This ball is not accepted.');
+		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This ball has been accepted already.' : 'Nothing to withdraw: this ball has not been accepted.');
 		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept }) => (accepted
 			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}.`
 			: 'Withdrawn: the balls that accepting added are removed.'));

@@ -190,7 +190,7 @@ class TestAgreement:
         found = gates(views, ("agreement", "two_views"), policy=self.POLICY)
         assert (found["agreement"].passed, found["agreement"].view) == (False, "b")
         assert found["agreement"].sentence == "B: 0.20"
-        assert "B not counted (paint does not agree)" in found["two_views"].sentence
+        assert "B not counted (paint contradicts the camera)" in found["two_views"].sentence
 
     def test_one_below_that_is_not_needed_is_said(self):
         views = [
