@@ -22,6 +22,8 @@ import { refuses } from './rights.js';
 /** @import {ViewJson} from '../api/types.js' */
 /** @import {FollowDone} from './last_action.js' */
 
+const GONE = new Set([403, 404, 409, 422]);
+
 /** @typedef {{dataset: string, camera: string, letter: string, station: number, found: FollowedBall | null}} Follow   `found`: null while it is followed */
 
 /** What is being followed, or was and is not put away. */
@@ -32,16 +34,23 @@ export const sure = computed(() => itemsIn('followed'));
 export const unsure = computed(() => itemsIn('uncertain'));
 
 let stop = new AbortController();
+/** Whether followed balls are on their way to the server. */
+let isSending = false;
 
 /** @param {FollowedItem['state']} state @returns {FollowedItem[]} */
 function itemsIn(state) {
 	return (follow.value?.found?.items ?? []).filter((item) => item.state === state);
 }
 
+/** Whether the camera of a view on screen is the one that was followed. @param {ViewJson} view */
+export function isOfCamera(view) {
+	const at = follow.value;
+	return at !== null && at.station === view.station.id && at.dataset === groupDocument.value?.dataset.name;
+}
+
 /** The followed balls of a view's camera, where it is the one. @param {ViewJson} view @returns {FollowedItem[]} */
 export function itemsOf(view) {
-	const at = follow.value;
-	return at?.found && at.station === view.station.id && at.dataset === groupDocument.value?.dataset.name ? at.found.items : [];
+	return (isOfCamera(view) && follow.value?.found?.items) || [];
 }
 
 /** Follow the ball of a view. @param {ViewJson} view */
@@ -53,6 +62,7 @@ export async function startFollow(view) {
 	if (!center) return complain(`View ${view.letter} has no ball to follow. Press N to draw it.`);
 	const { id: station, shared } = view.station;
 	if (!shared) return complain(`The camera of view ${view.letter} is not static. A ball can be followed through groups of static cameras, and in the player of a recording.`);
+	stop.abort();
 	const mine = new AbortController();
 	stop = mine;
 	follow.value = { dataset, camera: view.label, letter: view.letter, station, found: null };
@@ -88,13 +98,14 @@ function tell(found) {
 export function endFollow() {
 	stop.abort();
 	follow.value = null;
-	announce('The followed ball was dismissed; nothing was changed.');
+	announce('What was not accepted of the followed ball was dismissed.');
 }
 
 /** Make followed balls those of their views. @param {FollowedItem[]} items */
 export async function acceptFollowed(items) {
 	const at = follow.value;
 	if (!at?.found) return announce('The ball is still being followed.');
+	if (isSending) return announce('The balls are being placed.');
 	if (items.length === 0) return complain('The remaining views are uncertain: check each, and accept it with Y.');
 	const from = at.found.group;
 	/** @type {FollowDone} */
@@ -102,11 +113,15 @@ export async function acceptFollowed(items) {
 		kind: 'follow', dataset: at.dataset, from, text: `${plural(items.length, 'ball')} followed from group ${from}`,
 		items: items.map(({ view, etag, box }) => ({ view, etag, box })),
 	};
-	const left = at.found.items.filter((item) => !items.includes(item));
-	const done = await send(action, true);
+	const asked = new Set(items.map(({ view }) => view));
+	const left = at.found.items.filter(({ view }) => !asked.has(view));
+	isSending = true;
+	const done = await send(action, true).finally(() => { isSending = false; });
 	if (!done) return undefined;
+	// Meanwhile it may have been dismissed, or another ball followed.
+	if (follow.value === at) follow.value = left.length ? { ...at, found: { ...at.found, items: left } } : null;
+	if (!done.changed) return complain(`No ball was placed.${stayed(done.refused)} Follow the ball again.`);
 	did(done.action);
-	follow.value = left.length ? { ...at, found: { ...at.found, items: left } } : null;
 	inform(`${plural(done.changed, 'ball')} placed in ${at.camera}.${stayed(done.refused)}`, { label: 'Undo', run: () => undoFollow(done.action) });
 	return undefined;
 }
@@ -114,7 +129,8 @@ export async function acceptFollowed(items) {
 /** Accept the followed ball of the group on screen. @param {ViewJson} view @returns {boolean} whether there is one */
 export function acceptHere(view) {
 	const item = view.balls.length === 0 && itemsOf(view).find((one) => one.view === view.id);
-	if (item) acceptFollowed([item]);
+	// The group may have been edited since the ball was followed: what is on screen is what is accepted.
+	if (item) acceptFollowed([{ ...item, etag: groupDocument.value?.etag ?? item.etag }]);
 	return Boolean(item);
 }
 
@@ -159,7 +175,8 @@ async function send(action, placed) {
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`Not done: ${error.message}`);
-		return null;
+		// What the server cannot do it cannot do the next time either.
+		return GONE.has(error.status) ? { action: { ...action, items: [] }, changed: 0, refused: action.items.length } : null;
 	}
 }
 

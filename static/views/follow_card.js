@@ -13,7 +13,7 @@ import { Term } from './term.js';
 
 const ENDS = {
 	lost: 'the ball is lost', left: 'the ball left the picture', known: 'a group has a ball already', end: 'no more groups',
-	limit: 'the limit is reached',
+	limit: 'as far as it was asked: follow again from the last group',
 };
 
 /** @param {{found: FollowedBall, here: number | undefined}} props */
@@ -37,7 +37,7 @@ function Found({ found }) {
 			<dt>After</dt><dd>${ENDS[found.after]}</dd>
 		</dl>
 		<${Strip} found=${found} here=${group.value?.id} />
-		${found.sized ? null : html`<p class="note">This camera is not calibrated: the size of the ball comes from the one that was clicked.</p>`}
+		${found.sized ? null : html`<p class="note">No camera of this view is known: the ball is taken to be as large as the one that was clicked.</p>`}
 		${open ? html`
 			<p class="follow__open">${plural(open, 'uncertain view')}${open === 1 ? ' is' : ' are'} left out. <button class="link-button" type="button" onClick=${nextUnsure}>Look at the next</button>${here ? html`<br />Press <kbd>Y</kbd> to accept the one that is shown here.` : null}</p>` : null}
 		<div class="follow__tools">

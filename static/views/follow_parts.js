@@ -25,8 +25,15 @@ export function isFollowing() {
 export async function followOrAccept(view) {
 	const parts = loaded.value ?? await load();
 	if (!parts) announce('The server cannot be reached.');
-	else if (parts.follow.value) parts.acceptFollowed(parts.sure.value);
+	else if (parts.follow.value && (!view || parts.isOfCamera(view))) parts.acceptFollowed(parts.sure.value);
 	else if (view) parts.startFollow(view);
+}
+
+/** Follow the ball of a view, whatever was followed before. @param {ViewJson} view */
+export async function followAnew(view) {
+	const parts = loaded.value ?? await load();
+	if (parts) parts.startFollow(view);
+	else announce('The server cannot be reached.');
 }
 
 /** Leave what is being followed. */

@@ -12,7 +12,7 @@ import { group } from '../state/group.js';
 import { findFramesAround, framesAround, stepInstant } from '../state/instants.js';
 import { filled, toggleFilled } from '../state/viewports.js';
 import { drawing, equalViews, focusView, maximised, toggleMaximised } from '../state/workspace.js';
-import { followOrAccept } from './follow_parts.js';
+import { followAnew } from './follow_parts.js';
 
 
 /** @import {ViewJson} from '../api/types.js' */
@@ -79,7 +79,7 @@ export function PanelTools({ picture, sizes }) {
 				onClick=${() => (draws ? endDrawing() : startDrawing(letter))} />
 			${picture.view.station.shared && picture.view.balls.length ? html`
 				<${Tool} label=${`Follow the ball of view ${letter}`} title="Follow the ball through the groups before and after (Shift+Q)" path=${PATHS.follow}
-					onClick=${() => { focusView(letter); followOrAccept(picture.view); }} />` : null}
+					onClick=${() => { focusView(letter); followAnew(picture.view); }} />` : null}
 			<a class="icon-button" href=${group.value ? editorAddress(group.value.id, key) : undefined} aria-label=${`Calibration of view ${letter}`} title="Calibration editor (K)">
 				<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${PATHS.camera} /></svg>
 			</a>

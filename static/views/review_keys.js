@@ -138,7 +138,7 @@ function swap() {
 /** Accept the prediction in hand, else put the ball where the other views see it. */
 function takeBall() {
 	const view = viewInHand();
-	if (acceptFollowedHere(view)) return;
+	if (selected.value?.kind !== 'prediction' && acceptFollowedHere(view)) return;
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
 	else if (!placeExpected(view)) announce(`The other views disagree about the place of the ball in view ${view.letter}. Press N to draw it.`);
@@ -330,8 +330,8 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
-	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; again: accept what was followed', group: 'Edit', needs: 'annotate', run: () => { followOrAccept(viewInHand()); } },
+	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', once: true, run: takeBall },
+	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; again: accept what was followed', group: 'Edit', needs: 'annotate', once: true, run: () => { followOrAccept(viewInHand()); } },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
 	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },

@@ -28,7 +28,7 @@ from app.features.tracks.follow import follow_view
 from app.formats.issia import DEFAULT_SIZE
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import ReaderReport
-from app.media.frames import Frames
+from app.features.recordings.follow import BallFollower
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
 from app.tracking.ball_follow import expected_diameter
@@ -169,7 +169,7 @@ def follow_stretches(data: Path, folder: Path, camera: int, *, others: bool) -> 
         solve_dataset(store, "rig")
         ids = list_ids(store, get_dataset(store, "rig").id).ids
         by_number = {int(group.key): one for group, one in zip(groups, ids, strict=True)}
-        with closing(Frames(store.settings)) as frames:
+        with closing(BallFollower(store.settings)) as frames:
             for stretch in stretches:
                 _follow(store, frames, camera, stretch, by_number, truth, dice, met)
     return met

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 from app.config import Settings
 from app.db.store import Store
@@ -20,7 +21,7 @@ from app.media.frames import picture_error_of_ended_process
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowHints
 from app.video.frames import Image, RecordingReader
-from app.worker_pool import WorkerPool
+from app.worker_pool import Explain, PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
 
 LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
@@ -80,7 +81,7 @@ class BallFollower:
             )
 
         asked = (recording.path, sha256, click, bounds, hints, self._settings)
-        task = self._pool.submit(follow_in_file, *asked, explain=explain)
+        task = self.submit(follow_in_file, *asked, explain=explain)
         try:
             found: BallRun | None = task.future.result()
         except CancelledError as error:
@@ -88,6 +89,14 @@ class BallFollower:
                 "the server is shutting down", hint="Nothing was saved. Try it again in a moment."
             ) from error
         return found
+
+    def submit(self, work: Callable[..., Any], *arguments: Any, explain: Explain) -> PoolTask:
+        """Have a ball followed by a function of its own; ``explain`` says of what a process ended.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._pool.submit(work, *arguments, explain=explain)
 
     def close(self) -> None:
         """End the process."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Annotated, Any
 
 import typer
@@ -19,7 +20,7 @@ ENDS = {
     "left": "the ball left the picture",
     "known": "a group has a ball already",
     "end": "there are no more groups",
-    "limit": "it was followed no further",
+    "limit": "no more frames were asked for, or 100 groups are the most",
 }
 
 
@@ -47,23 +48,26 @@ def follow(
 
     Views that have a ball keep it. Without --accept nothing is changed.
     """
+    from app.features.recordings.follow import BallFollower
     from app.features.tracks.follow import accept_followed, follow_view, take_back_followed
-    from app.media.frames import Frames
 
     if accept and undo:
         raise typer.BadParameter("place the balls or take them away, one at a time")
+    if undo and at is not None:
+        raise typer.BadParameter("--undo removes balls wherever they are: leave --at out")
     place = _parse_place(at)
     with open_store() as store:
         view = _find(store, dataset, group, camera)
         if undo:
-            changed = take_back_followed(store, view, actor=get_current_actor())
-            _print({"taken_back": changed}, json_, f"{plural(changed, 'ball')} taken away.")
+            taken = take_back_followed(store, view, actor=get_current_actor())
+            gone = {"taken_back": taken.changed, "refused": taken.refused}
+            _print(gone, json_, f"{plural(taken.changed, 'ball')} removed.{_stayed(taken.refused)}")
             return
-        pictures = Frames(store.settings)
+        balls = BallFollower(store.settings)
         try:
-            found = follow_view(store, pictures, view, place, frames)
+            found = follow_view(store, balls, view, place, frames)
         finally:
-            pictures.close()
+            balls.close()
         placed = accept_followed(store, found, actor=get_current_actor()) if accept else None
     items = [
         {
@@ -78,16 +82,24 @@ def follow(
         }
         for item in found.items
     ]
+    refused = 0 if placed is None else placed.refused
     unsure = sum(item["state"] == "uncertain" for item in items)
     values = {
         "first": found.first, "last": found.last, "before": found.before, "after": found.after,
-        "placed": placed, "items": items,
+        "placed": None if placed is None else placed.changed, "refused": refused, "items": items,
     }  # fmt: skip
     told = f"Frames {found.first} to {found.last}: {plural(len(items), 'view')} without a ball, {unsure} of them uncertain. "
-    told += f"Before, {ENDS[found.before]}; after, {ENDS[found.after]}."
+    told += f"It stops at frame {found.first} because {ENDS[found.before]}, and at frame {found.last} because {ENDS[found.after]}."
     if placed is not None:
-        told += f" {plural(placed, 'ball')} placed."
+        told += f" {plural(placed.changed, 'ball')} placed.{_stayed(refused)}"
     _print(values, json_, told)
+
+
+def _stayed(groups: int) -> str:
+    """Groups that stay as they are, as a sentence; empty for none."""
+    return (
+        f" {plural(groups, 'group')} changed meanwhile: nothing was done there." if groups else ""
+    )
 
 
 def _print(values: dict[str, Any], as_json: bool, sentence: str) -> None:
@@ -102,6 +114,8 @@ def _parse_place(text: str | None) -> ImagePoint | None:
         return None
     try:
         x, y = (float(part) for part in text.split(","))
+        if not (isfinite(x) and isfinite(y)):
+            raise ValueError
     except ValueError:
         raise typer.BadParameter("write two numbers, as 812.5,344", param_hint="--at") from None
     return ImagePoint(x, y)

@@ -20,11 +20,12 @@ from app.features.groups.edit import set_ball
 from app.features.groups.state import GroupState, read_etags, read_states
 from app.features.groups.view_queries import StoredView, find_view, views_of_camera
 from app.features.people.visibility_queries import COPIES
+from app.features.recordings.follow import BallFollower
 from app.features.tracks.queries import place_of_group
-from app.features.tracks.stretches import frame_of
+from app.features.tracks.stretches import UNSURE, frame_of
 from app.geometry.camera import Camera
 from app.media.camera_frames import CameraFrames, Image, ViewFrame, frames_between
-from app.media.frames import Frames
+from app.media.frames import picture_error_of_ended_process
 from app.soccer.annotation import BallAnnotation, followed_source
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Media
@@ -33,6 +34,7 @@ from app.tracking.ball_expected import place_of, segment_of
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, ExpectedPlace, FollowedBall, FollowHints
 from app.worker_pool import PoolTask
+from app.worker_process import WorkerEnded
 
 EACH_WAY, MOST_EACH_WAY = 100, 250
 """Frames that a ball is followed to either side, unless somebody asks for others; and at most."""
@@ -53,6 +55,7 @@ class CameraSequence:
         clicks: The nearest balls that people placed before and after.
         expected: Where other views say that it is, by frame.
         each_way: Frames to either side.
+        ends: Why there are no views further on, before and after.
     """
 
     views: tuple[ViewFrame, ...]
@@ -62,6 +65,7 @@ class CameraSequence:
     expected: Mapping[int, Sequence[ExpectedPlace]]
     size: ImageSize
     each_way: int
+    ends: tuple[FollowEnd, FollowEnd]
 
 
 @dataclass(frozen=True)
@@ -160,14 +164,21 @@ def plan_follow(
         view, dataset = _need_view(session, view_id)
         if dataset > COPIES:
             raise ConflictError(
-                "an independent annotation is made without help", hint="Place each ball by hand."
+                "in an independent annotation no ball is followed: it has to be one person's work alone",
+                hint="Place each ball by hand.",
             )
         media, frame = view.media, _require_sequence(view)
         if media is None:
             raise NotFoundError(f"view {view.key} has no frame in which a ball could be followed")
         others = views_of_camera(session, dataset, view.match, view.station_id)
-        numbered = {number: one for one in others if (number := frame_of(one.group)) is not None}
-        near = _near({**numbered, frame: view}, frame)
+        # Groups whose keys begin otherwise are of another sequence.
+        own_start = _start_of_key(view.group)
+        numbered = {
+            number: one
+            for one in others
+            if (number := frame_of(one.group)) is not None and _start_of_key(one.group) == own_start
+        }
+        near, ends = _near({**numbered, frame: view}, frame)
         if len(near) < 2:
             raise InputError(
                 f"no other group of this match has a frame of {view.station}",
@@ -177,8 +188,13 @@ def plan_follow(
     own = states[frame][1]
     click = at or _ball_of(own, view.key)
     if click is None:
-        raise InputError(f"view {view.key} has no ball", hint="Place it first, or say where it is.")
-    sequence = _sequence(view, frame, click, states, each_way)
+        shown = own.group.view(view.key)
+        several = shown is not None and len(shown.balls) > 1
+        raise InputError(
+            f"view {view.key} has {'several balls' if several else 'no ball'}",
+            hint="Say which place is meant." if several else "Place it first, or say where it is.",
+        )
+    sequence = _sequence(view, frame, click, states, each_way, ends)
     return FollowQuestion(view, media, sequence, states)
 
 
@@ -192,17 +208,30 @@ def _require_sequence(view: StoredView) -> int:
         )
     if frame is None:
         raise InputError(
-            f"group {view.group} is part of no sequence: its key does not end in a frame number"
+            f"the key of group {view.group} does not end in a frame number, so nobody knows which"
+            " groups come before and after it",
+            hint="Place the ball by hand.",
         )
     return frame
 
 
-def _near(views: Mapping[int, StoredView], frame: int) -> dict[int, StoredView]:
-    """The views with frames that are nearest to one, by frame."""
+def _start_of_key(group: str) -> str:
+    """What stands before the number of a group's frame in its key."""
+    return group[: group.rfind("/") + 1]
+
+
+def _near(
+    views: Mapping[int, StoredView], frame: int
+) -> tuple[dict[int, StoredView], tuple[FollowEnd, FollowEnd]]:
+    """The views with frames that are nearest to one, by frame, and why there are no more on either side."""
     numbers = sorted(number for number, view in views.items() if view.media is not None)
     here = numbers.index(frame)
     wanted = numbers[max(here - MOST_GROUPS, 0) : here + MOST_GROUPS + 1]
-    return {number: views[number] for number in wanted}
+    ends: tuple[FollowEnd, FollowEnd] = (
+        "limit" if here > MOST_GROUPS else "end",
+        "limit" if here + MOST_GROUPS + 1 < len(numbers) else "end",
+    )
+    return {number: views[number] for number in wanted}, ends
 
 
 def _states(
@@ -214,8 +243,11 @@ def _states(
 
 
 def _ball_of(state: GroupState, key: str) -> ImagePoint | None:
+    """Where the one ball of a view is that somebody saw; a view that is left out says nothing."""
     view = state.group.view(key)
-    return None if view is None or view.ball is None else view.ball.center
+    if view is None or view.ball is None or view.ball.inferred or not view.included:
+        return None
+    return view.ball.center
 
 
 def _sequence(
@@ -224,8 +256,13 @@ def _sequence(
     click: ImagePoint,
     states: Mapping[int, tuple[StoredView, GroupState]],
     each_way: int,
+    ends: tuple[FollowEnd, FollowEnd],
 ) -> CameraSequence:
     first, last = _bounds(states, frame)
+    ends = (
+        "known" if first > min(states) else ends[0],
+        "known" if last < max(states) else ends[1],
+    )
     camera = _camera_of(states[frame][1], view.key)
     views, clicks = [], []
     expected: dict[int, list[ExpectedPlace]] = {}
@@ -242,7 +279,7 @@ def _sequence(
         elif camera is not None:
             expected[number] = _expected(state, one.key, camera, size)
     at = BallClick(frame, click.x, click.y)
-    return CameraSequence(tuple(views), at, tuple(clicks), camera, expected, size, each_way)
+    return CameraSequence(tuple(views), at, tuple(clicks), camera, expected, size, each_way, ends)
 
 
 def _bounds(states: Mapping[int, tuple[StoredView, GroupState]], frame: int) -> tuple[int, int]:
@@ -262,7 +299,9 @@ def _bounds(states: Mapping[int, tuple[StoredView, GroupState]], frame: int) -> 
 
 def _camera_of(state: GroupState, key: str) -> Camera | None:
     solved = _solved(state, key)
-    return None if solved is None else solved.calibration.camera
+    if solved is None or solved.failed in UNSURE:
+        return None
+    return solved.calibration.camera
 
 
 def _solved(state: GroupState, key: str) -> ViewSolution | None:
@@ -278,18 +317,23 @@ def _expected(state: GroupState, key: str, camera: Camera, size: ImageSize) -> l
     found = []
     for other in state.group.views:
         ball, source = _ball_of(state, other.key), _camera_of(state, other.key)
-        if other.key == key or ball is None or source is None or not other.included:
+        if other.key == key or ball is None or source is None:
             continue
         segment = segment_of(source, ball, camera, size)
         found += [] if segment is None else [segment]
     return found
 
 
-def ask_follow(frames: Frames, question: FollowQuestion) -> PoolTask:
+def ask_follow(settings: Settings, balls: BallFollower, question: FollowQuestion) -> PoolTask:
     """Have a ball followed in a worker process; ``followed_views`` makes of its result what is told."""
     view = question.view
-    return frames.request_work_on_frame(
-        question.media, view.flipped, follow_through, question.sequence
+
+    def explain(error: WorkerEnded) -> Exception:
+        what = f"the frames of {view.station} around group {view.group}"
+        return picture_error_of_ended_process(what, error)
+
+    return balls.submit(
+        follow_through, question.media, view.flipped, settings, question.sequence, explain=explain
     )
 
 
@@ -311,7 +355,7 @@ def followed_views(question: FollowQuestion, found: FollowedSequence) -> Followe
             continue
         one, state = question.states[ball.frame]
         shown = state.group.view(one.key)
-        if shown is not None and not shown.balls:
+        if shown is not None and shown.included and not shown.balls:
             items.append(
                 FollowedView(
                     state.id, state.key, state.number, one.id, ball.frame, state.etag, ball
@@ -333,7 +377,7 @@ def followed_views(question: FollowQuestion, found: FollowedSequence) -> Followe
 
 def follow_view(
     store: Store,
-    frames: Frames,
+    balls: BallFollower,
     view_id: int,
     at: ImagePoint | None = None,
     each_way: int = EACH_WAY,
@@ -347,7 +391,8 @@ def follow_view(
     """
     question = plan_follow(store, view_id, at, each_way)
     try:
-        found: FollowedSequence = ask_follow(frames, question).future.result()
+        task = ask_follow(store.settings, balls, question)
+        found: FollowedSequence = task.future.result()
     except CancelledError as error:
         raise OverloadedError(
             "the server is shutting down", hint="Try again in a moment."
@@ -355,8 +400,16 @@ def follow_view(
     return followed_views(question, found)
 
 
-def accept_followed(store: Store, found: FollowedViews, *, actor: str) -> int:
-    """Make the followed balls that are not uncertain those of their views; how many views changed."""
+@dataclass(frozen=True)
+class FollowedEdits:
+    """How many views were changed, and how many stay as they are because their groups were changed meanwhile."""
+
+    changed: int
+    refused: int
+
+
+def accept_followed(store: Store, found: FollowedViews, *, actor: str) -> FollowedEdits:
+    """Make the followed balls that are not uncertain those of their views."""
     source = followed_source(found.group)
 
     def item(one: FollowedView) -> ViewEdits:
@@ -369,8 +422,8 @@ def accept_followed(store: Store, found: FollowedViews, *, actor: str) -> int:
     return _edit(store, found.view, items, actor)
 
 
-def take_back_followed(store: Store, view_id: int, *, actor: str) -> int:
-    """Take away the balls that were followed from that of a view, as far as nobody changed them; how many.
+def take_back_followed(store: Store, view_id: int, *, actor: str) -> FollowedEdits:
+    """Take away the balls that were followed from that of a view, as far as nobody changed them.
 
     Raises:
         NotFoundError: There is no such view.
@@ -388,11 +441,12 @@ def take_back_followed(store: Store, view_id: int, *, actor: str) -> int:
     return _edit(store, view_id, items, actor)
 
 
-def _edit(store: Store, view_id: int, items: Sequence[ViewEdits], actor: str) -> int:
+def _edit(store: Store, view_id: int, items: Sequence[ViewEdits], actor: str) -> FollowedEdits:
     with store.read() as session:
         _, dataset = _need_view(session, view_id)
     report = edit_views(store, dataset, items, actor=actor)
-    return sum(one.outcome == "changed" for one in report.items)
+    outcomes = [one.outcome for one in report.items]
+    return FollowedEdits(outcomes.count("changed"), outcomes.count("refused"))
 
 
 def _need_view(session: Session, view_id: int) -> tuple[StoredView, int]:
@@ -430,14 +484,21 @@ def follow_through(
         return FollowedSequence(None)
     clicked = {one.frame for one in asked.clicks}
 
-    def end(why: FollowEnd, way: Sequence[int], every: Sequence[int]) -> FollowEnd:
+    def end(
+        why: FollowEnd, way: Sequence[int], every: Sequence[int], further: FollowEnd
+    ) -> FollowEnd:
         if why != "limit":
             return why
         if clicked.intersection(way):
             return "known"
-        return "limit" if len(way) < len(every) else "end"
+        return "limit" if len(way) < len(every) else further
 
-    return FollowedSequence(run, end(run.before, ways[0], before), end(run.after, ways[1], after))
+    ends = asked.ends
+    return FollowedSequence(
+        run,
+        end(run.before, ways[0], before, ends[0]),
+        end(run.after, ways[1], after, ends[1]),
+    )
 
 
 def _with_gaps(numbers: Sequence[int]) -> list[int]:

@@ -24,7 +24,7 @@ from app.http.deps import AppServices, Id
 from app.http.documents import Document
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import COMPUTE, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.soccer.frames import ImagePoint
 from app.tracking.ball_run import State
@@ -123,7 +123,7 @@ _SAME = ("view", "group", "camera", "frame", "first", "last", "before", "after",
     responses=responses(404, 409, 413, 415, 503),
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(COMPUTE)
+@limit(TRANSFER)
 async def follow_ball_of_view(
     view: Id,
     services: AppServices,
@@ -137,7 +137,7 @@ async def follow_ball_of_view(
     """
     at = None if wanted.at is None else ImagePoint(*wanted.at)
     question = await to_thread.run_sync(plan_follow, services.store, view, at, wanted.frames)
-    task = await to_thread.run_sync(ask_follow, services.frames, question)
+    task = await to_thread.run_sync(ask_follow, services.settings, services.balls, question)
     found: FollowedSequence | None = await task.result_unless_client_gone(request.is_disconnected)
     if found is None:
         return Response(status_code=CLIENT_GONE)

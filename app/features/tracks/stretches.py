@@ -34,7 +34,7 @@ LONGEST_GAP_S = 2.0
 MOST_FRAMES = 200_000
 """Of a stretch: a half of a match at 60 a second has 162,000."""
 _NUMBER = re.compile(r"(?:.*/)?(\d{1,9})(?:\.\w+)?", re.ASCII)
-_UNSURE = ("calibratable", "jac", "agreement")
+UNSURE = ("calibratable", "jac", "agreement")
 """Gates on cameras; a view that fails one measures nothing."""
 _ROUGH_HEIGHT_M, _ROUGH_DEPTH_M, _ROUGH_FARTHEST_M = 1.0, 60.0, 300.0
 """Where a ball that no two views placed is taken to be, to carry its camera's covariance there."""
@@ -243,7 +243,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
         ball = view.ball is not None and view.ball.center is not None
         solved = record.view_solution(view)
         camera = None if solved is None else solved.calibration.camera
-        if solved is None or camera is None or solved.failed in _UNSURE:
+        if solved is None or camera is None or solved.failed in UNSURE:
             unused["no camera that passes its gates" if solution else "not solved"] += ball
             continue
         camera = known.setdefault(_bytes_of(camera), camera)

@@ -16,10 +16,10 @@ from app.errors import ConflictError, ImageError, InputError, NotFoundError
 from app.features.groups.state import read_state
 from app.features.independent_annotations.tables import GoldModel
 from app.features.people.visibility_queries import READER, RestrictedReader
+from app.features.recordings.follow import BallFollower
 from app.features.tracks import follow
 from app.features.tracks.follow import FollowedViews, follow_view
 from app.features.tracks.queries import place_of_group
-from app.media.frames import Frames
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -31,8 +31,8 @@ Fill = Callable[..., list[int]]
 
 
 @pytest.fixture
-def frames(settings: Settings) -> Iterator[Frames]:
-    found = Frames(settings)
+def frames(settings: Settings) -> Iterator[BallFollower]:
+    found = BallFollower(settings)
     yield found
     found.close()
 
@@ -59,7 +59,7 @@ def off(found: FollowedViews) -> dict[int, float]:
 
 class TestFollowView:
     def test_a_ball_goes_through_the_groups_before_and_after(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
         found = follow_view(store, frames, view_of(store, ids[10]))
@@ -73,7 +73,7 @@ class TestFollowView:
         assert all(item.view == view_of(store, item.group) for item in found.items[:3])
 
     def test_frames_of_a_video_between_groups_are_looked_at(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED], video=True)
         ids = fill(*(group for group in every if int(group.key) % 5 == 0))
@@ -82,7 +82,7 @@ class TestFollowView:
         assert max(off(found).values()) < 1.0
 
     def test_files_between_groups_are_looked_at_and_missing_ones_passed(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
         ids = fill(*(group for group in every if int(group.key) % 5 == 0))
@@ -93,7 +93,7 @@ class TestFollowView:
         assert max(off(found).values()) < 1.0
 
     def test_it_ends_at_balls_that_are_there_and_leaves_them(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         said = [FIRST + 6, CLICKED, FIRST + 14]
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=said))
@@ -102,7 +102,7 @@ class TestFollowView:
         assert [item.frame - FIRST for item in found.items] == [7, 8, 9, 11, 12, 13]
 
     def test_a_ball_that_somebody_said_is_out_of_view_ends_it(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         groups = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
         gone = groups[13].view(CAMERA)
@@ -111,9 +111,57 @@ class TestFollowView:
         ids = fill(*groups)
         found = follow_view(store, frames, view_of(store, ids[10]))
         assert found.items[-1].frame == FIRST + 12
+        assert (found.before, found.after) == ("end", "known")
+
+    def test_an_inferred_ball_ends_it_and_is_no_place_where_the_ball_was_seen(
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED, FIRST + 13])
+        view = groups[13].view(CAMERA)
+        assert view is not None and view.ball is not None
+        groups[13] = groups[13].with_view(replace(view, balls=(replace(view.ball, inferred=True),)))
+        ids = fill(*groups)
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert (found.items[-1].frame, found.after) == (FIRST + 12, "known")
+        assert not plan_follow(store, view_of(store, ids[10])).sequence.clicks
+
+    def test_a_view_that_is_left_out_gets_no_ball(
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
+        view = groups[12].view(CAMERA)
+        assert view is not None
+        groups[12] = groups[12].with_view(replace(view, included=False))
+        ids = fill(*groups)
+        found = follow_view(store, frames, view_of(store, ids[10]), each_way=3)
+        assert [item.frame - CLICKED for item in found.items] == [-3, -2, -1, 1, 3]
+
+    def test_groups_of_another_sequence_of_the_match_are_no_neighbours(
+        self, store: Store, fill: Fill, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, 6, CAMERA, said=[FIRST])
+        keyed = [
+            replace(group, key=f"{'h1' if index < 3 else 'h2'}/{group.key}")
+            for index, group in enumerate(groups)
+        ]
+        ids = fill(*keyed)
+        assert len(plan_follow(store, view_of(store, ids[0])).states) == 3
+
+    def test_the_most_groups_are_told_as_a_limit(
+        self,
+        store: Store,
+        fill: Fill,
+        frames: BallFollower,
+        folder: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.setattr(follow, "MOST_GROUPS", 4)
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert (found.before, found.after) == ("limit", "limit")
 
     def test_groups_that_are_hidden_from_whoever_asks_take_no_part(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED, FIRST + 13]))
         view = view_of(store, ids[10])
@@ -134,7 +182,7 @@ class TestFollowView:
         assert follow_view(store, frames, view, each_way=5).after == "known"
 
     def test_as_far_as_is_asked(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
         found = follow_view(store, frames, view_of(store, ids[10]), each_way=3)
@@ -142,7 +190,7 @@ class TestFollowView:
         assert (found.before, found.after) == ("limit", "limit")
 
     def test_where_the_ball_is_gone_it_is_lost(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         hidden = range(FIRST + 18, FIRST + 60)
         groups = filmed_groups(folder, 60, CAMERA, said=[CLICKED], others=False, hidden=hidden)
@@ -154,7 +202,7 @@ class TestFollowView:
         )
 
     def test_a_place_may_be_given_where_no_ball_is_annotated(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[]))
         view = view_of(store, ids[10])
@@ -179,35 +227,37 @@ def broken(groups: Sequence[Group], **station: object) -> list[Group]:
 
 
 class TestRefusals:
-    def refused(self, store: Store, frames: Frames, group: int) -> str:
+    def refused(self, store: Store, frames: BallFollower, group: int) -> str:
         with pytest.raises((InputError, NotFoundError, ImageError, ConflictError)) as error:
             follow_view(store, frames, view_of(store, group))
         return error.value.message
 
     def test_of_a_camera_that_moves(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
         moving = [broken([g], key=f"{CAMERA}/{g.key}", shared=False)[0] for g in groups]
         assert "not a camera that stands still" in self.refused(store, frames, fill(*moving)[0])
 
     def test_of_groups_without_numbers(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
         named = [
             replace(group, key=f"goal {letter}x")
             for group, letter in zip(groups, "abc", strict=True)
         ]
-        assert "part of no sequence" in self.refused(store, frames, fill(*named)[0])
+        assert "does not end in a frame number" in self.refused(store, frames, fill(*named)[0])
 
     def test_of_one_group_alone(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         group = filmed_groups(folder, 1, CAMERA, said=[FIRST])[0]
         assert "no other group" in self.refused(store, frames, fill(group)[0])
 
-    def test_without_a_frame(self, store: Store, fill: Fill, frames: Frames, folder: Path) -> None:
+    def test_without_a_frame(
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
+    ) -> None:
         groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
         view = groups[0].view(CAMERA)
         assert view is not None
@@ -215,7 +265,7 @@ class TestRefusals:
         assert "has no frame" in self.refused(store, frames, fill(*groups)[0])
 
     def test_where_its_frame_is_gone(
-        self, store: Store, fill: Fill, frames: Frames, folder: Path
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
         (folder / CAMERA / f"{FIRST:06d}.jpg").unlink()
@@ -227,7 +277,7 @@ class TestRefusals:
         self,
         store: Store,
         fill: Fill,
-        frames: Frames,
+        frames: BallFollower,
         folder: Path,
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
@@ -236,4 +286,4 @@ class TestRefusals:
             place = place_of_group(session, ids[0])
         assert place is not None
         monkeypatch.setattr(follow, "COPIES", place.dataset_id - 1)
-        assert "without help" in self.refused(store, frames, ids[0])
+        assert "no ball is followed" in self.refused(store, frames, ids[0])

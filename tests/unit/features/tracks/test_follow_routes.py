@@ -125,7 +125,7 @@ class TestCommand:
         code, out, _ = touchline(*words)
         assert code == 0 and "0 views without a ball" in out and "has a ball already" in out
         code, out, _ = touchline(*words, "--undo", "--json")
-        assert (code, json.loads(out)) == (0, {"taken_back": COUNT - 1})
+        assert (code, json.loads(out)) == (0, {"taken_back": COUNT - 1, "refused": 0})
 
     def test_what_is_not_there_is_said(self, touchline: Run, home: Path) -> None:
         code, _, err = touchline("follow", "7", "cam1", "--dataset", "rolling")
