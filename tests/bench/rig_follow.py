@@ -23,12 +23,12 @@ from app.features.datasets.service import get_dataset
 from app.features.groups.state import read_state
 from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_ids
+from app.features.recordings.follow import BallFollower
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.follow import follow_view
 from app.formats.issia import DEFAULT_SIZE
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import ReaderReport
-from app.features.recordings.follow import BallFollower
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
 from app.tracking.ball_follow import expected_diameter
@@ -177,7 +177,7 @@ def follow_stretches(data: Path, folder: Path, camera: int, *, others: bool) -> 
 
 def _follow(
     store: Store,
-    frames: Frames,
+    frames: BallFollower,
     camera: int,
     stretch: list[int],
     ids: Mapping[int, int],

@@ -18,7 +18,7 @@ from app.features.independent_annotations.tables import GoldModel
 from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.recordings.follow import BallFollower
 from app.features.tracks import follow
-from app.features.tracks.follow import FollowedViews, follow_view
+from app.features.tracks.follow import FollowedViews, follow_view, plan_follow
 from app.features.tracks.queries import place_of_group
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
