@@ -31,9 +31,11 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.batches.service import NewBatch, make_batch
 from app.features.comments.service import add_reply, begin_thread
+from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import request_export
 from app.features.groups.history import read_history
 from app.features.groups.submit import load
+from app.features.groups.view_queries import find_group_and_view_ids
 from app.features.imports.ingest import import_groups
 from app.features.imports.upload_queries import UploadWriter
 from app.features.pitches.service import read_pitches
@@ -58,7 +60,8 @@ from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
 from app.tracking.ball_run import BallClick
 from tests.drawn_balls import place, write_film
-from tests.flights import add_flight
+from tests.filmed_rigs import filmed_groups
+from tests.flights import FIRST, add_flight
 from tests.openapi import openapi_of
 from tests.tracked_frames import frame
 from tests.waiting import SECONDS
@@ -73,6 +76,8 @@ DELETED_COMMENT = "2"
 DELETED_RECORDING = DELETED_LINK = DELETED_RUN = "2"
 BALL_CLICKS = [dict(zip("xy", place(frame), strict=True)) | {"frame": frame} for frame in (5, 20)]
 """On the ball of the recording."""
+FILMED = "cam1"
+"""Camera of groups with pictures, whose ball is followed."""
 HOOK = "http://127.0.0.1:9/hook"
 """Where webhooks may be sent, and nobody listens."""
 REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "503"]
@@ -137,6 +142,8 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")
     add_recordings(store, services.balls)
     assert add_flight(store) == 1
+    filmed = filmed_groups(chosen.home, 3, FILMED, said=[FIRST])
+    import_groups(store, "filmed", filmed, source="films", actor="local")
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
     add_reply(store, 1, talk.id, "It is.", actor="local")
     yield app
@@ -350,6 +357,8 @@ class Attack:
             case.path_parameters["run"] = DELETED_RUN
         if case.operation.path.endswith("/ball-runs") and case.method == "POST":
             case.body = BALL_CLICKS[0]
+        if case.operation.path.endswith("/ball/follow"):
+            case.path_parameters["view"], case.body = self.filmed_view(), {"frames": 1}
         if case.operation.path.endswith("/clicks"):
             case.body = BALL_CLICKS[1]
         if case.operation.path.endswith("/{run}") and case.method == "PATCH":
@@ -375,6 +384,13 @@ class Attack:
             case.body = {"first": 10, "last": 12}
         if "/cameras/{frame}" in case.operation.path:
             case.path_parameters["frame"] = "3"
+
+    def filmed_view(self) -> str:
+        """A view of a static camera whose ball the frames after it show."""
+        with self.store.read() as session:
+            dataset = dataset_id(self.store, "filmed")
+            groups = find_group_and_view_ids(session, dataset, [str(FIRST)])
+        return str(groups[str(FIRST)][1][FILMED])
 
     def upload(self, name: str = "predictions.csv") -> str:
         """A file of predictions that fits, or another one of the home."""
