@@ -303,7 +303,7 @@ class Settings(BaseSettings):
         return Path(self.database.partition("///")[2].partition("?")[0])
 
     @property
-    def solves_apart(self) -> bool:
+    def solves_in_own_processes(self) -> bool:
         """Whether processes of its own solve what people ask: a team's, in one process that answers."""
         return self.team and self.web_workers == 1
 

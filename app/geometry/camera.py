@@ -129,8 +129,8 @@ class Camera:
     def __post_init__(self) -> None:
         if self.lens not in LENSES:
             raise DegenerateGeometryError(
-                f'"{self.lens}" is not a known lens',
-                hint=f"Lenses are {', '.join(LENSES)}.",
+                f'"{self.lens}" is not a known lens model',
+                hint=f"Lens models are {', '.join(LENSES)}.",
             )
         shapes = (("rotation", (3, 3)), ("position", (3,)), ("distortion", (self.model.count,)))
         for name, shape in shapes:

@@ -189,7 +189,7 @@ def list_groups_to_compare(session: Session) -> list[tuple[int, int | None]]:
     return [(found.group_id, found.batch_id) for found in session.execute(statement)]
 
 
-def list_copies_to_adopt(session: Session) -> list[int]:
+def list_submitted_copies_to_take_over(session: Session) -> list[int]:
     """Copies that were submitted in batches which ask for one annotation a group, and wait."""
     annotation = IndependentAnnotationModel
     ready = (

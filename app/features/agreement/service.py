@@ -23,9 +23,9 @@ from app.features.agreement.queries import (
     AgreementRow,
     complete_unchosen_annotations,
     find_limits,
-    list_copies_to_adopt,
     list_group_agreements,
     list_groups_to_compare,
+    list_submitted_copies_to_take_over,
     put_agreement,
     put_limits,
     read_required_verdicts,
@@ -44,7 +44,7 @@ from app.features.independent_annotations.queries import (
     IndependentAnnotation,
     list_annotations_of_group,
 )
-from app.features.independent_annotations.service import find_annotation_of_copy
+from app.features.independent_annotations.service import find_independent_annotation_of_group
 from app.features.solutions.codec import to_json
 from app.features.webhooks.queries import DISPUTED, make_time_suffix, queue_webhook_messages
 from app.soccer.actors import SCRIPT
@@ -191,7 +191,7 @@ def compare_or_adopt_submission(
     Returns:
         ``agreed``: the first annotation was taken over; ``open``: somebody has to decide.
     """
-    annotation = find_annotation_of_copy(store, copy_id)
+    annotation = find_independent_annotation_of_group(store, copy_id)
     if annotation is None or annotation.kind != INDEPENDENT or annotation.submitted is None:
         return None
     try:
@@ -259,7 +259,7 @@ def compare_uncompared_groups(store: Store, paint: PaintFollower | None = None) 
         How many groups were compared.
     """
     with store.read() as session:
-        left, waiting = list_groups_to_compare(session), list_copies_to_adopt(session)
+        left, waiting = list_groups_to_compare(session), list_submitted_copies_to_take_over(session)
     for copy_id in waiting:
         compare_or_adopt_submission(store, copy_id, paint)
     compared = 0

@@ -24,7 +24,7 @@ from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
     count_groups_left,
-    find_annotation_of_copy_row,
+    find_independent_annotation_row,
     list_annotations_of_batch,
 )
 from app.features.independent_annotations.service import read_annotation
@@ -190,7 +190,7 @@ def find_own_annotation(
     session: Session, batch: Batch, group: int, person: str
 ) -> IndependentAnnotation | None:
     """The own annotation of a person in a batch whose copy a group is; None: it is none."""
-    row = find_annotation_of_copy_row(session, group)
+    row = find_independent_annotation_row(session, group)
     if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
         return None
     return read_annotation(session, row.id)

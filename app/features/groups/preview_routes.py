@@ -93,7 +93,7 @@ class LargeGroupSolver:
     """
 
     def __init__(self, settings: Settings):
-        apart = settings.solves_apart
+        apart = settings.solves_in_own_processes
         self.workers = (
             [ReadyWorker("large", LIMITS, _large_edit_error, prepare_solver_process)]
             if apart
@@ -190,7 +190,7 @@ class PreviewSolver:
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         self.workers = [
             ReadyWorker("previews", LIMITS, _process_ended_error, prepare_preview_process, settings)
-            for _ in range(PROCESSES if settings.solves_apart else 0)
+            for _ in range(PROCESSES if settings.solves_in_own_processes else 0)
         ]
 
     async def preview_document(

@@ -36,7 +36,7 @@ from app.features.groups.state import (
 )
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations import submission_queries as submissions
-from app.features.independent_annotations.queries import find_annotation_of_copy_row
+from app.features.independent_annotations.queries import find_independent_annotation_row
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
@@ -86,7 +86,7 @@ def find_view(store: Store, view_id: int) -> FoundView:
 def require_group_open(session: Session, dataset_id: int, group_id: int) -> None:
     """Raise ConflictError where a group is an independent annotation that was submitted."""
     if dataset_id > COPIES:
-        submissions.require_annotation_open(find_annotation_of_copy_row(session, group_id))
+        submissions.require_annotation_open(find_independent_annotation_row(session, group_id))
 
 
 @dataclass(frozen=True)

@@ -401,7 +401,7 @@ class UploadWriter:
             # What lies there has no record, so nobody can have been told of it.
             _remove_folder(place)
         raise StorageError(
-            "the upload could not be stored",
+            "the server could not save the upload",
             hint="Wait, then send it again with the same Idempotency-Key.",
         )
 

@@ -32,7 +32,7 @@ from app.features.independent_annotations.copying import rename_views_as_origina
 from app.features.independent_annotations.queries import (
     GOLD,
     IndependentAnnotation,
-    find_annotation_of_copy_row,
+    find_independent_annotation_row,
     update_annotation,
 )
 from app.features.independent_annotations.service import (
@@ -311,7 +311,7 @@ def _announce_return(
     session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
 ) -> None:
     """Tell webhooks of the dataset, for a copy of the one that it is of."""
-    row = find_annotation_of_copy_row(session, group.id)
+    row = find_independent_annotation_row(session, group.id)
     where, details = group.dataset_id, {"group": group.id, "person": person}
     if row is not None:
         where = need_group(session, row.group_id).dataset_id

@@ -146,7 +146,7 @@ def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotati
     )
 
 
-def find_annotation_of_copy_row(session: Session, copy_id: int) -> IndependentAnnotation | None:
+def find_independent_annotation_row(session: Session, copy_id: int) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
     return next(iter(_annotations_from_rows(session, _OF_COPY, {"copy": copy_id})), None)
 

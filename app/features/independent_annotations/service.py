@@ -27,8 +27,8 @@ from app.features.independent_annotations.queries import (
     IndependentAnnotation,
     count_annotations,
     find_annotation,
-    find_annotation_of_copy_row,
     find_common_gold_start,
+    find_independent_annotation_row,
     insert_annotation,
     list_annotations_of_group,
     read_annotations,
@@ -162,7 +162,7 @@ def begin_annotation_in_session(
     for one in others:
         if one.person == person:
             return one
-    if find_annotation_of_copy_row(session, group_id) is not None:
+    if find_independent_annotation_row(session, group_id) is not None:
         raise ConflictError(
             "this is an independent annotation already",
             hint="Start from the group that it was made from.",
@@ -221,7 +221,7 @@ def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
     Raises:
         NotFoundError: It is an ordinary group.
     """
-    annotation = find_annotation_of_copy(store, copy_id)
+    annotation = find_independent_annotation_of_group(store, copy_id)
     if annotation is not None:
         return annotation
     with store.read() as session:
@@ -231,10 +231,12 @@ def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
     raise NotFoundError(f"group {copy_id} is not an independent annotation")
 
 
-def find_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation | None:
+def find_independent_annotation_of_group(
+    store: Store, copy_id: int
+) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
     with store.read_one() as session:
-        return find_annotation_of_copy_row(session, copy_id)
+        return find_independent_annotation_row(session, copy_id)
 
 
 def list_annotations(

@@ -17,7 +17,7 @@ from app.features.agreement.queries import delete_open_agreement
 from app.features.groups.queries import read_groups
 from app.features.independent_annotations.queries import (
     IndependentAnnotation,
-    find_annotation_of_copy_row,
+    find_independent_annotation_row,
     update_annotation,
 )
 from app.soccer.actors import LOCAL_USER, person_of
@@ -89,7 +89,7 @@ def record_copy_verdict(session: Session, copy_id: int, state: str, *, actor: st
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already: its verdict stays, too.
     """
-    annotation = find_annotation_of_copy_row(session, copy_id)
+    annotation = find_independent_annotation_row(session, copy_id)
     if annotation is None:
         return
     if state != "unreviewed":

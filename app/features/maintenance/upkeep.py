@@ -27,7 +27,7 @@ from app.features.exports.jobs import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
 from app.features.jobs.queries import count_jobs, forget_jobs
 from app.features.jobs.service import Jobs
-from app.features.queue.queries import count_unsolved
+from app.features.queue.queries import count_groups_to_solve
 from app.features.webhooks.queries import forget_deliveries, has_old_deliveries
 
 log = structlog.get_logger("touchline.upkeep")
@@ -203,7 +203,7 @@ def read_home(store: Store) -> HomeReport:
         StorageError: The database does not answer.
     """
     with store.read() as session:
-        groups, unsolved, oldest = count_unsolved(session)
+        groups, unsolved, oldest = count_groups_to_solve(session)
         entries, jobs = find_newest_entry_id(session), count_jobs(session)
     settings = store.settings
     free = shutil.disk_usage(settings.home).free

@@ -203,7 +203,7 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
         ]
     if not adjusted:
         raise ConflictError(
-            "no static camera was adjusted by its last edit, so there is nothing to undo"
+            "there is nothing to undo: the last edit of no static camera was an adjustment of cameras"
         )
     states = [load_station(store, station) for station in adjusted]
     return undo_stations(store, states, actor=actor)

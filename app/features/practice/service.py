@@ -291,7 +291,7 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
     known = _read_truths(settings)
     if keys and not keys <= set(known or ()):
         raise ConflictError(
-            f'the dataset "{name}" already contains groups of your own',
+            f'the dataset "{name}" contains groups of your own, so the practice cannot use it',
             hint="The practice needs that name. Rename or delete your dataset first.",
         )
 

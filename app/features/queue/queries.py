@@ -459,7 +459,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[State
     return session.rows(StateCount, statement)
 
 
-def count_unsolved(session: Session) -> tuple[int, int, str | None]:
+def count_groups_to_solve(session: Session) -> tuple[int, int, str | None]:
     """How many groups there are, how many wait to be solved, and since when (UTC) the one that
     waits longest does: from its last change, or from that of its dataset's policy where that came
     later; None: none waits."""

@@ -26,7 +26,7 @@ from app.features.imports.cameras import GivenCamera, NamedStation, attach_camer
 from app.features.imports.ingest import IngestReport
 from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.queries import (
-    list_cameras_rows,
+    list_tracked_stretches,
     views_of_video,
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
@@ -99,7 +99,7 @@ def list_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
     """
     with store.read() as session:
         recording = need_recording(session, recording_id)
-        rows = list_cameras_rows(session, recording_id)
+        rows = list_tracked_stretches(session, recording_id)
         sha256 = recording.sha256
         views = views_of_video(session, recording.dataset_id, sha256) if rows and sha256 else []
     drawn = sorted({view.number for view in views if view.has_lines})
@@ -258,7 +258,9 @@ def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, byt
     """
     frames = read_cameras(store.settings, found.digest)
     if all(frame.camera is None for frame in frames):
-        raise ConflictError("no frame of this shot has a camera")
+        raise ConflictError(
+            "no frame of this shot has a camera yet", hint="Track the cameras of the shot first."
+        )
     title = f"{get_recording(store, found.recording).name}_{found.first}-{found.last}"
     with TemporaryDirectory() as place:
         # Samples carry the name of their folder.

@@ -153,7 +153,8 @@ def _require_shot(
     row = need_recording(session, recording)
     if row.facts is None:
         raise ConflictError(
-            f'"{row.name}" is not indexed yet', hint="Wait for the job that does it."
+            f'the recording "{row.name}" is not indexed yet',
+            hint="Wait for the job that indexes it.",
         )
     frames = parse_json_column(row.facts)["frames"]
     if not first <= last < frames:

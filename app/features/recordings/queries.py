@@ -139,7 +139,7 @@ class FrameView(NamedTuple):
     has_lines: bool
 
 
-def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
+def list_tracked_stretches(session: Session, recording_id: int) -> Sequence[Any]:
     """The stretches of a recording that have cameras, in their order."""
     model = ShotCamerasModel
     columns = [column for column in model.__table__.columns if column.name != "actor"]
@@ -168,7 +168,7 @@ def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[Frame
 
 def delete_overlapping(session: Session, recording_id: int, first: int, last: int) -> Sequence[Any]:
     """Delete what shares a frame with a stretch; returns its rows."""
-    rows = list_cameras_rows(session, recording_id)
+    rows = list_tracked_stretches(session, recording_id)
     gone = [row for row in rows if row.first <= last and first <= row.last]
     ids = [row.id for row in gone]
     session.execute(delete(ShotCamerasModel).where(ShotCamerasModel.id.in_(ids)))

@@ -94,8 +94,8 @@ class Recording:
         """
         if self.sha256 is None or self.problem is not None:
             raise ConflictError(
-                self.problem or f'"{self.name}" is not indexed yet',
-                hint="Index it again." if self.problem else "Wait for the job that does it.",
+                self.problem or f'the recording "{self.name}" is not indexed yet',
+                hint="Index it again." if self.problem else "Wait for the job that indexes it.",
             )
         return self.sha256
 

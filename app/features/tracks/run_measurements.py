@@ -24,8 +24,8 @@ from app.features.recordings.link_values import ShotLink, link_of
 from app.features.recordings.links import link_seconds
 from app.features.recordings.queries import (
     find_run,
-    list_cameras_rows,
     list_link_rows,
+    list_tracked_stretches,
     views_of_video,
 )
 from app.features.tracks.queries import accepted_run_rows, recording_shots
@@ -152,7 +152,7 @@ def followed_observations(
 
 
 def _cameras(session: Session, recording_id: int) -> list[tuple[str, int, int]]:
-    rows = list_cameras_rows(session, recording_id)
+    rows = list_tracked_stretches(session, recording_id)
     return [(row.digest, row.first, row.last) for row in rows]
 
 

@@ -258,7 +258,8 @@ def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
     missing = keys - found.keys()
     if missing:
         raise StorageError(
-            f"{len(missing)} frozen parts of the version are missing, {sorted(missing)[0]} first",
+            f"{len(missing)} of the parts that the version froze are missing in the database, for example"
+            f" {sorted(missing)[0]}",
             hint="Restore the database from a backup.",
         )
 

@@ -29,7 +29,10 @@ from app.features.batches.service import (
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load
 from app.features.independent_annotations.gold import mark_gold_group, unmark_gold_group
-from app.features.independent_annotations.queries import INDEPENDENT, find_annotation_of_copy_row
+from app.features.independent_annotations.queries import (
+    INDEPENDENT,
+    find_independent_annotation_row,
+)
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
@@ -370,7 +373,7 @@ class TestLeases:
         while not ordinary:
             copy = leases.next(batch, ADA).group
             with store.read() as session:
-                ordinary = find_annotation_of_copy_row(session, copy).kind == INDEPENDENT
+                ordinary = find_independent_annotation_row(session, copy).kind == INDEPENDENT
             leases.submit(batch, copy, ADA, actor="ada")
         assert get_batch(store, batch).submitted == 0
         compare_uncompared_groups(store)
