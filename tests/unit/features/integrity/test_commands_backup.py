@@ -95,7 +95,7 @@ class TestTransfer:
         file.chmod(0o640)
         done = CliRunner().invoke(app, ["transfer", str(home), str(file)])
         assert isinstance(done.exception, InputError)
-        assert done.exception.hint == f"chmod 600 {file}"
+        assert done.exception.hint == f"Run chmod 600 {file}."
 
     def test_a_file_without_an_address_is_no_place(self, home: Path, file: Path) -> None:
         done = CliRunner().invoke(app, ["transfer", str(home), str(file)])

@@ -96,7 +96,7 @@ class TestTrackAround:
         assert track_around(store, track).frame == worst
 
     def test_refuses_what_it_does_not_have(self, store: Store, track: int) -> None:
-        with pytest.raises(InputError, match="frame 3 is not of the track"):
+        with pytest.raises(InputError, match="frame 3 is not in the track"):
             track_around(store, track, 3)
         with pytest.raises(NotFoundError, match="there is no track 99"):
             track_around(store, 99, FIRST)

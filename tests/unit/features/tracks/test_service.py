@@ -248,7 +248,7 @@ class TestChangeTrack:
     def test_a_correction_outside_of_it_is_refused(self, store, flight) -> None:
         make(store)
         with pytest.raises(
-            InputError, match=f"frame 3 is not of the track .rig., {FIRST} to"
+            InputError, match=f"is not in the track .rig., which has the frames {FIRST} to"
         ) as error:
             change(store, TrackChange(corrections=(Correction(3, "out", True),)))
         assert error.value.pointer == "/corrections/0/frame"
