@@ -120,6 +120,10 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     app.state.services.close()
 
 
+NOT_HTTP = b"Invalid HTTP request received."
+"""What uvicorn itself answers to a head that is none: it never reaches the application."""
+
+
 class TestTable:
     def test_it_knows_every_route_and_no_other(self, app: Any) -> None:
         known, there = set(TABLE["routes"]), served(app)
@@ -342,7 +346,8 @@ class TestEveryRoute:
                 headers = {"Content-Type": own, "Content-Length": length, "If-Match": '"a"'}
                 answer = guarded.ask(row.method, bare(row), headers)
                 assert answer.status in (400, 413), told_of(row, answer, length)
-                assert_guarded(answer, told_of(row, answer, length))
+                if answer.body != NOT_HTTP:
+                    assert_guarded(answer, told_of(row, answer, length))
             both = {"Content-Type": own, "Content-Length": "2", "Transfer-Encoding": "chunked"}
             answer = guarded.ask(row.method, bare(row), both, b"0\r\n\r\n")
             assert answer.status == 400, told_of(row, answer, both)
