@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -93,7 +92,7 @@ class CameraFrames:
     ):
         self._media, self._flipped, self._size, self._settings = media, flipped, size, settings
         self._kept: OrderedDict[int, Image] = OrderedDict()
-        self._readers: dict[str, FrameReader] = {}
+        self._readers: dict[str, tuple[FrameReader, int]] = {}
 
     def read(self, number: int) -> Image:
         """A frame: red green blue, shape (H, W, 3).
@@ -119,7 +118,7 @@ class CameraFrames:
 
     def close(self) -> None:
         """Close the videos."""
-        for reader in self._readers.values():
+        for reader, _ in self._readers.values():
             reader.close()
 
     def _try(self, number: int) -> None:
@@ -157,11 +156,12 @@ class CameraFrames:
         how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
         return np.asarray(cv2.resize(picture, size, interpolation=how), np.uint8)
 
-    def _video(self, media: Media) -> Any:
-        reader = self._readers.get(media.path)
-        times = read_video_times(media, self._settings)
-        if not 0 <= (media.frame or 0) < len(times):
+    def _video(self, media: Media) -> FrameReader:
+        """What reads the frames of a video, which has this one."""
+        if media.path not in self._readers:
+            times = read_video_times(media, self._settings)
+            self._readers[media.path] = FrameReader(Path(media.path), times), len(times)
+        reader, count = self._readers[media.path]
+        if not 0 <= (media.frame or 0) < count:
             raise NotFoundError(f"{Path(media.path).name} has no frame {media.frame}")
-        if reader is None:
-            reader = self._readers[media.path] = FrameReader(Path(media.path), times)
         return reader

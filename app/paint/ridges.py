@@ -154,7 +154,7 @@ def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatAr
     return np.array(pieces).reshape(-1, 4)
 
 
-def _coordinates_along_piece(
+def coordinates_along_piece(
     paint: FloatArray, end: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
     """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
@@ -168,14 +168,14 @@ def _coordinates_along_piece(
 
 def _paint_beside_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint beside a piece, between its ends."""
-    along, across, length = _coordinates_along_piece(paint, end)
+    along, across, length = coordinates_along_piece(paint, end)
     near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
     return near
 
 
 def _extend_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
-    along, across, length = _coordinates_along_piece(paint, end)
+    along, across, length = coordinates_along_piece(paint, end)
     near = across < NEAR_PX * unit
     places = np.sort(along[near])
     gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)

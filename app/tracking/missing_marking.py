@@ -21,7 +21,7 @@ from app.paint.evidence import (
     to_paint_evidence,
     trace_visible_markings,
 )
-from app.paint.ridges import NEAR_PX, find_straight_pieces
+from app.paint.ridges import NEAR_PX, coordinates_along_piece, find_straight_pieces
 from app.paint.snap import SnappedCamera
 from app.paint.tracing import TracedPlaces
 from app.soccer.annotation import make_lines
@@ -100,12 +100,7 @@ def _missing_straight_markings(
 
 def _is_explained(piece: FloatArray, paint: FloatArray, unit: float) -> bool:
     """Whether the paint that was seen already lies along a piece."""
-    start, stop = piece[:2], piece[2:]
-    length = float(np.hypot(*(stop - start)))
-    direction = (stop - start) / length
-    offset = paint - start
-    along = offset @ direction
-    across = np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0])
+    along, across, length = coordinates_along_piece(paint, piece)
     beside = (across < 2 * NEAR_PX * unit) & (along > 0) & (along < length)
     return bool(np.ptp(along[beside]) > length / 2) if beside.any() else False
 
