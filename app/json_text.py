@@ -30,7 +30,7 @@ def canonical_json_text(value: Any) -> str:
         ValueError: A number is infinite or NaN.
 
     Example:
-        >>> canonical({"b": 1, "a": [1.5, None]})
+        >>> canonical_json_text({"b": 1, "a": [1.5, None]})
         '{"a":[1.5,null],"b":1}'
     """
     return _ENCODER.encode(value)
@@ -67,7 +67,7 @@ def replace_non_finite(value: Any) -> Any:
     """A value of dicts, lists and plain values in which no number is infinite or NaN.
 
     Example:
-        >>> finite({"error": float("inf"), "at": (1.0, float("nan"))})
+        >>> replace_non_finite({"error": float("inf"), "at": (1.0, float("nan"))})
         {'error': None, 'at': [1.0, None]}
     """
     if isinstance(value, float):

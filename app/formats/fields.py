@@ -23,7 +23,7 @@ def id_to_text(value: Any) -> str | None:
     """The text of an id; None for what is none (null, a truth value, a list, an object).
 
     Example:
-        >>> id_text(1), id_text(1.0), id_text(" 1.0 "), id_text("a7"), id_text(True)
+        >>> id_to_text(1), id_to_text(1.0), id_to_text(" 1.0 "), id_to_text("a7"), id_to_text(True)
         ('1', '1', '1', 'a7', None)
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
@@ -177,7 +177,7 @@ def parse_image_size(value: Mapping[str, Any]) -> ImageSize | None:
     """Width and height in pixels; None where the record states none that an image can have.
 
     Example:
-        >>> stated_size({"image_size": [1280, 720]})
+        >>> parse_image_size({"image_size": [1280, 720]})
         ImageSize(width=1280, height=720)
     """
     pairs = [[value.get(width), value.get(height)] for width, height in _SIDES]

@@ -216,7 +216,7 @@ def parse_camera_number(name: str, *, strict: bool = False) -> int | None:
     """Number of the camera that a file's name speaks of; ``strict``: not any last number.
 
     Example:
-        >>> camera_number("Film Role-0 ID-3 T-0 m00s00-026.xgtf"), camera_number("ground_truth_5")
+        >>> parse_camera_number("Film Role-0 ID-3 T-0 m00s00-026.xgtf"), parse_camera_number("ground_truth_5")
         (3, 5)
     """
     for pattern in _NUMBERED[: -1 if strict else None]:

@@ -23,7 +23,7 @@ def split_picture_name(name: str) -> tuple[str, ...]:
     Drives, roots, ``.``, ``..``, hosts and what follows a ``?`` of an address are left out.
 
     Example:
-        >>> picture_parts("..\\\\..\\\\media\\\\4\\\\north.jpg"), picture_parts("file:///C:/a%20b/1.jpg")
+        >>> split_picture_name("..\\\\..\\\\media\\\\4\\\\north.jpg"), split_picture_name("file:///C:/a%20b/1.jpg")
         (('media', '4', 'north.jpg'), ('a b', '1.jpg'))
     """
     text = name.strip()
@@ -47,7 +47,7 @@ def split_of_word(name: str) -> str:
     """The split that a name is; empty where it is none.
 
     Example:
-        >>> [split_of(name) for name in ("train2017", "Validation", "val", "cam1")]
+        >>> [split_of_word(name) for name in ("train2017", "Validation", "val", "cam1")]
         ['train', 'valid', 'valid', '']
     """
     found = _SPLIT.fullmatch(name.strip().lower())
@@ -58,7 +58,7 @@ def split_within_word(name: str) -> str:
     """The split that one word of a name says; empty where none does, or two contradict.
 
     Example:
-        >>> split_in("instances_train2017"), split_in("train_or_test"), split_in("_annotations.coco")
+        >>> split_within_word("instances_train2017"), split_within_word("train_or_test"), split_within_word("_annotations.coco")
         ('train', '', '')
     """
     found = {split for word in _WORDS.split(name.lower()) if (split := split_of_word(word))}

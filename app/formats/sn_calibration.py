@@ -65,7 +65,7 @@ def split_folder_name(split: str, size: ImageSize) -> str:
     """Folder of the frames of one split and one size: the evaluator takes one size at a time.
 
     Example:
-        >>> split_folder_of("test", ImageSize(1280, 720))
+        >>> split_folder_name("test", ImageSize(1280, 720))
         'test-1280x720'
     """
     return f"{split or UNASSIGNED}-{size.width}x{size.height}"

@@ -221,7 +221,7 @@ def format_yolo_label(box: Box, size: ImageSize) -> str | None:
         size: Of the image.
 
     Example:
-        >>> label_line(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))
+        >>> format_yolo_label(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))
         '0 0.25 0.15 0.1 0.1'
     """
     left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))

@@ -42,7 +42,7 @@ def install_metrics(app: FastAPI, limits: RequestLimits) -> None:
     """Count requests by route, each application for itself, and watch its services.
 
     Of several web processes each counts in a file that all of them read, and whichever answers adds
-    them up (``web_processes``): a number never depends on who was asked.
+    them up: a number never depends on who was asked.
     """
     registry = app.state.metrics = CollectorRegistry()
     own = ProcessCollector(app, limits)

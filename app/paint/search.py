@@ -274,7 +274,7 @@ def search_cameras(
 
     Args:
         picture: The paint.
-        pieces: Its straight pieces (``straight.straight_pieces``), pixels, shape (L, 4).
+        pieces: Its straight pieces (``ridges.find_straight_pieces``), pixels, shape (L, 4).
         library: Where cameras are looked for.
         pitch: The pitch.
         executor: Runs parts of it side by side; threads, as the kernels let go of the GIL.

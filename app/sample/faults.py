@@ -166,7 +166,7 @@ def list_confusable_markings(marking: str) -> tuple[str, ...]:
     """Names that annotators write for this marking by mistake.
 
     Example:
-        >>> confusions("Small rect. left main")
+        >>> list_confusable_markings("Small rect. left main")
         ('Big rect. left main', 'Small rect. right main')
     """
     other_side = _swap_words(marking, "left", "right")

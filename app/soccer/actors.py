@@ -39,7 +39,7 @@ def is_actor_of(actor: str, name: str) -> bool:
     """Whether an actor is a person of that name, one of their tokens, or that very token.
 
     Example:
-        >>> is_of("anna (token deploy)", "anna"), is_of("anna", "anna (token deploy)")
+        >>> is_actor_of("anna (token deploy)", "anna"), is_actor_of("anna", "anna (token deploy)")
         (True, False)
     """
     return name in (actor, person_of(actor))
@@ -49,7 +49,7 @@ def parse_script_name(text: str, *, pointer: str | None = None) -> str:
     """The name under which a script acts.
 
     Example:
-        >>> script_name("nightly import"), script_name("script:nightly")
+        >>> parse_script_name("nightly import"), parse_script_name("script:nightly")
         ('script:nightly import', 'script:nightly')
 
     Raises:

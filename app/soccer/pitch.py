@@ -78,7 +78,7 @@ def find_marking_like(name: str) -> str | None:
     """The marking that a name means, whatever its capitals, spaces, dots and underscores.
 
     Example:
-        >>> marking_like("Big_rect_left_top"), marking_like("Line unknown")
+        >>> find_marking_like("Big_rect_left_top"), find_marking_like("Line unknown")
         ('Big rect. left top', None)
     """
     return _LOOSE.get(_letters_and_digits(name))
@@ -92,7 +92,7 @@ def opposite_marking(marking: str) -> str:
     """The marking that this one becomes when the pitch is turned by 180 degrees.
 
     Example:
-        >>> twin_marking("Big rect. left top")
+        >>> opposite_marking("Big rect. left top")
         'Big rect. right bottom'
     """
     if marking.startswith("Goal") and "post" in marking:

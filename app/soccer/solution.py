@@ -347,7 +347,7 @@ def compute_margin(value: float, threshold: float | None, *, at_most: bool = Fal
         the threshold is 0, or the value is infinite or NaN.
 
     Example:
-        >>> margin_of(15.0, 10.0), margin_of(15.0, 10.0, at_most=True), margin_of(15.0, 0.0)
+        >>> compute_margin(15.0, 10.0), compute_margin(15.0, 10.0, at_most=True), compute_margin(15.0, 0.0)
         (0.5, -0.5, None)
     """
     if not threshold:

@@ -90,7 +90,7 @@ def compute_mean_ball(
 ) -> Ball3D | None:
     """The mean of the valid pairs with its uncertainty; None without a valid pair.
 
-    Where the views contradict each other its sigma is multiplied by ``widening_of`` them.
+    Where the views contradict each other its sigma is multiplied by ``group_sigma_widening``.
 
     Args:
         keys: Of the views.

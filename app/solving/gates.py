@@ -304,7 +304,7 @@ def _percent_of_limit(share: float, limit: float) -> str:
     """A share of a limit as per cent, in as many digits as it takes to tell it from the limit.
 
     Example:
-        >>> _percent(0.14, 1.0), _percent(1.0002, 1.0)
+        >>> _percent_of_limit(0.14, 1.0), _percent_of_limit(1.0002, 1.0)
         ('0.14 %', '1.0002 %')
     """
     value = share * limit
@@ -366,7 +366,7 @@ def describe_consistency(p_value: float) -> str:
         p_value: Of their chi-square test.
 
     Example:
-        >>> consistency_word(0.72), consistency_word(0.01), consistency_word(0.0004)
+        >>> describe_consistency(0.72), describe_consistency(0.01), describe_consistency(0.0004)
         ('normal', 'unlikely', 'contradictory')
     """
     if p_value < LOW_P_VALUE:
@@ -378,7 +378,7 @@ def _format_p_value(p_value: float) -> str:
     """A p-value in two digits.
 
     Example:
-        >>> _probability(0.72), _probability(0.00083), _probability(1e-12)
+        >>> _format_p_value(0.72), _format_p_value(0.00083), _format_p_value(1e-12)
         ('p = 0.72', 'p = 0.00083', 'p < 0.000001')
     """
     if p_value < 1e-6:
@@ -391,7 +391,7 @@ def describe_odds(p_value: float) -> str:
     """How often something happens, for people.
 
     Example:
-        >>> odds_text(0.31), odds_text(0.0004), odds_text(1e-12)
+        >>> describe_odds(0.31), describe_odds(0.0004), describe_odds(1e-12)
         ('31 % of groups', '1 of 2,500 groups', 'fewer than 1 of a million groups')
     """
     if p_value >= 0.01:

@@ -160,7 +160,7 @@ def recompare_thresholds(
     Args:
         known: What another policy makes of them.
         policy: The thresholds.
-        sigma: ``longest_sigma`` of each group, NaN without a ball, shape (G,); None where the
+        sigma: ``major_axis_sigma`` of each group, NaN without a ball, shape (G,); None where the
             policy does not ask.
         p_value: Of each group, infinite where it cannot be tested, shape (G,); None likewise.
     """

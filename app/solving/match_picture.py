@@ -2,7 +2,7 @@
 
 What was done to the pictures of a match (or of one shot) was done to all of them alike. One frame
 seldom tells a stretched picture from another camera; many frames do. All cameras and the three
-numbers are adjusted together (``many_frames``). A frame that contradicts the others fits badly, so
+numbers are adjusted together (see ``pitch_size``). A frame that contradicts the others fits badly, so
 its clicks count as noisy and it says little.
 """
 

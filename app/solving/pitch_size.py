@@ -1,7 +1,7 @@
 """Pitch size: length and width of a match's pitch, estimated from many of its frames, and how frames share numbers.
 
 One frame cannot tell a longer pitch from another camera; many frames of the same pitch can. All
-cameras and the two sizes are adjusted together (``many_frames``).
+cameras and the two sizes are adjusted together.
 
 One frame seldom tells such a number from another camera; many frames do. What a frame says of the
 numbers, whatever its camera, is what is left once its camera is eliminated (Schur complement), and

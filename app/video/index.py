@@ -149,7 +149,7 @@ def find_time_base(times: FloatArray) -> tuple[tuple[int, int], IntArray]:
         Seconds of a tick (numerator, denominator), and ticks, shape (N,).
 
     Example:
-        >>> time_base_of(np.array([0.0, 1001 / 24, 1001 / 12]))
+        >>> find_time_base(np.array([0.0, 1001 / 24, 1001 / 12]))
         ((1001, 24000), array([0, 1, 2]))
     """
     seconds = times / 1000.0

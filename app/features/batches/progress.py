@@ -293,7 +293,7 @@ def sum_working_time(times: Iterable[str]) -> timedelta:
 
     Example:
         >>> day = "2026-11-20T"
-        >>> str(worked([day + "10:00", day + "10:04", day + "12:00", day + "12:06"]))
+        >>> str(sum_working_time([day + "10:00", day + "10:04", day + "12:00", day + "12:06"]))
         '0:10:00'
     """
     found = sorted(datetime.fromisoformat(one) for one in times)

@@ -54,7 +54,7 @@ def extract_mentions(text: str) -> list[str]:
     """The names that a text mentions, each once.
 
     Example:
-        >>> names_in("@anna, look at this; mail bob@club.org or @Carl.")
+        >>> extract_mentions("@anna, look at this; mail bob@club.org or @Carl.")
         ['anna', 'carl']
     """
     return list(dict.fromkeys(name.lower() for name in _MENTION.findall(text)))

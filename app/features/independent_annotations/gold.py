@@ -239,7 +239,7 @@ def wilson_interval(right: int, of: int) -> tuple[float | None, float | None]:
     """Wilson's 95 % interval of a share (E. B. Wilson 1927, J. Am. Stat. Assoc. 22).
 
     Example:
-        >>> [round(end, 3) for end in wilson(9, 10)]
+        >>> [round(end, 3) for end in wilson_interval(9, 10)]
         [0.596, 0.982]
     """
     if of == 0:
@@ -255,8 +255,8 @@ def median_interval(values: Sequence[float | None]) -> MedianInterval:
     holds the true median in 95 of 100 cases, whatever the distribution.
 
     Example:
-        >>> middle_of([3.0, None, 1.0, 2.0])
-        Middle(count=3, median=2.0, low=None, high=None)
+        >>> median_interval([3.0, None, 1.0, 2.0])
+        MedianInterval(count=3, median=2.0, low=None, high=None)
     """
     known = sorted(value for value in values if value is not None)
     count = len(known)

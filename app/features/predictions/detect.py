@@ -139,7 +139,7 @@ def find_ball_category(names: Sequence[str]) -> int | None:
     """The class that is a ball, by the names in a model; None where none or several could be.
 
     Example:
-        >>> ball_category(["person", "bicycle", "sports ball"])
+        >>> find_ball_category(["person", "bicycle", "sports ball"])
         2
     """
     if len(names) == 1:

@@ -253,7 +253,7 @@ def make_prediction_set_name(path: Path) -> str:
     """A file's name as the name of a set: ASCII letters and digits, else ``-``.
 
     Example:
-        >>> prediction_set_name(Path("runs/best model.json"))
+        >>> make_prediction_set_name(Path("runs/best model.json"))
         'best-model'
     """
     return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"

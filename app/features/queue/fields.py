@@ -192,7 +192,7 @@ def query_reveals_hidden_work(query: str) -> bool:
     """Whether a query asks what others made of groups; also within quotes: rather once too often.
 
     Example:
-        >>> [asks_blind(text) for text in ("status:accepted submissions>=2", "sort:value")]
+        >>> [query_reveals_hidden_work(text) for text in ("status:accepted submissions>=2", "sort:value")]
         [True, False]
     """
     return _BLIND.search(query) is not None

@@ -298,7 +298,7 @@ def make_logarithmic_bins(first: int, last: int, per_decade: int) -> tuple[float
         per_decade: Bins from one power of ten to the next.
 
     Example:
-        >>> decades(-1, 1, 2)
+        >>> make_logarithmic_bins(-1, 1, 2)
         (0.0, 0.1, 0.316, 1.0, 3.16, 10.0)
     """
     steps = range(first * per_decade, last * per_decade + 1)

@@ -172,7 +172,7 @@ class SolutionSummary:
 
     Attributes:
         margin: Of the first failing gate, or of the gate nearest to failing: a share of its
-            threshold (``solution.margin_of``), negative when it fails.
+            threshold (``solution.compute_margin``), negative when it fails.
         value: The margin without its sign: how close the group is to passing, or to failing.
             Where it is small, a small mistake decides.
         min_jac: The lowest JaC of the views at 0.5 %.

@@ -252,7 +252,7 @@ def describe_outcome(
     """How many groups pass, how many do not and at which gates, and how many could not be solved.
 
     Example:
-        >>> outcome_sentence(solved=60, passed=52, errors=1, failing={"jac": 8})
+        >>> describe_outcome(solved=60, passed=52, errors=1, failing={"jac": 8})
         '52 pass, 8 do not (first failing gate: jac 8); 1 error'
     """
     ranked = sorted((failing or {}).items(), key=lambda item: -item[1])

@@ -141,7 +141,7 @@ class YieldTable:
 
 
 def make_table(rows: Sequence[Any], facts: Facts) -> YieldTable:
-    """The table of rows as ``groups_from`` returns them, with their facts or none."""
+    """The table of rows of solved groups, in the order of their facts."""
     splits, split = _encode_names([row.split for row in rows])
     matches, match = _encode_names([row.match for row in rows])
     return YieldTable(

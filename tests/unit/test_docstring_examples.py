@@ -1,0 +1,71 @@
+"""Docstrings show and name what is there."""
+
+import ast
+import doctest
+import importlib
+import pkgutil
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import app
+import touchline
+
+ROOT = Path(__file__).parents[2]
+NAME = re.compile(r"``([a-z_]\w*(?:\.[a-z_]\w*)*)(?:\(\))?``")
+OF_OTHERS = {"camera_00012.json", "instances_Train.json"}
+"""Names in docstrings that are not of the code: files of an example."""
+
+
+def test_the_examples_of_docstrings_come_out_as_they_say() -> None:
+    finder, runner = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner(verbose=False)
+    failed: list[str] = []
+    for package in (app, touchline):
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if found.name.endswith("__main__"):
+                continue
+            for example in finder.find(importlib.import_module(found.name), found.name):
+                runner.run(example, out=failed.append)
+    assert not failed, "".join(failed)
+    assert runner.tries > 50
+
+
+def test_names_in_docstrings_are_names_of_the_code() -> None:
+    sources = {
+        path: path.read_text("utf-8") for part in ("app", "touchline") for path in _files(part)
+    }
+    known = {part for path in sources for part in re.split(r"[/.]", str(path))}
+    for path in [*sources, *_files("tests"), *_files("migrations")]:
+        known |= set(_names(ast.parse(path.read_text("utf-8"))))
+    for path in [*(ROOT / "static").glob("*/**/*.js"), ROOT / "pyproject.toml"]:
+        if not {"node_modules", "built"} & set(path.parts):
+            known |= set(re.findall(r"\w+", path.read_text("utf-8")))
+    gone = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path, text in sources.items()
+        for name in NAME.findall(text)
+        if name not in OF_OTHERS and not known.issuperset(name.split("."))
+    ]
+    assert not gone, gone
+
+
+def _files(part: str) -> Iterator[Path]:
+    return (ROOT / part).rglob("*.py")
+
+
+def _names(tree: ast.AST) -> Iterator[str]:
+    """Every name of a module's code, and the words of its short texts."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.Attribute(attr=name):
+                yield name
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                yield name
+            case ast.ClassDef(name=name):
+                yield name
+            case ast.keyword(arg=str(name)):
+                yield name
+            case ast.alias(name=name):
+                yield from name.split(".")
+            case ast.Constant(value=str(text)) if len(text) < 60:
+                yield from re.findall(r"\w+", text)
