@@ -33,9 +33,9 @@ from app.features.solve import commands as solve
 from app.features.tracks import commands as tracks
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.terminal.options import set_current_actor
-from app.terminal.server import work_against_server
+from app.terminal.server import set_current_server
 from app.terminal.terminal import allow_any_text, escape_controls, print_error
 from app.workers import commands as cluster
 
@@ -49,7 +49,7 @@ SHOWN = 200
 """Letters of a name in a complaint that it is too long, or no text."""
 
 
-class _Commands(typer.core.TyperGroup):
+class _EscapingCommandGroup(typer.core.TyperGroup):
     """Commands whose complaints about what was typed do not steer a terminal with it."""
 
     def invoke(self, ctx: Any) -> Any:
@@ -63,7 +63,7 @@ class _Commands(typer.core.TyperGroup):
 
 app = typer.Typer(
     name="touchline",
-    cls=_Commands,
+    cls=_EscapingCommandGroup,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -135,7 +135,7 @@ def options(
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
     set_current_actor(actor)
-    work_against_server(server, token_file, context.invoked_subcommand)
+    set_current_server(server, token_file, context.invoked_subcommand)
     if server is not None and token_file is not None and actor is not None:
         raise typer.BadParameter(
             "the log names the person of the token; leave it out", param_hint="--actor"
@@ -160,7 +160,7 @@ def run() -> None:
     except OSError as error:
         if error.filename is None:
             raise
-        name = quoted(str(error.filename), SHOWN)
+        name = quote_text(str(error.filename), SHOWN)
         if isinstance(error, PermissionError):
             print_error(
                 f"this user has no permission to read {name}",
@@ -173,7 +173,7 @@ def run() -> None:
         # What stands for bytes of the command line that are no UTF-8.
         if "surrogates" not in error.reason:
             raise
-        print_error(f"{quoted(error.object, SHOWN)} contains bytes that are not UTF-8 text")
+        print_error(f"{quote_text(error.object, SHOWN)} contains bytes that are not UTF-8 text")
         sys.exit(1)
     except RuntimeError as error:
         # numba's words when it finds no folder to write to; it has no class of its own for them.

@@ -22,7 +22,7 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from app.durable import read_private
+from app.durable import read_private_file
 from app.errors import InputError
 from app.log import LogFormat
 
@@ -185,9 +185,9 @@ class Settings(BaseSettings):
     """Mail server by which invitations are sent, such as smtp.example.org; empty: no mail is sent, and links
     are shown."""
     smtp_port: int | None = Field(default=None, ge=1, le=65535)
-    """Its port; empty: 587 with ``starttls``, 465 with ``tls``, 25 with ``none``."""
+    """Its port; empty: 587 with ``starttls``, 465 with ``tls``, 25 with ``make_empty_track``."""
     smtp_security: Literal["starttls", "tls", "none"] = "starttls"
-    """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``none``
+    """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``make_empty_track``
     only for a mail server on this machine."""
     smtp_user: str | None = None
     """The account at the mail server, if it requires one."""
@@ -272,7 +272,7 @@ class Settings(BaseSettings):
             raise InputError(
                 "the database is given twice: by TOUCHLINE_DATABASE_URL and by TOUCHLINE_DATABASE_URL_FILE"
             )
-        self.database_url = read_private(self.database_url_file, "TOUCHLINE_DATABASE_URL_FILE")
+        self.database_url = read_private_file(self.database_url_file, "TOUCHLINE_DATABASE_URL_FILE")
         if not self.database_url:
             raise InputError(
                 f"{self.database_url_file}, which TOUCHLINE_DATABASE_URL_FILE names, is empty;"
@@ -303,7 +303,7 @@ class Settings(BaseSettings):
         return Path(self.database.partition("///")[2].partition("?")[0])
 
     @property
-    def solves_in_own_processes(self) -> bool:
+    def uses_solver_processes(self) -> bool:
         """Whether processes of its own solve what people ask: a team's, in one process that answers."""
         return self.team and self.web_workers == 1
 
@@ -334,7 +334,7 @@ class Settings(BaseSettings):
 _PACKAGE = Path(__file__).resolve().parent
 
 
-def find_own_folder(name: str) -> Path:
+def find_packaged_folder(name: str) -> Path:
     """Where ``static`` or ``migrations`` lies: inside the package when it was installed from a
     wheel, beside it in a checkout."""
     installed = _PACKAGE / name

@@ -11,7 +11,7 @@ from pathlib import Path
 from app.errors import InputError
 
 
-def read_private(path: Path, variable: str) -> str:
+def read_private_file(path: Path, variable: str) -> str:
     """The text of a file that nobody but its owner may use, without white space around it.
 
     Args:
@@ -43,7 +43,7 @@ def is_open_to_others(found: os.stat_result) -> bool:
     return bool(stat.S_IMODE(found.st_mode) & 0o077)
 
 
-def keep_private() -> None:
+def set_private_umask() -> None:
     """From now on this process makes no file that others than its owner may read."""
     os.umask(0o077)
 

@@ -39,7 +39,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+def suggest_similar_name(name: str, known: Iterable[str]) -> str | None:
     """A question that offers the known name nearest to one that is unknown; None where none is near.
 
     Example:
@@ -87,7 +87,7 @@ class UnknownMarkingError(InputError):
     """A marking name that is none of the 26 markings of the pitch."""
 
     def __init__(self, marking: str, known: Iterable[str] = ()):
-        meant = did_you_mean(marking, known)
+        meant = suggest_similar_name(marking, known)
         where = "docs/glossary.md lists the 26 names; trailing spaces do not matter."
         super().__init__(
             f'"{marking}" is not a pitch marking', hint=f"{meant} {where}" if meant else where
@@ -158,7 +158,9 @@ class NotFoundError(ReviewError):
 
     def nearest(self, sees: Callable[[int], bool] = lambda _: True) -> str | None:
         """A question whether another one was meant, of those that somebody may see."""
-        return did_you_mean(self.asked, [name for key, name in self.known.items() if sees(key)])
+        return suggest_similar_name(
+            self.asked, [name for key, name in self.known.items() if sees(key)]
+        )
 
 
 class ConflictError(ReviewError):

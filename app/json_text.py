@@ -36,7 +36,7 @@ def canonical_json_text(value: Any) -> str:
     return _ENCODER.encode(value)
 
 
-def digest_of(content: bytes) -> str:
+def digest_content(content: bytes) -> str:
     """Digest of content, 32 hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()[:32]
 
@@ -45,7 +45,7 @@ MAX_ID = 2**63 - 1
 """The largest whole number that a column of ids, and an answer, holds."""
 
 
-class _TimeFormat:
+class _DatetimeSerialization:
     """How a time of a value that is served is told; the value itself keeps the text of the database."""
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> Any:
@@ -59,7 +59,7 @@ class _TimeFormat:
         return {**told, "serialization": written}
 
 
-Moment = Annotated[str, _TimeFormat()]
+Moment = Annotated[str, _DatetimeSerialization()]
 """A time as ``text_of`` writes it; RFC 3339 where it is served."""
 
 
@@ -111,15 +111,15 @@ def json_text(
         # Numbers that are not finite are null to this encoder, which is ten times as fast as Python's.
         data = msgspec.json.encode(value)
     except (TypeError, UnicodeEncodeError):
-        return _json_text_slowly(value, indent, ascii_, compact)
+        return _encode_json_slowly(value, indent, ascii_, compact)
     if ascii_ and not data.isascii():
-        return _json_text_slowly(value, indent, ascii_, compact)
+        return _encode_json_slowly(value, indent, ascii_, compact)
     if not compact:
         data = msgspec.json.format(data, indent=indent or 0)
     return data.decode()
 
 
-def _json_text_slowly(value: Any, indent: int | None, ascii_: bool, compact: bool) -> str:
+def _encode_json_slowly(value: Any, indent: int | None, ascii_: bool, compact: bool) -> str:
     """``json_text`` of what the fast encoder has no place for: other keys and numbers than Python's,
     halves of a surrogate pair; and of letters that are to be escaped."""
     separators = (",", ":") if compact else None
@@ -132,7 +132,7 @@ def _json_text_slowly(value: Any, indent: int | None, ascii_: bool, compact: boo
     )
 
 
-def quoted(text: str, most: int = 40) -> str:
+def quote_text(text: str, most: int = 40) -> str:
     """The beginning of somebody's text in a sentence, in quotes; what cannot be printed is spelt out.
 
     Example:

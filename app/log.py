@@ -32,7 +32,7 @@ def log_to_stderr(form: LogFormat = "text") -> None:
     render = structlog.processors.JSONRenderer(default=str) if form == "json" else order
     structlog.configure(
         processors=[*before, render],
-        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Stderr())),
+        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _CurrentStderr())),
     )
     handler = logging.StreamHandler(sys.stderr)
     if form == "json":
@@ -54,7 +54,7 @@ def replace_non_finite_numbers(
     return {name: replace_non_finite(value) for name, value in event.items()}
 
 
-class _Stderr:
+class _CurrentStderr:
     """The stderr of the moment: what a logger is given once may be closed later."""
 
     def write(self, line: str) -> None:

@@ -19,9 +19,9 @@ from urllib.parse import urlsplit
 import structlog
 
 from app.config import Settings, is_local
-from app.durable import read_private
+from app.durable import read_private_file
 from app.errors import InputError
-from app.json_text import quoted
+from app.json_text import quote_text
 
 log = structlog.get_logger("touchline.mail")
 
@@ -55,7 +55,7 @@ class MailServer:
 
     Attributes:
         host: Its name; certificates are checked against it.
-        security: ``starttls``, ``tls`` or ``none``.
+        security: ``starttls``, ``tls`` or ``make_empty_track``.
         user: The account there, with its password; None: it wants none.
         sender: Address that letters are from.
         own_name: What this machine calls itself (EHLO).
@@ -88,7 +88,7 @@ class MailServer:
                 for letter in letters:
                     if monotonic() > until:
                         raise TimeoutError
-                    problems.append(self._send_one(connection, letter))
+                    problems.append(self._send_letter(connection, letter))
         except (OSError, smtplib.SMTPException) as error:
             # After the last letter it has been taken, whatever becomes of the farewell.
             reason = self._failure_sentence(error)
@@ -131,7 +131,7 @@ class MailServer:
                 connection.login(self.user, self.password)
             yield connection
 
-    def _send_one(self, connection: smtplib.SMTP, letter: MailMessage) -> str | None:
+    def _send_letter(self, connection: smtplib.SMTP, letter: MailMessage) -> str | None:
         message = EmailMessage(policy=_POLICY)
         message["From"], message["To"] = self.sender, letter.to
         message["Subject"] = letter.subject
@@ -181,7 +181,7 @@ def read_mail_server(settings: Settings) -> MailServer | None:
         return None
     if settings.smtp_security == "none" and not is_local(host):
         raise InputError(
-            f"TOUCHLINE_SMTP_SECURITY=none would send mail to {quoted(host)} unencrypted",
+            f"TOUCHLINE_SMTP_SECURITY=none would send mail to {quote_text(host)} unencrypted",
             hint="Use starttls or tls; none is for a mail server on this machine.",
         )
     if settings.smtp_from is None:
@@ -193,7 +193,7 @@ def read_mail_server(settings: Settings) -> MailServer | None:
         sender = parse_mail_address(settings.smtp_from)
     except InputError as error:
         raise InputError(f"TOUCHLINE_SMTP_FROM: {error.message}", hint=error.hint) from None
-    password = _password(settings)
+    password = _read_password(settings)
     if bool(settings.smtp_user) != bool(password):
         raise InputError("TOUCHLINE_SMTP_USER and its password must be set together", hint=_HINT)
     if not f"{settings.smtp_user or ''}{password}".isascii():
@@ -218,14 +218,14 @@ def parse_mail_address(text: str, *, pointer: str | None = None) -> str:
     address = text.strip()
     if len(address) > LONGEST_ADDRESS or not _ADDRESS.fullmatch(address):
         raise InputError(
-            f"{quoted(text)} is not an email address",
+            f"{quote_text(text)} is not an email address",
             hint="Write it as anna@example.org, in plain letters, without a name or brackets.",
             pointer=pointer,
         )
     return address
 
 
-def _password(settings: Settings) -> str:
+def _read_password(settings: Settings) -> str:
     given = settings.smtp_password
     if settings.smtp_password_file is None:
         return given.get_secret_value() if given else ""
@@ -234,7 +234,7 @@ def _password(settings: Settings) -> str:
             "the password of the mail server is given twice: by TOUCHLINE_SMTP_PASSWORD and by "
             "TOUCHLINE_SMTP_PASSWORD_FILE"
         )
-    return read_private(settings.smtp_password_file, "TOUCHLINE_SMTP_PASSWORD_FILE")
+    return read_private_file(settings.smtp_password_file, "TOUCHLINE_SMTP_PASSWORD_FILE")
 
 
 def _refusal_sentence(code: int, text: bytes | str) -> str:

@@ -54,24 +54,24 @@ from app.features.what_if import routes as what_if
 from app.formats.manifest import read_software_version
 from app.http import event_routes as http_event
 from app.http import openapi
-from app.http.access import Access
+from app.http.access import AccessControl
 from app.http.deps import Services
 from app.http.errors import install_error_handlers
 from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
-from app.http.idempotency import Idempotency
-from app.http.metrics import SharedNumbers, install_metrics
-from app.http.openapi import describe_errors_in_openapi
+from app.http.idempotency import IdempotencyHandler
+from app.http.metrics import SharedProcessMetrics, install_metrics
+from app.http.openapi import install_openapi_document
 from app.http.pages import STATIC, BrowserSite, install_pages
 from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
 from app.http.requests import (
     MAX_JSON_BYTES,
+    AmbiguousLengthGuard,
     HeadAsGet,
-    OneLength,
-    OneRange,
+    SingleRangeFilter,
     refuse_unknown_parameters,
 )
-from app.http.route import Gate, Route, require_permissions, respond_to_unknown_route
+from app.http.route import RequestPipeline, Route, require_permissions, respond_to_unknown_route
 from app.http.team import TeamLogin, list_allowed_hosts
 
 PREFIX = "/api/v1"
@@ -166,9 +166,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     )
     app.state.services = services
     team = app.state.team = TeamLogin.of(settings, services.store)
-    app.state.gate = Gate(
-        None if team is None else Access(team, services.store),
-        Idempotency(),
+    app.state.gate = RequestPipeline(
+        None if team is None else AccessControl(team, services.store),
+        IdempotencyHandler(),
         RequestLimits(team=team is not None),
         min(MAX_JSON_BYTES, settings.max_upload_bytes),
     )
@@ -184,7 +184,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
             prefix=PREFIX,
             dependencies=[Depends(refuse_unknown_parameters)],
         )
-    describe_errors_in_openapi(app)
+    install_openapi_document(app)
     require_permissions(app)
     _add_middleware(app, settings, site)
     return app
@@ -192,9 +192,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
 
 def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None:
     """The first one added is the innermost."""
-    app.add_middleware(OneRange)
+    app.add_middleware(SingleRangeFilter)
     app.add_middleware(HeadAsGet)
-    app.add_middleware(OneLength)
+    app.add_middleware(AmbiguousLengthGuard)
     app.add_middleware(SameOrigin, url=settings.url, required=settings.team)
     app.add_middleware(KnownHosts, allowed=list_allowed_hosts(settings))
     install_metrics(app, app.state.gate.limits)
@@ -206,8 +206,8 @@ def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     current_default_thread_limiter().total_tokens = THREADS
     app.state.services.start()
-    shared: SharedNumbers | None = getattr(app.state, "shared_metrics", None)
-    keeping = None if shared is None else asyncio.create_task(shared.keep_fresh())
+    shared: SharedProcessMetrics | None = getattr(app.state, "shared_metrics", None)
+    keeping = None if shared is None else asyncio.create_task(shared.refresh_forever())
     yield
     if keeping is not None:
         keeping.cancel()

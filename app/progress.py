@@ -36,13 +36,13 @@ def make_partial_progress(
         total: How much there is to do in the whole work; None: as the part says.
     """
 
-    def tell(done: int, of: int | None = None, _sentence: str = "") -> None:
+    def report_part(done: int, of: int | None = None, _sentence: str = "") -> None:
         progress(start + done, of if total is None else total, sentence)
 
-    return tell
+    return report_part
 
 
-def told(
+def report_each_item(
     items: Iterable[Item], total: int, progress: ReportProgress | None, sentence: str
 ) -> Iterator[Item]:
     """The same items, each of which is told as it comes.

@@ -56,19 +56,19 @@ def serve(
     settings = read_settings(
         host=host, port=port, team=team, url=url, cluster=cluster, web_workers=workers
     )
-    _require_safe(settings)
-    from app.db.dialects.dialect import dialect_of, require_processes
+    _require_safe_settings(settings)
+    from app.db.dialects.dialect import get_dialect, require_multiprocess_support
     from app.db.locks import hold_server_lock
     from app.features.maintenance.upkeep import read_database_file_sizes
     from app.features.people.service import require_no_people
-    from app.http.server import open_listening_socket, run, serve_with
+    from app.http.server import open_listening_socket, serve_application, serve_with_processes
     from app.log import log_to_stderr
     from app.main import create_app
     from app.workers.executors import make_server_pool_opener
 
-    require_processes(settings, settings.web_workers)
+    require_multiprocess_support(settings, settings.web_workers)
     log_to_stderr(settings.log_format)
-    with hold_server_lock(settings, shared=not dialect_of(settings).is_file):
+    with hold_server_lock(settings, shared=not get_dialect(settings).is_file):
         _prepare_home(settings)
         if not settings.team and team is None:
             with open_store(settings) as store:
@@ -78,18 +78,18 @@ def serve(
         with open_listening_socket(settings.host, settings.port) as (socket, address):
             if settings.web_workers > 1:
                 _print_address(settings, address)
-                serve_with(settings.web_workers, _serve_part, settings, socket)
+                serve_with_processes(settings.web_workers, _serve_process, settings, socket)
                 return
             application = create_app(settings, pool=make_server_pool_opener(settings))
             if read_database_file_sizes(settings).get("database", 0) <= QUICK_BYTES:
-                application.state.services.store.require_whole()
+                application.state.services.store.require_intact_database()
             say(f"Touchline is at {address}")
             if settings.team:
                 _print_first_link(application.state.services.store, settings.url or address)
-            run(application, socket)
+            serve_application(application, socket)
 
 
-def _require_safe(settings: Settings) -> None:
+def _require_safe_settings(settings: Settings) -> None:
     """Refuse to serve where strangers could come in, or passwords would be read on their way."""
     from app.features.maintenance.service import find_exposure_warning
     from app.features.people.sign_on_rules import read_rules
@@ -115,15 +115,15 @@ def _make_sample(settings: Settings) -> None:
         )
 
 
-def _serve_part(settings: Settings, socket: socket) -> None:
+def _serve_process(settings: Settings, socket: socket) -> None:
     """Serve in one process of several."""
-    from app.http.server import run
+    from app.http.server import serve_application
     from app.log import log_to_stderr
     from app.main import create_app
     from app.workers.executors import make_server_pool_opener
 
     log_to_stderr(settings.log_format)
-    run(create_app(settings, pool=make_server_pool_opener(settings)), socket)
+    serve_application(create_app(settings, pool=make_server_pool_opener(settings)), socket)
 
 
 def _print_address(settings: Settings, address: str) -> None:
@@ -162,11 +162,11 @@ def _prepare_home(settings: Settings) -> None:
     """Make the home private and its database the present one; the log says what was changed."""
     import structlog
 
-    from app.db.home import make_private
+    from app.db.home import make_home_private
     from app.db.migrate import migrate_database as run_migrations
 
     log = structlog.get_logger("touchline")
-    mended = make_private(settings)
+    mended = make_home_private(settings)
     if mended:
         log.warning("others could read the home; now its owner alone can", files=mended)
     migrated = run_migrations(settings)

@@ -17,7 +17,7 @@ def plural(count: int, one: str, several: str | None = None) -> str:
     return f"{count:,} {one if count == 1 else several or f'{one}s'}"
 
 
-def counted(count: int, name: str) -> str:
+def format_named_count(count: int, name: str) -> str:
     """A count under the name that a report has for several.
 
     Example:

@@ -28,7 +28,7 @@ WARM_WAITING = 100
 Explain = Callable[[WorkerEnded], Exception]
 
 
-def begin_all() -> None:
+def accept_all_tasks() -> None:
     """Begin every task."""
 
 
@@ -40,7 +40,7 @@ class PoolTask:
         begin: Called before the task is given to a worker; what it raises is the result instead.
     """
 
-    def __init__(self, explain: Explain, begin: Callable[[], None] = begin_all) -> None:
+    def __init__(self, explain: Explain, begin: Callable[[], None] = accept_all_tasks) -> None:
         self.future: Future[Any] = Future()
         self._explain, self._begin = explain, begin
         self._abandoned = threading.Event()
@@ -81,14 +81,14 @@ class PoolTask:
         counts.add_waiting(-1)
         began = monotonic()
 
-        def stop() -> None:
+        def stop_if_abandoned() -> None:
             if self._abandoned.is_set() and monotonic() - began > ABANDONED_SECONDS:
                 raise CancelledError
 
         try:
             self._begin()
-            with counts.working():
-                result = worker.run(work, *arguments, stop=stop)
+            with counts.track_task():
+                result = worker.run(work, *arguments, stop=stop_if_abandoned)
         except WorkerEnded as error:
             self.future.set_exception(self._explain(error))
         except BaseException as error:
@@ -136,7 +136,7 @@ class WorkerPool:
         return len(self._tasks)
 
     @property
-    def is_whole(self) -> bool:
+    def has_all_processes(self) -> bool:
         """Whether each worker has its process."""
         return all(worker.is_alive for worker in self._workers)
 
@@ -145,7 +145,7 @@ class WorkerPool:
         work: Callable[..., Any],
         *arguments: Any,
         explain: Explain | None = None,
-        begin: Callable[[], None] = begin_all,
+        begin: Callable[[], None] = accept_all_tasks,
         bounded: bool = True,
     ) -> PoolTask:
         """Have a function of a module called in a worker.
@@ -236,7 +236,7 @@ class ReadyWorker(WorkerPool):
 
     def begin(self) -> bool:
         """Whether it is ready; the first call, and the first after a crash, start a process."""
-        if self.is_ready and not self.is_whole:
+        if self.is_ready and not self.has_all_processes:
             self.is_ready = self._begun = False
         if not self._begun:
             self._begun = True

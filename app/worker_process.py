@@ -116,7 +116,7 @@ class WorkerCounts:
             self.waiting += more
 
     @contextmanager
-    def working(self) -> Iterator[None]:
+    def track_task(self) -> Iterator[None]:
         """Count the block as a task at work, and its worker where that ends before the task."""
         with self._lock:
             self.busy += 1
@@ -173,7 +173,7 @@ class WorkerProcess:
                 pipe.send(on_message(value))
                 kind, value = self._receive(pipe, self.limits.silence, stop)
         except (EOFError, ConnectionError):
-            raise WorkerEnded(self._cause_of_death(), self.limits) from None
+            raise WorkerEnded(self._find_end_reason(), self.limits) from None
         except BaseException:
             self.close()
             raise
@@ -235,7 +235,7 @@ class WorkerProcess:
         kind, value = pipe.recv()
         return kind, value
 
-    def _cause_of_death(self) -> EndReason:
+    def _find_end_reason(self) -> EndReason:
         process = self._process
         code = None
         if process is not None:
@@ -287,7 +287,7 @@ def _serve_tasks(pipe: Connection, limits: WorkerLimits) -> None:
         # Where memory runs out all the same, the kernel takes this process first.
         Path("/proc/self/oom_score_adj").write_text("1000")
 
-    def send(message: Any) -> Any:
+    def send_message(message: Any) -> Any:
         pipe.send(("message", message))
         return pipe.recv()
 
@@ -299,7 +299,7 @@ def _serve_tasks(pipe: Connection, limits: WorkerLimits) -> None:
             _set_resource_limit(
                 resource.RLIMIT_CPU, usage.ru_utime + usage.ru_stime + limits.processor
             )
-            pipe.send(_outcome_of_work(work, (*arguments, send) if sends else arguments))
+            pipe.send(_run_work(work, (*arguments, send_message) if sends else arguments))
 
 
 def _set_resource_limit(kind: int, amount: float) -> None:
@@ -310,7 +310,7 @@ def _set_resource_limit(kind: int, amount: float) -> None:
     resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
-def _outcome_of_work(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def _run_work(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
     try:
         return "result", work(*arguments)
     except (ReviewError, JobCancelled) as error:

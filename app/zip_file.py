@@ -55,7 +55,7 @@ def open_zip(path: Path | StoredPath) -> zipfile.ZipFile:
     """
     if isinstance(path, Path) and not stat.S_ISREG(path.stat().st_mode):
         raise zipfile.BadZipFile("is not a regular file")
-    return _open_zip_part(_whole_file(path))
+    return _open_zip_of_part(_open_whole_file(path))
 
 
 def open_nested(
@@ -77,13 +77,13 @@ def open_nested(
     if member.flag_bits & _ENCRYPTED:
         raise zipfile.BadZipFile("is encrypted")
     if member.compress_type == zipfile.ZIP_STORED:
-        file, at = _whole_file(path), member.header_offset
+        file, at = _open_whole_file(path), member.header_offset
         file.seek(at)
         header = file.read(_HEADER.size)
         if len(header) < _HEADER.size or not header.startswith(_HEADER_MARK):
             raise zipfile.BadZipFile("has no header where the zip file's list of members says")
         start = at + _HEADER.size + sum(_HEADER.unpack(header))
-        return _open_zip_part(file.part(start, member.file_size))
+        return _open_zip_of_part(file.part(start, member.file_size))
     if not isinstance(path, Path):
         # To reach a member of it, all of it would have to be fetched.
         raise zipfile.BadZipFile("is a zip compressed inside another; put it there by itself")
@@ -96,7 +96,7 @@ def open_nested(
                     raise zipfile.BadZipFile(f"unpacks to more than {MAX_UNPACKED:,} bytes")
                 unpacked.write(chunk)
         unpacked.flush()
-        return _open_zip_part(_part_of_handle(os.dup(unpacked.fileno()), total))
+        return _open_zip_of_part(_make_part_of_handle(os.dup(unpacked.fileno()), total))
 
 
 def split_nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
@@ -112,13 +112,13 @@ def split_nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | 
     return None
 
 
-def count_truncated(archive: zipfile.ZipFile) -> int:
+def count_unlisted_members(archive: zipfile.ZipFile) -> int:
     """How many members more the end of a zip counts than its list has; below 0: fewer.
 
     ``zipfile`` believes the list alone: a damaged byte there, such as a length, makes it read over
     members without an error. Old programs count to 65,535 and begin again; 0 where there is no end.
     """
-    end = None if archive.fp is None else _end_record(archive.fp)
+    end = None if archive.fp is None else _read_end_record(archive.fp)
     if end is None:
         return 0
     listed = len(archive.infolist())
@@ -136,13 +136,13 @@ def list_first_member_names(path: Path, most: int) -> list[str]:
         OSError: It cannot be read.
     """
     with path.open("rb") as file:
-        end = _end_record(file)
+        end = _read_end_record(file)
         if end is None or end.list_bytes > end.at:
             return []
         file.seek(end.at - end.list_bytes)
         records = file.read(min(end.list_bytes, MAX_LIST))
     names: list[str] = []
-    for _at, _flags, name in _member_records(records):
+    for _at, _flags, name in _parse_member_records(records):
         if len(names) == most:
             break
         names.append(name.decode("utf-8", errors="replace").replace("\\", "/"))
@@ -159,7 +159,7 @@ class _EndRecord(NamedTuple):
     is_wide: bool
 
 
-def _end_record(file: IO[bytes]) -> _EndRecord | None:
+def _read_end_record(file: IO[bytes]) -> _EndRecord | None:
     most = _END_64.size + _LOCATOR_BYTES + _END.size + _MAX_COMMENT
     begin = max(file.seek(0, os.SEEK_END) - most, 0)
     file.seek(begin)
@@ -177,7 +177,7 @@ def _end_record(file: IO[bytes]) -> _EndRecord | None:
     return _EndRecord(begin + wide, size, members, True)
 
 
-def _member_records(records: bytes) -> Iterator[tuple[int, int, bytes]]:
+def _parse_member_records(records: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Place, flags and name of each member in a list of members, as far as it is one."""
     at = 0
     while records.startswith(_ENTRY_MARK, at) and at + _ENTRY.size <= len(records):
@@ -243,7 +243,7 @@ class FilePart(io.RawIOBase):
         left = max(self._size - self._at, 0)
         data = self._pread(left if size < 0 else min(size, left), self._start + self._at)
         if self.lenient and data.startswith(_ENTRY_MARK):
-            data = _without_false_marks(data)
+            data = _clear_false_utf8_marks(data)
         self._at += len(data)
         return data
 
@@ -260,18 +260,18 @@ class FilePart(io.RawIOBase):
         super().close()
 
 
-def _whole_file(path: Path | StoredPath) -> FilePart:
+def _open_whole_file(path: Path | StoredPath) -> FilePart:
     if isinstance(path, StoredPath):
         return FilePart(path.reads().pread, 0, path.size)
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    return _part_of_handle(handle, os.fstat(handle).st_size)
+    return _make_part_of_handle(handle, os.fstat(handle).st_size)
 
 
-def _part_of_handle(handle: int, size: int) -> FilePart:
+def _make_part_of_handle(handle: int, size: int) -> FilePart:
     return FilePart(partial(os.pread, handle), 0, size, partial(os.close, handle))
 
 
-def _open_zip_part(file: FilePart) -> zipfile.ZipFile:
+def _open_zip_of_part(file: FilePart) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)
     except UnicodeDecodeError:
@@ -281,13 +281,13 @@ def _open_zip_part(file: FilePart) -> zipfile.ZipFile:
         return archive
 
 
-def _without_false_marks(records: bytes) -> bytes:
+def _clear_false_utf8_marks(records: bytes) -> bytes:
     """The list of a zip's members, another mark in the place of that for UTF-8 at names that are not.
 
     Their own headers keep the false mark, so that ``zipfile`` could not open them anyway.
     """
     changed = bytearray(records)
-    for at, flags, name in _member_records(records):
+    for at, flags, name in _parse_member_records(records):
         try:
             name.decode("utf-8")
         except UnicodeDecodeError:

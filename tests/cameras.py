@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.cameras import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.view_files import write_file_below
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
@@ -92,6 +92,6 @@ def _level(place: FloatArray, target: FloatArray) -> FloatArray:
 def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
     """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written."""
     return [
-        write_file_below(root, camera_file_name(key), camera_file_text(camera))
+        write_file_below(root, camera_file_name(key), format_camera_file(camera))
         for key, camera in cameras.items()
     ]

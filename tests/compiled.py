@@ -14,7 +14,7 @@ from app.paint.view_proposal import propose_lines_in_image
 from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
-from app.solving.solve import solve, warm_up_solver
+from app.solving.solve import solve_group, warm_up_solver
 from app.tracking.ball_solve import track_ball
 from tests.bench.ball_track import frame_times, main
 from tests.bench.link import made_ball
@@ -34,7 +34,7 @@ def compile_all() -> None:
     assert propose_lines_in_image(image, view.size, (), pitch, policy).lines
     solving.join()
     assert solving.exitcode == 0
-    first = solve(scene.group, PAPER).views[0].calibration
+    first = solve_group(scene.group, PAPER).views[0].calibration
     assert read_paint_of_image(image, view.size, first, pitch, policy).outcome == "snapped"
 
 
@@ -50,7 +50,7 @@ def compile_tests() -> None:
 
 def _solve(scene: Scene) -> None:
     warm_up_solver()
-    assert solve(scene.group, PAPER).views[0].calibration
+    assert solve_group(scene.group, PAPER).views[0].calibration
     ball = made_ball(2.0)
     times = frame_times(ball)
     assert not track_ball(

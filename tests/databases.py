@@ -15,7 +15,7 @@ import pytest
 from sqlalchemy import Connection, event, inspect, select
 
 from app.config import Settings
-from app.db.dialects.dialect import WRITE, dialect_in, dialect_of, make_engine
+from app.db.dialects.dialect import WRITE, get_dialect, get_session_dialect, make_engine
 from app.db.idempotency import StoredResponseModel
 from app.db.session import Session
 from app.db.store import Store
@@ -209,7 +209,7 @@ def all_that_is_kept(home: Path, *, but: Path | None = None) -> bytes:
     files = [path for path in home.iterdir() if path.is_file() and path != but]
     kept = [subprocess.run(["cat", *files], check=True, capture_output=True).stdout]
     settings = Settings(home=home)
-    if not dialect_of(settings).is_file:
+    if not get_dialect(settings).is_file:
         engine = make_engine(settings)
         with engine.connect() as connection:
             for name in inspect(connection).get_table_names():
@@ -238,13 +238,13 @@ def said_for_sqlite(session: Session) -> Iterator[None]:
 
     A trigger that is dropped is off until the database is emptied.
     """
-    dialect = dialect_in(session)
+    dialect = get_session_dialect(session)
     if dialect.is_file:
         yield
         return
     event.listen(session, "before_cursor_execute", _translated, retval=True)
     try:
-        with dialect.migrating(session, new=False):
+        with dialect.migration_context(session, new=False):
             yield
     finally:
         event.remove(session, "before_cursor_execute", _translated)

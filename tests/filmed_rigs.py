@@ -12,7 +12,7 @@ import numpy as np
 
 from app.geometry.camera import Camera
 from app.soccer.group import Group, Media
-from app.tracking.ball_follow import expected_diameter
+from app.tracking.ball_follow import expected_ball_diameter
 from app.video.frames import Image
 from tests.drawn_balls import drawn, grass
 from tests.flights import FIRST, flight_groups
@@ -33,7 +33,7 @@ def pictured(
     found = np.clip(picture, 0, 255).astype(np.uint8)
     if center is not None:
         x, y = center
-        size = expected_diameter(camera, x, y) or 8.0
+        size = expected_ball_diameter(camera, x, y) or 8.0
         reach = int(2 * size) + 4
         left, top = max(int(x) - reach, 0), max(int(y) - reach, 0)
         part = found[top : int(y) + reach, left : int(x) + reach]

@@ -28,7 +28,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.tracking.ball_track import BallMeasurements, BallTrack
 from tests.cameras import SIZE
 from tests.rigs import TRUTH
@@ -95,7 +95,9 @@ def add_flight(store: Store, name: str = "flight", count: int = 40) -> int:
 
 def write_flight_export(out: Path) -> BallTrack:
     """A Parquet export of a frozen version of the flight, with its track, as the review floor writes it."""
-    records = [ExportRecord(item, solve(item, PAPER), "accepted") for item in flight_groups(60)]
+    records = [
+        ExportRecord(item, solve_group(item, PAPER), "accepted") for item in flight_groups(60)
+    ]
     (stretch,) = gather_stretches(records, PAPER)
     track = make_track(TrackInputs.of(stretch))
     kept = [TrackRecord(stretch.key, track, stretch.pitch, stretch.rate, verdict="accepted")]

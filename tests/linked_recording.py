@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from app.db.store import Store
-from app.features.recordings.ball_run_values import run_columns
-from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.ball_run_values import run_to_columns
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.links import add_link, set_instants
-from app.features.recordings.queries import insert_run, update_run
+from app.features.recordings.queries import insert_ball_run, update_ball_run
 from app.features.recordings.service import get_recording
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 from tests.bench.link import Filmed, at_times, film, made_ball
@@ -88,14 +88,14 @@ class LinkedRecording:
                 for at, camera in enumerate(view.cameras)
             ]
             stretch = (first, first + len(frames) - 1)
-            save_cameras(store, recording, stretch, Tracked(frames, ()), [], "ann")
-            values = run_columns(run_of(first, view)) | {"sha256": recording.sha256}
+            save_cameras(store, recording, stretch, TrackedStretch(frames, ()), [], "ann")
+            values = run_to_columns(run_of(first, view)) | {"sha256": recording.sha256}
             values |= {"dataset_id": recording.dataset_id, "recording_id": self.id}
             with store.write() as session:
-                self.runs.append(insert_run(session, "ann", **values))
+                self.runs.append(insert_ball_run(session, "ann", **values))
 
     def accept(self, which: int, is_accepted: bool = True) -> None:
         """Accept a run without giving groups its balls, or take that back."""
         with self._store.write() as session:
             by = "ann" if is_accepted else None
-            update_run(session, self.runs[which], accepted_by=by, revision=1 + is_accepted)
+            update_ball_run(session, self.runs[which], accepted_by=by, revision=1 + is_accepted)

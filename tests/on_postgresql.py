@@ -103,17 +103,17 @@ def install(cluster: Cluster) -> None:
     _say_url(homes)
     _pass_on(homes)
     shutil.copytree = _copying(homes, shutil.copytree)
-    from app.db.dialects.postgresql import PostgreSQL
+    from app.db.dialects.postgresql import PostgreSQLDialect
 
-    make = PostgreSQL.make_engine
+    make = PostgreSQLDialect.make_engine
 
     @wraps(make)
-    def make_engine(self: PostgreSQL, settings: Settings, **options: Any) -> Any:
+    def make_engine(self: PostgreSQLDialect, settings: Settings, **options: Any) -> Any:
         if settings.database_url == homes.url(settings.home):
             homes.ensure(settings.home)
         return make(self, settings, **options)
 
-    PostgreSQL.make_engine = make_engine  # type: ignore[method-assign]
+    PostgreSQLDialect.make_engine = make_engine  # type: ignore[method-assign]
 
 
 def _say_url(homes: Homes) -> None:

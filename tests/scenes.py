@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.sample.fixture import group_counts
+from app.sample.fixture import group_counts_by_match
 from app.sample.scene import Scene
 from app.sample.scenes import make_match
 
@@ -11,6 +11,6 @@ def make_scenes(groups: int, seed: int, faults: bool = True) -> list[Scene]:
     """The scenes that ``write_sample`` draws for the same numbers."""
     return [
         scene
-        for match, count in enumerate(group_counts(groups))
+        for match, count in enumerate(group_counts_by_match(groups))
         for scene in make_match(match, count, seed, faults)
     ]

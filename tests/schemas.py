@@ -15,7 +15,7 @@ from sqlalchemy import Engine
 from app.db import migrate
 from app.db.dialects.dialect import Dialect
 
-make_schema = migrate.make_schema
+make_schema = migrate.apply_missing_migrations
 """What the product does: run every migration."""
 
 
@@ -40,7 +40,7 @@ def copied_schemas() -> Iterator[None]:
                 _install(file)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(migrate, "make_schema", copy)
+            patch.setattr(migrate, "apply_missing_migrations", copy)
             yield
 
 

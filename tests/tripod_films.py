@@ -44,7 +44,7 @@ class Film:
         height, width = self.images[number].shape[:2]
         grid = np.stack(np.meshgrid(np.linspace(0, width, 9), np.linspace(0, height, 7)), -1)
         pixels = grid.reshape(-1, 2)
-        ground = truth.on_ground(pixels)
+        ground = truth.project_to_ground(pixels)
         inside = np.isfinite(ground).all(axis=1) & (np.abs(ground) < (52.5, 34)).all(axis=1)
         places = np.column_stack([ground[inside], np.zeros(inside.sum())])
         return float(np.hypot(*(camera.project(places) - pixels[inside]).T).max())

@@ -23,12 +23,17 @@ import pysqlite3.dbapi2
 from sqlalchemy import inspect, text
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_in, dialect_of, make_engine, report_storage_errors
-from app.db.home import is_half_written, refused_file_error
-from app.db.locks import DatabaseInUse
+from app.db.dialects.dialect import (
+    get_dialect,
+    get_session_dialect,
+    make_engine,
+    report_storage_errors,
+)
+from app.db.home import is_half_written, make_file_access_error
+from app.db.locks import DatabaseLock
 from app.db.log import verify_chain
 from app.db.recovery.anchor import DatabaseAnchor, read_anchor_of_database, require_own_database
-from app.db.recovery.preopen_check import list_signs_of_use, require_sound
+from app.db.recovery.preopen_check import list_signs_of_use, require_consistent_home_files
 from app.db.session import Session, now
 from app.durable import PARTIAL, sync_to_disk
 from app.errors import EXAMINE, DamagedError, InputError, StorageError
@@ -75,31 +80,31 @@ class BackupManifest:
     version: int = FORMAT_VERSION
 
 
-def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> BackupManifest:
+def back_up_home(settings: Settings, out: Path, folders: Sequence[str] = ()) -> BackupManifest:
     """``write_backup`` of a home whose files belong together, beside whoever works in it.
 
     Raises:
         InputError: The home has no database, or it is a server's.
     """
-    require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
+    require_file_database(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
     if not settings.database_file.exists() and not list_signs_of_use(settings):
         raise InputError(
             f"there is no database in {settings.home}",
             hint="Set TOUCHLINE_HOME to the home folder of an installation.",
         )
-    lock = DatabaseInUse(settings)
+    lock = DatabaseLock(settings)
     try:
         if lock.alone:
-            require_sound(settings)
+            require_consistent_home_files(settings)
         lock.share()
         return write_backup(settings, out, folders)
     finally:
         lock.release()
 
 
-def require_file(settings: Settings, done: str, command: str) -> None:
+def require_file_database(settings: Settings, done: str, command: str) -> None:
     """Raise InputError where the database is a server's, whose own programs copy it."""
-    if not dialect_of(settings).is_file:
+    if not get_dialect(settings).is_file:
         raise InputError(
             f"{settings.database_name} is a PostgreSQL database, which is {done} with the"
             " programs of PostgreSQL",
@@ -126,19 +131,19 @@ def write_backup(
         DamagedError: The database is damaged; nothing is written.
         StorageError: The disk is full, or somebody writes the same backup.
     """
-    _require_free_place(out, replace)
+    _require_writable_destination(out, replace)
     try:
         with _temporary_folder(out) as folder:
             copy, partial = folder / DATABASE, folder / "backup.zip"
             _copy_database(settings, copy)
             manifest = _write_zip(settings, copy, partial, folders)
             verify_backup(partial)
-            _require_free_place(out, replace)
+            _require_writable_destination(out, replace)
             partial.replace(out)
             sync_to_disk(out.parent)
     except OSError as error:
         hint = f"Make {out.parent} writable for this user, or name another folder."
-        raise refused_file_error(Path(error.filename or out), error, hint) from error
+        raise make_file_access_error(Path(error.filename or out), error, hint) from error
     return manifest
 
 
@@ -212,10 +217,10 @@ def examine_database(
     engine = make_engine(own)
     try:
         with report_storage_errors(own), Session(engine) as session:
-            dialect, tables = dialect_in(session), set(inspect(session).get_table_names())
+            dialect, tables = get_session_dialect(session), set(inspect(session).get_table_names())
             if "alembic_version" not in tables or "log" not in tables:
                 raise DamagedError(f"{known_as} is not a Touchline database", hint=EXAMINE)
-            if faults := dialect.file_faults(session, 3, thorough=True):
+            if faults := dialect.find_file_faults(session, 3, thorough=True):
                 raise DamagedError(f"{known_as} is damaged: {'; '.join(faults)}", hint=EXAMINE)
             if dialect.count_lost_references(session):
                 problem = f"{known_as} has rows that refer to rows that are gone"
@@ -226,18 +231,20 @@ def examine_database(
                 for name in _COUNTED
                 if name in tables
             }
-            return read_anchor_of_database(session) or _anchor_without_installation(session), counts
+            return read_anchor_of_database(session) or _read_anchor_without_installation(
+                session
+            ), counts
     finally:
         engine.dispose()
 
 
-def _anchor_without_installation(session: Session) -> DatabaseAnchor:
+def _read_anchor_without_installation(session: Session) -> DatabaseAnchor:
     schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
     last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
     return DatabaseAnchor("", "", schema, *(tuple(last) if last else (0, "")))
 
 
-def _require_free_place(out: Path, replace: bool) -> None:
+def _require_writable_destination(out: Path, replace: bool) -> None:
     if out.exists() and not replace:
         raise InputError(f"{out} already exists", hint="Name a file that does not exist yet.")
     if not out.parent.is_dir():
@@ -300,7 +307,7 @@ def _write_zip(
     with os.fdopen(handle, "w+b") as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as backup:
             files[DATABASE] = _add_file(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
-            for path in _files_of_folders(settings.home, folders):
+            for path in _iterate_files_of_folders(settings.home, folders):
                 name = path.relative_to(settings.home).as_posix()
                 # Uploads expire, and exports are deleted, meanwhile.
                 with suppress(FileNotFoundError):
@@ -328,7 +335,7 @@ def _count_frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
     return sum(not any(path.is_relative_to(folder) for folder in folders) for path in paths)
 
 
-def _files_of_folders(home: Path, folders: Sequence[str]) -> Iterator[Path]:
+def _iterate_files_of_folders(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order; half-written ones are nobody's yet."""
     for name in folders:
         walk = os.walk(home / name)

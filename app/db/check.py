@@ -27,7 +27,7 @@ class CheckResult:
     mend: str | None = None
 
 
-def compare_records(
+def summarize_faulty_records(
     name: str, whole: str, apart: Sequence[str], wrong: str, mend: str
 ) -> CheckResult:
     """What came of looking at many records.
@@ -45,20 +45,24 @@ def compare_records(
     return CheckResult(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
 
 
-def record_name(key: object) -> str:
+def format_record_key(key: object) -> str:
     """What a record is called: its key, or the parts of it."""
     if isinstance(key, tuple):
         return " ".join(str(part) for part in key if part is not None)
     return str(key)
 
 
-def _equal_but_null_characters(logged: Any, present: Any) -> bool:
+def _equal_except_null_characters(logged: Any, present: Any) -> bool:
     """Whether two values are the same, but for U+0000, which is read from the log as U+FFFD."""
     return bool(logged == present) or repr(logged) == repr(present).replace(r"\x00", "\ufffd")
 
 
 def compare_with_log(
-    name: str, logged: Any, present: Any, advice: str, call: Callable[[Any], str] = record_name
+    name: str,
+    logged: Any,
+    present: Any,
+    advice: str,
+    call: Callable[[Any], str] = format_record_key,
 ) -> CheckResult:
     """What came of comparing a table with what the log says of it.
 
@@ -74,10 +78,10 @@ def compare_with_log(
         names = [
             call(key)
             for key in keys
-            if not _equal_but_null_characters(logged.get(key), present.get(key))
+            if not _equal_except_null_characters(logged.get(key), present.get(key))
         ]
     else:
         # Parts of what is in a set may be missing, and missing parts have no order.
         names = sorted(map(call, logged ^ present))
     whole = f"{len(present):,}, as the log says"
-    return compare_records(name, whole, names, "not as the log says", advice)
+    return summarize_faulty_records(name, whole, names, "not as the log says", advice)

@@ -39,11 +39,11 @@ Answer = tuple[bool, Any]
 """Whether it is an error; the answer or the error."""
 
 
-def refuse_question(_question: Any) -> None:
+def ignore_question(_question: Any) -> None:
     """The answer where no questions are asked."""
 
 
-class CallingServer:
+class ServerProxy:
     """The server, as the work sees it; it is a ``ReportProgress`` and a context that is a turn to write."""
 
     def __init__(self, send: Callable[[Message], Answer]):
@@ -67,7 +67,7 @@ class CallingServer:
     def send_progress(self) -> None:
         """Report the progress that was held back."""
         if self._unsent:
-            self._request("step", self._place)
+            self._send_request("step", self._place)
             self._sent_at, self._unsent = monotonic(), False
 
     def ask(self, question: Any) -> Any:
@@ -76,15 +76,17 @@ class CallingServer:
         Raises:
             ReviewError: As the server raised it.
         """
-        return self._request("question", question)
+        return self._send_request("question", question)
 
     def __enter__(self) -> None:
-        self._request("write", None)
+        self._send_request("write", None)
 
     def __exit__(self, *_: object) -> None:
-        self._request("written", None)
+        self._send_request("written", None)
 
-    def _request(self, kind: Literal["write", "written", "step", "question"], value: Any) -> Any:
+    def _send_request(
+        self, kind: Literal["write", "written", "step", "question"], value: Any
+    ) -> Any:
         is_error, answer = self._send((kind, value))
         if is_error:
             raise answer
@@ -99,7 +101,7 @@ def run_in_worker(
     limits: WorkerLimits = NO_LIMIT,
     progress: ReportProgress,
     stop: Callable[[], None],
-    answer: Callable[[Any], Any] = refuse_question,
+    answer: Callable[[Any], Any] = ignore_question,
 ) -> Result:
     """Call ``work(store, *arguments, caller)`` in a worker process and return its result.
 
@@ -107,7 +109,7 @@ def run_in_worker(
         store: The database; the process opens it again.
         kind: What is done; see ``worker_process.KINDS``.
         work: A function of a module; it, its arguments and its result travel by pickle.
-        arguments: Its arguments between the database and the ``CallingServer``.
+        arguments: Its arguments between the database and the ``ServerProxy``.
         limits: What the process may use.
         progress: Receives the progress; the error that it raises is raised in the work.
         stop: Called every now and then; an error that it raises ends the process.
@@ -140,9 +142,9 @@ def run_in_worker(
 
         given = store.settings, structlog.contextvars.get_contextvars(), work, arguments
         try:
-            with COUNTS[kind].working():
+            with COUNTS[kind].track_task():
                 result: Result = worker.run(
-                    _work_in_process, *given, on_message=on_message, stop=stop
+                    _run_work_in_process, *given, on_message=on_message, stop=stop
                 )
         except DamagedError as error:
             store.note_damage(error)
@@ -155,7 +157,7 @@ def run_in_this_thread(
     work: Callable[..., Result],
     *arguments: Any,
     progress: ReportProgress,
-    answer: Callable[[Any], Any] = refuse_question,
+    answer: Callable[[Any], Any] = ignore_question,
 ) -> Result:
     """Like ``run_in_worker``, in this thread: for work that is done before a process would have started."""
 
@@ -166,10 +168,10 @@ def run_in_this_thread(
         progress(*value)
         return False, None
 
-    return _run_and_flush(work, store, arguments, CallingServer(on_message))
+    return _run_and_flush(work, store, arguments, ServerProxy(on_message))
 
 
-def with_grace(check: Callable[[], None]) -> Callable[[], None]:
+def make_stop_with_grace_period(check: Callable[[], None]) -> Callable[[], None]:
     """A ``stop`` that gives cancelled work ``GRACE_SECONDS`` to end by its next step.
 
     Args:
@@ -189,7 +191,7 @@ def with_grace(check: Callable[[], None]) -> Callable[[], None]:
     return stop
 
 
-def _work_in_process(
+def _run_work_in_process(
     settings: Settings,
     log_fields: Mapping[str, Any],
     work: Callable[..., Any],
@@ -197,7 +199,7 @@ def _work_in_process(
     send: Callable[[Message], Answer],
 ) -> Any:
     log_to_stderr(settings.log_format)
-    caller = CallingServer(send)
+    caller = ServerProxy(send)
     with (
         structlog.contextvars.bound_contextvars(**log_fields),
         closing(Store.open(settings, caller)) as store,
@@ -206,7 +208,7 @@ def _work_in_process(
 
 
 def _run_and_flush(
-    work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: CallingServer
+    work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: ServerProxy
 ) -> Result:
     result = work(store, *arguments, caller)
     # It is done: to cancel it now is too late.

@@ -18,9 +18,9 @@ from glob import iglob
 from pathlib import Path
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.recovery.anchor import read_anchor
-from app.durable import PARTIAL, keep_private, sync_to_disk
+from app.durable import PARTIAL, set_private_umask, sync_to_disk
 from app.errors import DamagedError, StorageError
 
 NETWORK_FILE_SYSTEMS = frozenset(
@@ -60,7 +60,7 @@ def make_home(settings: Settings) -> Path:
         ) from error
     kind = find_file_system(settings.home)
     # A database on a server lets several machines share the files.
-    if kind in NETWORK_FILE_SYSTEMS and dialect_of(settings).is_file:
+    if kind in NETWORK_FILE_SYSTEMS and get_dialect(settings).is_file:
         raise StorageError(
             f"the home folder lies on a network file system ({kind})",
             hint="Set TOUCHLINE_HOME to a folder on a local disk.",
@@ -68,15 +68,15 @@ def make_home(settings: Settings) -> Path:
     return settings.home
 
 
-def make_private(settings: Settings) -> int:
+def make_home_private(settings: Settings) -> int:
     """Take a home's folders and files from everybody but their owner, from now on, too.
 
-    What belongs to another user stays as it is; ``open_to_others`` finds it.
+    What belongs to another user stays as it is; ``find_paths_open_to_others`` finds it.
 
     Returns:
         How many could be read by others.
     """
-    keep_private()
+    set_private_umask()
     mended = 0
     for path in iterate_private_files(settings):
         # Other commands may delete files meanwhile.
@@ -89,7 +89,7 @@ def make_private(settings: Settings) -> int:
     return mended
 
 
-def open_to_others(settings: Settings) -> list[Path]:
+def find_paths_open_to_others(settings: Settings) -> list[Path]:
     """What of a home others than its owner can read or write: a closed home closes all in it."""
     closed = not settings.home.stat().st_mode & 0o077
     found = []
@@ -107,7 +107,7 @@ def iterate_private_files(settings: Settings) -> Iterator[Path]:
     home, database = settings.home, settings.database_file
     yield home
     yield from (home / name for name in LOCKS if (home / name).exists())
-    yield from _files_of_database(home, database)
+    yield from _iterate_database_files(home, database)
     ours = (home / name for name in FOLDERS)
     for top in (*ours, *home.glob(f"{ASIDE}*"), database.with_name(RESTORING)):
         for folder, _folders, names in os.walk(top):
@@ -115,7 +115,7 @@ def iterate_private_files(settings: Settings) -> Iterator[Path]:
             yield from (Path(folder, file) for file in names)
 
 
-def _files_of_database(home: Path, database: Path) -> Iterator[Path]:
+def _iterate_database_files(home: Path, database: Path) -> Iterator[Path]:
     """A database and what lies beside it; outside of the home only where it is surely ours."""
     if not database.resolve().is_relative_to(home.resolve()) and not _is_own_database(database):
         return
@@ -135,7 +135,7 @@ def _is_own_database(file: Path) -> bool:
     return bool(header and anchor and anchor.installation.startswith(f"{header.tag:07x}"))
 
 
-def refused_file_error(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
+def make_file_access_error(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
     """What a disk said about a file, as a sentence with its remedy; without ``hint`` of the home."""
     if error.errno == errno.ENOSPC:
         return StorageError(
@@ -147,7 +147,7 @@ def refused_file_error(path: Path, error: OSError, hint: str = WRITABLE) -> Stor
     )
 
 
-def make_file(path: Path) -> None:
+def create_private_file(path: Path) -> None:
     """An empty file for its owner alone, where there is none.
 
     One that is there is not opened: closing it would end the locks of SQLite on it in this process.
@@ -157,7 +157,7 @@ def make_file(path: Path) -> None:
     except FileExistsError:
         return
     except OSError as error:
-        raise refused_file_error(path, error) from error
+        raise make_file_access_error(path, error) from error
 
 
 def find_file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
@@ -194,7 +194,7 @@ def get_installation_key(settings: Settings, name: str) -> bytes:
             _make_key_file(path)
         key = path.read_bytes()
     except OSError as error:
-        raise refused_file_error(path, error) from error
+        raise make_file_access_error(path, error) from error
     if len(key) != _BYTES:
         raise DamagedError(
             f"{path} is not a valid secret key: it has {len(key)} bytes, not {_BYTES}",

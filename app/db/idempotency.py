@@ -18,7 +18,7 @@ from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import insert
 from app.db.json_columns import Json, decompress, parse_json_column
-from app.db.session import Base, Session, now, pending_response, text_of
+from app.db.session import Base, Session, format_utc_time, now, pending_response
 from app.db.store import Store
 from app.errors import ConflictError
 from app.json_text import json_text
@@ -70,7 +70,7 @@ class StoredResponse:
     body: bytes | None
 
     @property
-    def under_way(self) -> bool:
+    def is_in_progress(self) -> bool:
         """Whether it is none yet: the work was begun, and the body says how far it is."""
         return self.status == UNDER_WAY
 
@@ -111,7 +111,7 @@ def delete_old_responses(session: Session) -> int:
     return len(session.scalars(gone).all())
 
 
-def shorten_responses(session: Session, most: int) -> int:
+def delete_oldest_response_bodies(session: Session, most: int) -> int:
     """Delete the bodies of the oldest responses, so that all take at most so many bytes.
 
     Their keys stay for as long as was promised: the requests still count once.
@@ -124,7 +124,7 @@ def shorten_responses(session: Session, most: int) -> int:
 
 def _oldest_kept_time() -> str:
     oldest = datetime.now(UTC) - timedelta(hours=KEPT_HOURS)
-    return text_of(oldest)
+    return format_utc_time(oldest)
 
 
 _SHORTEN = text(
@@ -214,14 +214,14 @@ class PendingResponse(Generic[R]):
                     "another copy of this request was carried out first",
                     hint="Wait, then send it again with the same Idempotency-Key.",
                 )
-        session.call_after_commit(lambda: self._commit(outcome, response))
+        session.call_after_commit(lambda: self._mark_committed(outcome, response))
 
-    def _commit(self, outcome: object, response: R | None) -> None:
+    def _mark_committed(self, outcome: object, response: R | None) -> None:
         self._committed = outcome, response
         if self._request is not None:
             self._request.stored = True
 
-    def response_to(self, outcome: object) -> R:
+    def make_or_get_response(self, outcome: object) -> R:
         """The response to send: the stored one, or a new one where nothing is stored.
 
         Raises:
@@ -238,7 +238,7 @@ class PendingResponse(Generic[R]):
 
 
 @contextmanager
-def without_response() -> Iterator[None]:
+def without_pending_response() -> Iterator[None]:
     """For work inside other work: the outer one answers the request."""
     token = pending_response.set(None)
     try:
@@ -247,7 +247,7 @@ def without_response() -> Iterator[None]:
         pending_response.reset(token)
 
 
-def has_key() -> bool:
+def has_idempotency_key() -> bool:
     """Whether the request that this thread carries out was sent under a key."""
     pending = pending_response.get()
     return pending is not None and pending.key is not None
@@ -260,7 +260,7 @@ def read_progress(session: Session) -> Json | None:
     """
     key = session.idempotency_key
     found = None if key is None else find_response(session, key.key, key.actor)
-    if found is None or found.body is None or not found.under_way:
+    if found is None or found.body is None or not found.is_in_progress:
         return None
     return parse_json_column(found.body)
 
@@ -274,7 +274,7 @@ def save_progress(session: Session, value: Json) -> None:
         insert_response(session, key.key, key.actor, progress)
 
 
-def find_stored(
+def find_stored_response(
     store: Store, key: str, actor: str, *, at_once: bool = False
 ) -> StoredResponse | None:
     """The response that is stored under an actor's key, or None.
@@ -288,7 +288,7 @@ def find_stored(
     Raises:
         BusyError: There was something to wait for.
     """
-    with store.read_without_waiting() if at_once else store.read_one() as session:
+    with store.read_without_waiting() if at_once else store.read_for_one_statement() as session:
         return find_response(session, key, actor)
 
 
@@ -301,7 +301,7 @@ def claim_key(store: Store, key: str, actor: str) -> bool:
     return store.sharing.claim(_claim_name(key, actor))
 
 
-def end_claim(store: Store, key: str, actor: str) -> None:
+def release_key(store: Store, key: str, actor: str) -> None:
     """Let others respond under it: what they find is stored by now."""
     store.sharing.release(_claim_name(key, actor))
 
@@ -310,7 +310,7 @@ def _claim_name(key: str, actor: str) -> str:
     return f"answer/{actor}/{key}"
 
 
-def store_sent(store: Store, key: str, actor: str, response: StoredResponse) -> None:
+def store_sent_response(store: Store, key: str, actor: str, response: StoredResponse) -> None:
     """Store a response that was sent already; one that is stored under its key stays."""
     with store.write() as session:
         insert_response(session, key, actor, response)

@@ -42,7 +42,7 @@ def parse_json_column(text: str | bytes) -> Json:
         raise _damaged_record_error() from error
 
 
-def parse_as(text: str | bytes, kind: type[Shape]) -> Shape:
+def parse_json_as(text: str | bytes, kind: type[Shape]) -> Shape:
     """The members of a JSON text that a type names; all others are passed over, which is faster.
 
     Raises:

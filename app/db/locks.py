@@ -15,8 +15,8 @@ from app.db.home import (
     OPENING_LOCK,
     PRACTICE_LOCK,
     SERVER_LOCK,
+    make_file_access_error,
     make_home,
-    refused_file_error,
 )
 from app.errors import BusyError, StorageError
 
@@ -28,7 +28,7 @@ OPENING_SECONDS = 60.0
 """So long who opens the database waits for another process that does, and may be migrating it."""
 
 
-def lock_within(handle: int, seconds: float) -> bool:
+def try_to_lock(handle: int, seconds: float) -> bool:
     """Take the lock of an open file or folder; False where others had it all the while."""
     until = time.monotonic() + seconds
     while True:
@@ -47,7 +47,7 @@ def require_lock(handle: int, held: str, seconds: float) -> None:
     Raises:
         BusyError: It was not free in time.
     """
-    if not lock_within(handle, seconds):
+    if not try_to_lock(handle, seconds):
         raise BusyError(
             f"another Touchline process {held} for {seconds:.0f} seconds",
             hint="Wait until that process is done. If it was suspended with Ctrl-Z, continue it"
@@ -55,7 +55,7 @@ def require_lock(handle: int, held: str, seconds: float) -> None:
         )
 
 
-class DatabaseInUse:
+class DatabaseLock:
     """Says that a process has the database open.
 
     ``database.lock`` is shared by all who have. Who opens it holds ``opening.lock`` meanwhile:
@@ -79,7 +79,7 @@ class DatabaseInUse:
         except BusyError:
             self.release()
             raise
-        self.alone = lock_within(self._handle, 0.0)
+        self.alone = try_to_lock(self._handle, 0.0)
         if not self.alone:
             self.share()
 
@@ -95,13 +95,13 @@ class DatabaseInUse:
 
 
 @contextmanager
-def hold_database_alone(settings: Settings, why: str) -> Iterator[None]:
+def hold_exclusive_database_lock(settings: Settings, why: str) -> Iterator[None]:
     """Hold the database while its file is replaced or its schema changed.
 
     Raises:
         StorageError: Somebody has it open; ``why`` says what cannot be done meanwhile.
     """
-    lock = DatabaseInUse(settings)
+    lock = DatabaseLock(settings)
     try:
         if not lock.alone:
             raise StorageError(
@@ -144,7 +144,7 @@ def hold_practice_lock(settings: Settings, waiting: Callable[[], None]) -> Itera
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
     handle = _open_lock_file(make_home(settings) / PRACTICE_LOCK)
     try:
-        while not lock_within(handle, NOTICE_SECONDS):
+        while not try_to_lock(handle, NOTICE_SECONDS):
             waiting()
         yield
     finally:
@@ -161,4 +161,4 @@ def _open_lock_file(path: Path) -> int:
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
-        raise refused_file_error(path, error) from error
+        raise make_file_access_error(path, error) from error

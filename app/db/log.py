@@ -21,7 +21,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.dialect import dialect_in
+from app.db.dialects.dialect import get_session_dialect
 from app.db.json_columns import Json, decompress_json
 from app.db.session import Base, Session
 from app.errors import DamagedError
@@ -143,7 +143,9 @@ _NEWEST_STEPS = (
 )
 
 
-def group_steps(session: Session, group_ids: Sequence[int], kinds: Iterable[str]) -> Sequence[Any]:
+def list_group_steps(
+    session: Session, group_ids: Sequence[int], kinds: Iterable[str]
+) -> Sequence[Any]:
     """Rows (group_id, id, kind) of the entries of some kinds about groups, in order."""
     return session.execute(_STEPS, {"groups": list(group_ids), "kinds": list(kinds)}).all()
 
@@ -177,13 +179,13 @@ def read_entry_hash(session: Session, log_id: int) -> str | None:
     return found
 
 
-def group_entries(session: Session, group_id: int, *, verdicts: bool = True) -> list[LogEntry]:
+def list_group_entries(session: Session, group_id: int, *, verdicts: bool = True) -> list[LogEntry]:
     """Everything that was said about a group, oldest first; without verdicts and comments, if need be."""
     where = [] if verdicts else [_CHANGES]
     return list(read_log(session, LogModel.group_id == group_id, *where))
 
 
-def read_entries_of(
+def iterate_group_entries_of_kinds(
     session: Session, group_ids: Sequence[int], kinds: Iterable[str]
 ) -> Iterator[LogEntry]:
     """Entries of some kinds about groups, oldest first."""
@@ -268,7 +270,7 @@ def verify_chain(session: Session) -> int:
             raise DamagedError(
                 f"row {entry.id} of the log was changed or is damaged: its hash does not continue"
                 " the hash chain",
-                hint=dialect_in(session).restoring,
+                hint=get_session_dialect(session).restoring,
             )
     return count
 

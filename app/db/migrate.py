@@ -7,18 +7,19 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
-from app.config import Settings, find_own_folder
+from app.config import Settings, find_packaged_folder
 from app.db.backup import write_backup
-from app.db.dialects.dialect import WRITE, Dialect, dialect_of, make_engine, report_storage_errors
-from app.db.home import make_file
-from app.db.locks import DatabaseInUse
+from app.db.dialects.dialect import WRITE, Dialect, get_dialect, make_engine, report_storage_errors
+from app.db.home import create_private_file
+from app.db.locks import DatabaseLock
 from app.db.recovery.anchor import renew_anchor, require_own_database
-from app.db.recovery.preopen_check import require_sound
+from app.db.recovery.preopen_check import require_consistent_home_files
 from app.errors import StorageError
 
 KNOWN_REVISIONS = tuple(
     sorted(
-        script.name[:4] for script in (find_own_folder("migrations") / "versions").glob("[0-9]*.py")
+        script.name[:4]
+        for script in (find_packaged_folder("migrations") / "versions").glob("[0-9]*.py")
     )
 )
 """Every revision that this version can migrate, oldest first."""
@@ -49,7 +50,7 @@ def find_migrations_folder() -> Path:
     Raises:
         StorageError: They do not.
     """
-    folder = find_own_folder("migrations")
+    folder = find_packaged_folder("migrations")
     if not (folder / "env.py").is_file():
         raise StorageError("the migration scripts are missing from this installation")
     return folder
@@ -64,10 +65,10 @@ def migrate_database(settings: Settings) -> MigrationResult:
         StorageError: The database is newer than this version, or somebody has it open.
         DamagedError: The database is not what was written, or not the one of its home.
     """
-    lock = DatabaseInUse(settings)
+    lock = DatabaseLock(settings)
     try:
-        if lock.alone and dialect_of(settings).is_file:
-            require_sound(settings)
+        if lock.alone and get_dialect(settings).is_file:
+            require_consistent_home_files(settings)
         return migrate_locked_database(settings, alone=lock.alone)
     finally:
         lock.release()
@@ -75,15 +76,15 @@ def migrate_database(settings: Settings) -> MigrationResult:
 
 def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResult:
     """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
-    dialect = dialect_of(settings)
+    dialect = get_dialect(settings)
     if dialect.is_file:
-        make_file(settings.database_file)
+        create_private_file(settings.database_file)
     engine = make_engine(settings)
     copy = None
     try:
         with report_storage_errors(settings):
             revision = read_schema_revision(engine)
-            _refuse_newer(revision, settings)
+            _refuse_newer_schema(revision, settings)
             require_own_database(engine, settings)
             if revision not in (None, SCHEMA_REVISION):
                 if not alone:
@@ -96,16 +97,16 @@ def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResu
                     copy = _backup_folder(settings) / COPY.format(SCHEMA_REVISION)
                     write_backup(settings, copy, replace=True)
             if revision != SCHEMA_REVISION:
-                make_schema(engine, dialect, new=revision is None)
+                apply_missing_migrations(engine, dialect, new=revision is None)
             renew_anchor(engine, settings, alone=alone)
     finally:
         engine.dispose()
     if copy is not None:
-        _delete_older_copies(copy)
+        _delete_older_backups(copy)
     return MigrationResult(SCHEMA_REVISION, copy)
 
 
-def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
+def apply_missing_migrations(engine: Engine, dialect: Dialect, *, new: bool) -> None:
     """Run what is missing of the migrations, in one transaction; ``new``: of an empty database."""
     # Alembic is slow to import and seldom needed.
     from alembic import command
@@ -115,7 +116,7 @@ def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
     config.set_main_option("script_location", str(find_migrations_folder()).replace("%", "%%"))
     with (
         engine.execution_options(**WRITE).begin() as connection,
-        dialect.migrating(connection, new=new),
+        dialect.migration_context(connection, new=new),
     ):
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
@@ -127,7 +128,7 @@ def _backup_folder(settings: Settings) -> Path:
     return folder
 
 
-def _delete_older_copies(copy: Path) -> None:
+def _delete_older_backups(copy: Path) -> None:
     """Of an earlier migration, which this one has shown to be good."""
     for other in copy.parent.glob(COPY.format("*")):
         if other != copy:
@@ -147,7 +148,7 @@ def _read_revision(connection: Connection) -> str | None:
     return None if revision is None else str(revision)
 
 
-def _refuse_newer(revision: str | None, settings: Settings) -> None:
+def _refuse_newer_schema(revision: str | None, settings: Settings) -> None:
     if revision is not None and revision not in KNOWN_REVISIONS:
         raise newer_schema_error(revision, settings)
 

@@ -12,12 +12,24 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from app.config import Settings
-from app.db.backup import DATABASE, EXPORTS, FRAMES, examine_database, require_file, verify_backup
-from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused_file_error
-from app.db.locks import hold_database_alone, hold_server_lock
+from app.db.backup import (
+    DATABASE,
+    EXPORTS,
+    FRAMES,
+    examine_database,
+    require_file_database,
+    verify_backup,
+)
+from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_file_access_error, make_home_private
+from app.db.locks import hold_exclusive_database_lock, hold_server_lock
 from app.db.migrate import KNOWN_REVISIONS, newer_schema_error
-from app.db.recovery.anchor import DatabaseAnchor, anchor_file, make_anchor
-from app.db.recovery.preopen_check import MAGIC, log_file, read_header, read_log
+from app.db.recovery.anchor import DatabaseAnchor, find_anchor_file, write_anchor
+from app.db.recovery.preopen_check import (
+    MAGIC,
+    find_write_ahead_log_file,
+    read_header,
+    read_write_ahead_log,
+)
 from app.durable import sync_to_disk
 from app.errors import DamagedError, InputError
 
@@ -60,23 +72,25 @@ def restore_database(settings: Settings, source: Path) -> RestoreResult:
         DamagedError: The database in it is damaged.
         StorageError: Somebody uses the home, or the disk is full.
     """
-    require_file(settings, "restored", "pg_restore --clean --if-exists --dbname=DATABASE FILE")
+    require_file_database(
+        settings, "restored", "pg_restore --clean --if-exists --dbname=DATABASE FILE"
+    )
     if not source.is_file():
         raise InputError(f"there is no file {source}")
     with (
         hold_server_lock(settings),
-        hold_database_alone(settings, "it cannot be replaced meanwhile"),
+        hold_exclusive_database_lock(settings, "it cannot be replaced meanwhile"),
     ):
         try:
             with _temporary_folder(settings) as folder:
-                return _restore_in_folder(settings, source, folder)
+                return _restore_through_folder(settings, source, folder)
         except OSError as error:
-            raise refused_file_error(Path(error.filename or settings.home), error) from error
+            raise make_file_access_error(Path(error.filename or settings.home), error) from error
 
 
-def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> RestoreResult:
+def _restore_through_folder(settings: Settings, source: Path, folder: Path) -> RestoreResult:
     if zipfile.is_zipfile(source):
-        expected, foreign_log = _unpack(source, folder), False
+        expected, foreign_log = _unpack_backup(source, folder), False
     else:
         expected, foreign_log = None, _copy_files(source, folder)
     anchor, rows = examine_database(settings, folder / DATABASE, source)
@@ -89,9 +103,11 @@ def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restor
     files = sum(1 for path in folder.rglob("*") if path.is_file()) - 1
     # The files of the backup, and those of its database's log, which SQLite may have left.
     os.sync()
-    aside = _move_aside(settings, [path.name for path in folder.iterdir() if path.is_dir()])
+    aside = _move_replaced_files_aside(
+        settings, [path.name for path in folder.iterdir() if path.is_dir()]
+    )
     _move_into_home(settings, folder, anchor)
-    make_private(settings)
+    make_home_private(settings)
     return RestoreResult(
         settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log
     )
@@ -108,7 +124,7 @@ def _temporary_folder(settings: Settings) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _unpack(source: Path, folder: Path) -> tuple[int, str]:
+def _unpack_backup(source: Path, folder: Path) -> tuple[int, str]:
     """Unpack a backup that is what was written; returns length and end of its log."""
     manifest = verify_backup(source)
     with zipfile.ZipFile(source) as backup:
@@ -140,25 +156,27 @@ def _copy_files(source: Path, folder: Path) -> bool:
             f"{source} is neither a backup of Touchline nor a database ({MAGIC[:13].decode()})",
             hint="Make a backup with touchline backup.",
         )
-    log = read_log(log_file(source))
+    log = read_write_ahead_log(find_write_ahead_log_file(source))
     shutil.copyfile(source, folder / DATABASE)
     if log.commits and log.belongs_to(header):
-        shutil.copyfile(log_file(source), log_file(folder / DATABASE))
+        shutil.copyfile(
+            find_write_ahead_log_file(source), find_write_ahead_log_file(folder / DATABASE)
+        )
         return False
     return log.commits > 0
 
 
-def _move_aside(settings: Settings, folders: list[str]) -> Path | None:
+def _move_replaced_files_aside(settings: Settings, folders: list[str]) -> Path | None:
     """Move what will be replaced into a folder of its own; the anchor stays until the end."""
     database = settings.database_file
     present = [
         *database.parent.glob(f"{database.name}*"),
         *(settings.home / name for name in folders if (settings.home / name).exists()),
     ]
-    anchor = anchor_file(database)
+    anchor = find_anchor_file(database)
     if not present and not anchor.exists():
         return None
-    aside = _new_folder(settings.home)
+    aside = _make_aside_folder(settings.home)
     if anchor.exists():
         shutil.copy(anchor, aside)
     for path in present:
@@ -168,7 +186,7 @@ def _move_aside(settings: Settings, folders: list[str]) -> Path | None:
     return aside
 
 
-def _new_folder(home: Path) -> Path:
+def _make_aside_folder(home: Path) -> Path:
     name = f"{ASIDE}{datetime.now(UTC):%Y%m%dT%H%M%S}"
     number = 1
     while (folder := home / (name if number == 1 else f"{name}-{number}")).exists():
@@ -188,6 +206,6 @@ def _move_into_home(settings: Settings, folder: Path, anchor: DatabaseAnchor) ->
     shutil.move(folder / DATABASE, settings.database_file)
     sync_to_disk(settings.database_file.parent)
     if anchor.installation:
-        make_anchor(settings.database_file, anchor)
+        write_anchor(settings.database_file, anchor)
     else:
-        anchor_file(settings.database_file).unlink(missing_ok=True)
+        find_anchor_file(settings.database_file).unlink(missing_ok=True)

@@ -112,11 +112,11 @@ class Session(Connection):
 
 
 def now() -> str:
-    """Now, as ``text_of`` writes it."""
-    return text_of(datetime.now(UTC))
+    """Now, as ``format_utc_time`` writes it."""
+    return format_utc_time(datetime.now(UTC))
 
 
-def text_of(at: datetime) -> str:
+def format_utc_time(at: datetime) -> str:
     """A time with a zone in UTC, ISO 8601 with microseconds; the texts sort as the times do."""
     return at.astimezone(UTC).isoformat(timespec="microseconds")
 

@@ -13,9 +13,9 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
-from app.db.dialects.dialect import AGAIN, WRITE, dialect_of, make_engine, report_storage_errors
-from app.db.home import make_file
-from app.db.locks import DatabaseInUse
+from app.db.dialects.dialect import AGAIN, WRITE, get_dialect, make_engine, report_storage_errors
+from app.db.home import create_private_file
+from app.db.locks import DatabaseLock
 from app.db.migrate import (
     KNOWN_REVISIONS,
     SCHEMA_REVISION,
@@ -25,13 +25,13 @@ from app.db.migrate import (
 )
 from app.db.recovery.anchor import (
     DatabaseAnchor,
-    move_anchor,
+    overwrite_anchor,
     read_anchor,
     renew_anchor,
     require_own_database,
     sync_anchor,
 )
-from app.db.recovery.preopen_check import OpenedFile, require_sound
+from app.db.recovery.preopen_check import OpenDatabaseFile, require_consistent_home_files
 from app.db.session import InstallationModel, Session
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 
@@ -46,7 +46,7 @@ TURN_SECONDS = 10.0
 processes (``busy_timeout``)."""
 
 
-class WriteTurn:
+class ThreadWriteLock:
     """The turn to write among the threads of one process.
 
     Raises:
@@ -81,25 +81,27 @@ class Store:
         self,
         engine: Engine,
         settings: Settings,
-        lock: DatabaseInUse,
+        lock: DatabaseLock,
         turn: AbstractContextManager[object],
     ):
         self.settings = settings
         self._engine = engine
-        self._reader = dialect_of(settings).reading(engine)
+        self._reader = get_dialect(settings).reading(engine)
         self._writer = engine.execution_options(**WRITE)
-        self._glancer = dialect_of(settings).autocommit_engine(engine)
-        self._peeker = dialect_of(settings).nonblocking_engine(settings)
+        self._glancer = get_dialect(settings).autocommit_engine(engine)
+        self._peeker = get_dialect(settings).nonblocking_engine(settings)
         # Connections of its own: one that waits for no disk must never carry what was promised.
         self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
-        self.sharing = dialect_of(settings).sharing(engine, lambda: report_storage_errors(settings))
+        self.sharing = get_dialect(settings).sharing(
+            engine, lambda: report_storage_errors(settings)
+        )
         self._lock = lock
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []
         self._anchor = read_anchor(settings.database_file)
         self._anchor_refused = False
         file = settings.database_file
-        self._file = OpenedFile(file) if dialect_of(settings).is_file else None
+        self._file = OpenDatabaseFile(file) if get_dialect(settings).is_file else None
         self._damage: tuple[str, str] | None = None
         self._refused: StorageError | None = None
 
@@ -117,12 +119,12 @@ class Store:
             DamagedError: The database is not what was written, or not the one of its home.
             InputError: The URL is neither one of SQLite nor of PostgreSQL.
         """
-        lock = DatabaseInUse(settings)
+        lock = DatabaseLock(settings)
         engine: Engine | None = None
         try:
             engine = _open_engine(settings, lock.alone)
             lock.share()
-            return Store(engine, settings, lock, WriteTurn() if turn is None else turn)
+            return Store(engine, settings, lock, ThreadWriteLock() if turn is None else turn)
         except BaseException:
             if engine is not None:
                 engine.dispose()
@@ -132,29 +134,29 @@ class Store:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session on one consistent snapshot; nothing that it changes is kept."""
-        with self._noting_damage(), Session(self._reader) as session:
+        with self._note_raised_damage(), Session(self._reader) as session:
             yield session
 
     @contextmanager
-    def read_one(self) -> Iterator[Session]:
+    def read_for_one_statement(self) -> Iterator[Session]:
         """A session for one statement, which is a snapshot by itself and needs no transaction.
 
         For what every request asks.
         """
-        with self._noting_damage(), Session(self._glancer) as session:
+        with self._note_raised_damage(), Session(self._glancer) as session:
             yield session
 
     @contextmanager
     def read_without_waiting(self) -> Iterator[Session]:
-        """A session like that of ``read_one`` for whoever may wait for nothing, as the event loop.
+        """A session like that of ``read_for_one_statement`` for whoever may wait for nothing, as the event loop.
 
         Raises:
-            BusyError: There would be something to wait for; ``read_one`` waits for it.
+            BusyError: There would be something to wait for; ``read_for_one_statement`` waits for it.
         """
         if self._peeker is None:
             raise BusyError("the database cannot be read now without waiting for another process")
         try:
-            with self._noting_damage(), Session(self._peeker) as session:
+            with self._note_raised_damage(), Session(self._peeker) as session:
                 yield session
         except NoConnectionError as error:
             raise BusyError(
@@ -179,7 +181,7 @@ class Store:
         with (
             self.turn,
             self._remember_write_failure(),
-            self._noting_damage(),
+            self._note_raised_damage(),
             Session(writer) as session,
         ):
             # Take the lock before anything is read, so that what is read is still true when it
@@ -191,10 +193,10 @@ class Store:
                 raise RuntimeError(
                     "a write with log entries must be durable: call write() without lasting=False"
                 )
-            self._require_anchored(session)
+            self._require_untruncated_log(session)
             if self._file is not None:
                 self._file.require_there()
-                self._file.require_log()
+                self._file.require_write_ahead_log()
             if lasting:
                 self.sharing.publish(session, COMMITTED)
             session.commit()
@@ -245,24 +247,24 @@ class Store:
             message, hint = self._damage
             raise DamagedError(f"nothing can be changed now: {message}", hint=hint)
         if self._file is not None:
-            with self._noting_damage():
+            with self._note_raised_damage():
                 self._file.require_there()
 
-    def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
+    def require_intact_database(self, wanted: Callable[[], bool] = lambda: True) -> None:
         """Let SQLite look at every page and index; raise DamagedError where it finds a fault.
 
         It ends early, without a word, once it is no longer ``wanted``.
         """
-        dialect = dialect_of(self.settings)
-        with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
-            faults = dialect.file_faults(session, 1)
+        dialect = get_dialect(self.settings)
+        with self.read() as session, dialect.interrupt_when(session, lambda: not wanted()):
+            faults = dialect.find_file_faults(session, 1)
             if faults:
                 file = self.settings.database_file
                 log.error("the database is damaged", file=str(file), fault=faults[0])
                 raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
 
     @contextmanager
-    def _noting_damage(self) -> Iterator[None]:
+    def _note_raised_damage(self) -> Iterator[None]:
         try:
             with report_storage_errors(self.settings):
                 yield
@@ -274,7 +276,7 @@ class Store:
         """Refuse writes from now on: something read was not what was written. The first sign stays."""
         self._damage = self._damage or (error.message, error.hint or EXAMINE)
 
-    def _require_anchored(self, session: Session) -> None:
+    def _require_untruncated_log(self, session: Session) -> None:
         """Raise DamagedError where the log had ended before what was said already.
 
         It only ever grows, whoever writes: not even an anchor that another process moved is ahead.
@@ -302,7 +304,7 @@ class Store:
             return
         self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
         try:
-            move_anchor(self.settings.database_file, self._anchor)
+            overwrite_anchor(self.settings.database_file, self._anchor)
         except OSError as error:
             if not self._anchor_refused:
                 log.warning("home.json cannot be written", error=str(error))
@@ -325,7 +327,7 @@ class Store:
     def publish(self, word: str) -> None:
         """Say a word to the other processes, where there may be some; see ``sharing``."""
         if self.sharing.is_shared:
-            with self.read_one() as session:
+            with self.read_for_one_statement() as session:
                 self.sharing.publish(session, word)
 
     def _receive_notification(self, word: str) -> None:
@@ -348,14 +350,14 @@ class Store:
 
 
 def _open_engine(settings: Settings, alone: bool) -> Engine:
-    dialect, engine = dialect_of(settings), make_engine(settings)
+    dialect, engine = get_dialect(settings), make_engine(settings)
     if dialect.is_file:
         if alone:
-            require_sound(settings)
-        make_file(settings.database_file)
+            require_consistent_home_files(settings)
+        create_private_file(settings.database_file)
     try:
         with report_storage_errors(settings):
-            dialect.require_promises(engine)
+            dialect.require_supported_configuration(engine)
             if read_schema_revision(engine) is None:
                 migrate_locked_database(settings, alone=alone)
             _require_schema(engine, settings)

@@ -54,7 +54,7 @@ class BallDistance:
     """The ball of one view as two people saw it.
 
     Attributes:
-        a: ``seen``, ``occluded``, ``out_of_view``, ``none`` or ``several``; ``b`` likewise.
+        a: ``seen``, ``occluded``, ``out_of_view``, ``make_empty_track`` or ``several``; ``b`` likewise.
         center_px: Distance of both centres; None unless both have one ball with a place.
         diameter_px: Difference of both diameters, b less a; None unless both drew boxes.
     """
@@ -97,7 +97,7 @@ class ViewDistance:
         return max((value for value in found if value is not None), default=0.0)
 
     @property
-    def jac_least(self) -> float | None:
+    def lowest_jac(self) -> float | None:
         """The lower of both JaC; None where there is none."""
         return min((value for value in self.jac if value is not None), default=None)
 
@@ -150,8 +150,8 @@ def compare_annotations(
         second = b.view(first.key)
         if second is not None:
             cameras = (
-                _calibration_of_view(solution_a, first.key),
-                _calibration_of_view(solution_b, first.key),
+                _find_view_calibration(solution_a, first.key),
+                _find_view_calibration(solution_b, first.key),
             )
             views.append(_compare_views(first, second, (a, b), cameras))
     ball_a = None if solution_a is None else solution_a.ball
@@ -167,13 +167,16 @@ def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
     """
     found = []
     for marking in sorted({*a, *b}):
-        first, second = _points_of_marking(a, marking), _points_of_marking(b, marking)
+        first, second = _get_marking_points(a, marking), _get_marking_points(b, marking)
         if not len(first) or not len(second):
             only: Side = "a" if len(first) else "b"
             if len(first) or len(second):
                 found.append(LineDistance(marking, only))
             continue
-        there, back = _distances_beside(first, second), _distances_beside(second, first)
+        there, back = (
+            _measure_distances_within_line_ends(first, second),
+            _measure_distances_within_line_ends(second, first),
+        )
         if not len(there) + len(back):
             # Drawn one behind the other: what is left is how far apart they are.
             there = distance_to_polyline(first, second)[0]
@@ -191,7 +194,7 @@ def compare_balls(a: tuple[BallAnnotation, ...], b: tuple[BallAnnotation, ...]) 
     where either is a point without a box.
     """
     states = classify_ball_state(a), classify_ball_state(b)
-    places = [_only_visible_ball(a), _only_visible_ball(b)]
+    places = [_find_only_visible_ball(a), _find_only_visible_ball(b)]
     first, second = places
     if first is None or second is None:
         return BallDistance(*states)
@@ -257,16 +260,16 @@ def _compare_views(
     )
 
 
-def _calibration_of_view(solution: Solution | None, view: str) -> Calibration | None:
+def _find_view_calibration(solution: Solution | None, view: str) -> Calibration | None:
     found = None if solution is None else solution.view(view)
     return None if found is None else found.calibration
 
 
-def _points_of_marking(lines: Lines, marking: str) -> FloatArray:
+def _get_marking_points(lines: Lines, marking: str) -> FloatArray:
     return np.array(lines.get(marking) or (), dtype=float).reshape(-1, 2)
 
 
-def _distances_beside(points: FloatArray, line: FloatArray) -> FloatArray:
+def _measure_distances_within_line_ends(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distances of the points that lie beside a polyline, not beyond its ends, shape (<= N,)."""
     if len(line) < 2:
         return distance_to_polyline(points, line)[0]
@@ -277,7 +280,7 @@ def _distances_beside(points: FloatArray, line: FloatArray) -> FloatArray:
     return apart[~beyond]
 
 
-def _only_visible_ball(
+def _find_only_visible_ball(
     balls: tuple[BallAnnotation, ...],
 ) -> tuple[tuple[float, float], float | None] | None:
     """Centre and diameter of the only ball to be seen, pixels."""
@@ -327,9 +330,11 @@ def measure_distance_from_truth(
     pairs = [
         (view, other) for view in truth.views if (other := annotated.view(view.key)) is not None
     ]
-    lines = [distance for view, other in pairs for distance in _line_distances(view, other)]
+    lines = [distance for view, other in pairs for distance in _measure_line_distances(view, other)]
     missing = sum(len({*view.station.lines} - {*other.station.lines}) for view, other in pairs)
-    centers = [(_ball_center(view), _ball_center(other)) for view, other in pairs]
+    centers = [
+        (_find_first_ball_center(view), _find_first_ball_center(other)) for view, other in pairs
+    ]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a and b]
     return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
@@ -343,16 +348,16 @@ def measure_distance_from_truth(
 
 
 @dataclass(frozen=True)
-class TrueView:
+class GroundTruthView:
     """What is true of a view whose world is known: its camera, and where its ball is, in pixels."""
 
     camera: Camera
     center: ImagePoint
 
 
-def measure_error_in_world(
+def measure_error_against_true_cameras(
     truth: Group,
-    views: Mapping[str, TrueView],
+    views: Mapping[str, GroundTruthView],
     annotated: Group,
     ball: Point3,
     own: Point3 | None,
@@ -379,7 +384,7 @@ def measure_error_in_world(
         projected = project_markings(known.camera, truth.pitch, other.size)
         measured = measure_markings(projected, other.station.lines).values()
         lines += [float(one.distances.mean()) for one in measured if one.distances.size]
-    centers = [(_ball_center(other), known.center) for _, other, known in seen]
+    centers = [(_find_first_ball_center(other), known.center) for _, other, known in seen]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a is not None]
     return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
@@ -388,18 +393,18 @@ def measure_error_in_world(
         ),
         ball_px=max(balls) if balls else None,
         balls_missing=sum(
-            _ball_center(view) is not None and _ball_center(other) is None
+            _find_first_ball_center(view) is not None and _find_first_ball_center(other) is None
             for view, other, _ in seen
         ),
         ball_m=None if own is None else float(np.linalg.norm(np.subtract(ball, own))),
     )
 
 
-def _ball_center(view: View) -> ImagePoint | None:
+def _find_first_ball_center(view: View) -> ImagePoint | None:
     return next((center for ball in view.balls if (center := ball.center) is not None), None)
 
 
-def _line_distances(view: View, other: View) -> list[float]:
+def _measure_line_distances(view: View, other: View) -> list[float]:
     """Mean distance of each marking that both have, from either to the other, pixels."""
     mine, theirs = view.station.lines, other.station.lines
     return [polyline_distance(mine[name], theirs[name]) for name in mine if name in theirs]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from app.evaluation.bootstrap import Resamples
+from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.frame import JudgedFrame, iou
 from app.evaluation.result import (
     Axis,
@@ -64,7 +64,7 @@ class PrecisionRecallCurve:
     score: FloatArray
 
 
-def find_hits(judged: Sequence[JudgedFrame]) -> SortedDetections:
+def match_detections_to_balls(judged: Sequence[JudgedFrame]) -> SortedDetections:
     """Match detections to balls as COCO does: the surest that overlaps enough gets the ball."""
     scores, frames, found = [], [], []
     for index, item in enumerate(judged):
@@ -93,9 +93,9 @@ def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None,
         return 0.0, 0.0
     from faster_coco_eval import COCO, COCOeval_faster
 
-    truth = COCO(_coco_truth(judged), print_function=_no_output)
-    found = truth.loadRes(_coco_results(judged))
-    run = COCOeval_faster(truth, found, "bbox", print_function=_no_output)
+    truth = COCO(_build_coco_ground_truth(judged), print_function=_discard_output)
+    found = truth.loadRes(_build_coco_results(judged))
+    run = COCOeval_faster(truth, found, "bbox", print_function=_discard_output)
     run.evaluate()
     run.accumulate()
     precision = np.asarray(run.eval["precision"])[:, :, 0, 0, -1]
@@ -122,7 +122,7 @@ def precision_recall_curve(
     return PrecisionRecallCurve(recall, precision, hits.scores)
 
 
-def interpolated_precision(found: PrecisionRecallCurve) -> float:
+def interpolated_average_precision(found: PrecisionRecallCurve) -> float:
     """COCO's AP: the mean of the interpolated precision at 101 recalls."""
     return float(_precision_at_recalls(found).mean())
 
@@ -133,7 +133,9 @@ def area_under_curve(found: PrecisionRecallCurve) -> float:
     return float(np.sum(steps * _precision_envelope(found.precision)))
 
 
-def mean_interpolated(hits: SortedDetections, weights: FloatArray | None = None) -> float:
+def mean_average_precision_over_ious(
+    hits: SortedDetections, weights: FloatArray | None = None
+) -> float:
     """COCO's AP averaged over ``IOUS``: the same as `interpolated` of each, in one go."""
     weights = np.ones(len(hits.balls)) if weights is None else weights
     each, balls = weights[hits.frames], float(weights @ hits.balls)
@@ -163,7 +165,7 @@ def _precision_envelope(precision: FloatArray) -> FloatArray:
     return best
 
 
-def _coco_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]:
+def _build_coco_ground_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]:
     balls = [(image, item.truth) for image, item in enumerate(judged, 1) if item.truth is not None]
     return {
         "images": [
@@ -186,7 +188,7 @@ def _coco_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]:
     }
 
 
-def _coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
+def _build_coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
     return [
         {
             "image_id": image,
@@ -199,7 +201,7 @@ def _coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
     ]
 
 
-def _no_output(*_words: object, **_options: object) -> None:
+def _discard_output(*_words: object, **_options: object) -> None:
     """Where the evaluator's remarks go: stdout belongs to results."""
 
 
@@ -215,31 +217,36 @@ COLUMNS = (
 )
 
 
-def make_detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Table:
+def make_detection_summary(judged: Sequence[JudgedFrame], resamples: MatchResamples) -> Table:
     """AP with intervals by match."""
-    hits = find_hits(judged)
+    hits = match_detections_to_balls(judged)
     place = resamples.places([item.frame.match for item in judged])
     ap_50, ap = coco_average_precision(judged)
     balls = int(hits.balls.sum())
 
-    def cell(value: float | None, low: float | None, high: float | None) -> Cell:
+    def make_cell(value: float | None, low: float | None, high: float | None) -> Cell:
         return Cell(value, low, high, balls, len(judged))
 
-    def spread(weights: FloatArray) -> float:
-        return interpolated_precision(precision_recall_curve(hits, 0, weights[place]))
+    def compute_weighted_precision(weights: FloatArray) -> float:
+        return interpolated_average_precision(precision_recall_curve(hits, 0, weights[place]))
 
     once = precision_recall_curve(hits)
     recall = float(once.recall[-1]) if balls and len(once.recall) else (0.0 if balls else None)
     cells = (
-        cell(ap_50, *resamples.statistic(spread)),
-        cell(ap, *resamples.statistic(lambda weights: mean_interpolated(hits, weights[place]))),
-        cell(
+        make_cell(ap_50, *resamples.compute_interval(compute_weighted_precision)),
+        make_cell(
+            ap,
+            *resamples.compute_interval(
+                lambda weights: mean_average_precision_over_ious(hits, weights[place])
+            ),
+        ),
+        make_cell(
             area_under_curve(once) if balls else None,
-            *resamples.statistic(
+            *resamples.compute_interval(
                 lambda w: area_under_curve(precision_recall_curve(hits, 0, w[place]))
             ),
         ),
-        cell(recall, *resamples.statistic(lambda w: _highest_recall(hits, w[place]))),
+        make_cell(recall, *resamples.compute_interval(lambda w: _highest_recall(hits, w[place]))),
     )
     note = (
         f"{plural(len(judged), 'frame')}: {balls} with a ball, {len(judged) - balls} without; "
@@ -251,9 +258,11 @@ def make_detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) 
 
 def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Figure:
     """Precision against recall at IoU 0.5 and 0.75."""
-    hits = find_hits(judged)
+    hits = match_detections_to_balls(judged)
     balls = int(hits.balls.sum())
-    series = tuple(_curve_series(hits, index, words) for index, words in CURVES) if balls else ()
+    series = (
+        tuple(_make_curve_series(hits, index, words) for index, words in CURVES) if balls else ()
+    )
     panel = Panel(
         "Precision and recall",
         Axis("Recall", "", 0.0, 1.0),
@@ -264,14 +273,14 @@ def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Figure:
     return Figure("precision_recall", "Precision against recall", (panel,), note)
 
 
-def _curve_series(hits: SortedDetections, index: int, words: str) -> Series:
+def _make_curve_series(hits: SortedDetections, index: int, words: str) -> Series:
     found = precision_recall_curve(hits, index)
     chosen = np.unique(np.linspace(0, max(len(found.recall) - 1, 0), MAX_PLACES).astype(int))
     if not len(found.recall):
         chosen = np.zeros(0, dtype=int)
     return Series(
         f"iou_{words}",
-        f"IoU {words}: AP {interpolated_precision(found):.3f}",
+        f"IoU {words}: AP {interpolated_average_precision(found):.3f}",
         tuple(found.recall[chosen].tolist()),
         tuple(found.precision[chosen].tolist()),
         count=tuple((chosen + 1).tolist()),
@@ -329,7 +338,7 @@ SIZE = ErrorBins(
 MAX_NAMED = 500
 
 
-def error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
+def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
     """Median error of hits in each bin, with the quarters around it, and the frames themselves."""
     kept = [frame for frame in frames if frame.error_m is not None]
     inside: dict[int, list[float]] = {}
@@ -354,13 +363,13 @@ def error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
         bins.title,
         Axis(bins.label, bins.unit, 0.0),
         Axis("Error of the place", "m", 0.0),
-        (_scatter_series(kept, bins.field), middle),
+        (_make_scatter_series(kept, bins.field), middle),
     )
     note = f"{plural(len(kept), 'frame')} with a detection of IoU > 0, oracle cameras."
     return Figure(bins.figure, bins.title, (panel,), note)
 
 
-def detection_table(
+def make_detection_table(
     judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: ErrorBins
 ) -> Table:
     """AP over the frames of each bin, with how many of their balls were found.
@@ -402,7 +411,7 @@ def _bin_center(bins: ErrorBins, place: int) -> float:
     return (low + high) / 2 if high is not None else low + (low - bins.edges[place - 1]) / 2
 
 
-def _scatter_series(frames: Sequence[FrameResult], field: str) -> Series:
+def _make_scatter_series(frames: Sequence[FrameResult], field: str) -> Series:
     """The frames themselves; of very many an even choice, which shows the same cloud."""
     pairs = [
         (value, frame.error_m)

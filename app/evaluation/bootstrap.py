@@ -17,7 +17,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Resamples:
+class MatchResamples:
     """How often each match was drawn in each resample.
 
     Attributes:
@@ -30,14 +30,16 @@ class Resamples:
     counts: FloatArray
 
     @staticmethod
-    def draw(matches: Sequence[str], resamples: int = RESAMPLES, seed: int = SEED) -> Resamples:
+    def draw(
+        matches: Sequence[str], resamples: int = RESAMPLES, seed: int = SEED
+    ) -> MatchResamples:
         """Draw matches with replacement, as many as there are."""
         names = tuple(sorted(set(matches)))
         if len(names) < 2:
-            return Resamples(names, np.zeros((0, len(names))))
+            return MatchResamples(names, np.zeros((0, len(names))))
         rng = np.random.default_rng(seed)
         share = np.full(len(names), 1 / len(names))
-        return Resamples(names, rng.multinomial(len(names), share, resamples).astype(float))
+        return MatchResamples(names, rng.multinomial(len(names), share, resamples).astype(float))
 
     def places(self, matches: Sequence[str]) -> npt.NDArray[np.int64]:
         """Column of ``counts`` of each match, shape (N,).
@@ -66,7 +68,7 @@ class Resamples:
             means = (self.counts @ sums) / (self.counts @ sizes)
         return Cell(float(array.mean()), *percentile_interval(means), count, whole)
 
-    def statistic(
+    def compute_interval(
         self, compute: Callable[[FloatArray], float]
     ) -> tuple[float | None, float | None]:
         """The interval of any number that is computed from a weight per match, shape (M,)."""

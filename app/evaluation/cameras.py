@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.evaluation.bootstrap import Resamples
+from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.frame import Frame
 from app.evaluation.result import (
     Axis,
@@ -18,8 +18,8 @@ from app.evaluation.result import (
     Column,
     Figure,
     FrameRange,
-    Mark,
     Panel,
+    ReferenceLine,
     Row,
     Series,
     Table,
@@ -39,8 +39,8 @@ from app.solving.jaccard import (
     measure_markings,
     project_markings,
 )
-from app.solving.match_position import NO_PLACES, FramePlaces, share_position
-from app.solving.observations import observations_of_lines
+from app.solving.match_position import NO_PLACES, FramePlaces, calibrate_with_match_position
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from app.wording import plural
 
@@ -150,11 +150,11 @@ def measure_error_without_marking(
     """Largest distance of a marking's points from where the others put it, pixels."""
     rest = make_lines({name: points for name, points in lines.items() if name != marking})
     alone = calibrate(rest, pitch, size, policy)
-    camera = share_position(alone, others, rest, pitch, size, policy).camera
+    camera = calibrate_with_match_position(alone, others, rest, pitch, size, policy).camera
     if camera is None:
         return None
     problem = ResectionProblem.of(size, policy)
-    seen = observations_of_lines(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
+    seen = make_observations(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
     return float(problem.distances(problem.parameters(camera), seen).max())
 
 
@@ -193,10 +193,10 @@ def score_cameras(
     return scores
 
 
-def cameras_table(
+def make_cameras_table(
     rows: Sequence[tuple[str, str, Scores]],
     frames: Sequence[Frame],
-    resamples: Resamples,
+    resamples: MatchResamples,
     judged: Collection[int],
 ) -> Table:
     """One row per set of cameras, over all frames with lines; a frame without camera counts 0.
@@ -208,7 +208,9 @@ def cameras_table(
         judged: Ids of the frames that a run lists.
     """
     match = {frame.id: frame.match for frame in frames}
-    made = tuple(_score_row(name, label, scores, match, resamples) for name, label, scores in rows)
+    made = tuple(
+        _make_score_row(name, label, scores, match, resamples) for name, label, scores in rows
+    )
     count = len(rows[0][2]) if rows else 0
     unseen = sum(frame not in judged for frame in (rows[0][2] if rows else ()))
     note = (
@@ -224,9 +226,9 @@ def cameras_table(
     return Table("calibration", "Calibration against annotated lines", COLUMNS, made, note)
 
 
-def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
+def make_jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
     """Share of frames whose JaC is above a threshold, for each gamma."""
-    panels = tuple(_jac_panel(name, label, scores, min_jac) for name, label, scores in rows)
+    panels = tuple(_make_jac_panel(name, label, scores, min_jac) for name, label, scores in rows)
     note = (
         f"{len(rows[0][2]) if rows else 0} frames with annotated lines. Points of the predicted "
         f"cameras at γ = {GAMMAS_PERCENT[0]:g} % open their frames."
@@ -234,29 +236,32 @@ def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figur
     return Figure("jac", "Frames above a JaC", panels, note)
 
 
-def _score_row(
-    name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: Resamples
+def _make_score_row(
+    name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: MatchResamples
 ) -> Row:
     total, count = score_frames(scores.values()), len(scores)
     matches = [match[frame] for frame in scores]
     found = list(scores.values())
 
-    def mean(value: Callable[[FrameScore], float]) -> Cell:
+    def make_mean_cell(value: Callable[[FrameScore], float]) -> Cell:
         values = [0.0 if item is None else value(item) for item in found]
         return resamples.mean(values, matches)
 
     cells = (
-        mean(lambda _item: 1.0),
-        *(mean(lambda item, place=place: item.jac[place]) for place in range(len(GAMMAS_PERCENT))),  # type: ignore[misc]
-        mean(lambda item: float(item.jac[0] > SHARE_ABOVE)),
-        mean(lambda item: item.challenge),
+        make_mean_cell(lambda _item: 1.0),
+        *(
+            make_mean_cell(lambda item, place=place: item.jac[place])  # type: ignore[misc]
+            for place in range(len(GAMMAS_PERCENT))
+        ),
+        make_mean_cell(lambda item: float(item.jac[0] > SHARE_ABOVE)),
+        make_mean_cell(lambda item: item.challenge),
         Cell(total.error_median_px, count=total.calibrated, of=count),
         Cell(total.error_p95_px, count=total.calibrated, of=count),
     )
     return Row(name, label, cells, FrameRange("predicted_jac"))
 
 
-def _jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
+def _make_jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     values = np.array(
         [item.jac if item is not None else (0.0,) * len(GAMMAS_PERCENT) for item in scores.values()]
     ).reshape(-1, len(GAMMAS_PERCENT))
@@ -271,7 +276,9 @@ def _jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
                 tuple(JAC_LIMITS.tolist()),
                 tuple(share.tolist()),
                 count=tuple(above.tolist()),
-                frames=_ranges_above_limits() if name == "predicted" and place == 0 else (),
+                frames=_make_ranges_above_jac_limits()
+                if name == "predicted" and place == 0
+                else (),
             )
         )
     return Panel(
@@ -279,11 +286,11 @@ def _jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
         Axis("JaC above", "", 0.0, 1.0),
         Axis("Share of frames", "", 0.0, 1.0),
         tuple(series),
-        (Mark("x", min_jac, f"{min_jac:g}"),),
+        (ReferenceLine("x", min_jac, f"{min_jac:g}"),),
     )
 
 
-def _ranges_above_limits() -> tuple[FrameRange, ...]:
+def _make_ranges_above_jac_limits() -> tuple[FrameRange, ...]:
     """The frames above each threshold itself, which a lower bound alone would take in."""
     bounds = (math.nextafter(threshold, math.inf) for threshold in JAC_LIMITS.tolist())
     return tuple(FrameRange("predicted_jac", low=bound) for bound in bounds)

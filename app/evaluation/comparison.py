@@ -23,7 +23,7 @@ _MEASURES = (
 
 
 @dataclass(frozen=True)
-class Difference:
+class CellDifference:
     """One number of both runs; ``change`` is the second minus the first.
 
     ``unit`` and ``better`` are those of its column.
@@ -84,10 +84,10 @@ def list_differing_settings(first: Mapping[str, Any], second: Mapping[str, Any])
     return (*names, *(["careful"] if len(drawn) > 1 else []))
 
 
-def compare_tables(first: Sequence[Table], second: Sequence[Table]) -> list[Difference]:
+def compare_tables(first: Sequence[Table], second: Sequence[Table]) -> list[CellDifference]:
     """Every number that stands in either run, in the order of the first."""
     names = list(dict.fromkeys([table.name for table in (*first, *second)]))
-    found: list[Difference] = []
+    found: list[CellDifference] = []
     for name in names:
         pair = [next((t for t in tables if t.name == name), None) for tables in (first, second)]
         found += _compare_table(name, pair[0], pair[1])
@@ -129,13 +129,13 @@ def compare_frames(
     return FrameComparison(field, len(pairs), better, worse, gained, lost, mean, tuple(rows))
 
 
-def _compare_table(name: str, first: Table | None, second: Table | None) -> list[Difference]:
+def _compare_table(name: str, first: Table | None, second: Table | None) -> list[CellDifference]:
     both = [table for table in (first, second) if table is not None]
     rows = {row.name: row.label for table in both for row in table.rows}
     # A release may measure what the one before did not, and the other way round.
     columns = {column.name: column for table in both for column in table.columns}
     return [
-        Difference(name, row, column, f"{label}: {head.label}", head.unit, head.better, *cells)
+        CellDifference(name, row, column, f"{label}: {head.label}", head.unit, head.better, *cells)
         for row, label in rows.items()
         for column, head in columns.items()
         if (cells := (_find_cell(first, row, column), _find_cell(second, row, column)))

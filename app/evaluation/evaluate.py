@@ -13,13 +13,13 @@ from app.evaluation.average_precision import (
     DISTANCE,
     PARALLAX,
     SIZE,
-    detection_table,
-    error_figure,
     make_detection_summary,
+    make_detection_table,
+    make_error_figure,
     make_precision_recall_figure,
 )
-from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
-from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
+from app.evaluation.bootstrap import RESAMPLES, SEED, MatchResamples
+from app.evaluation.cameras import Scores, make_cameras_table, make_jac_figure, score_cameras
 from app.evaluation.frame import (
     Detection,
     Frame,
@@ -29,7 +29,7 @@ from app.evaluation.frame import (
     size_error_percent,
 )
 from app.evaluation.localization import (
-    localization_table,
+    make_localization_table,
     make_precision_distance_figure,
     measure_frame,
 )
@@ -61,11 +61,11 @@ ROWS = (
 )
 
 
-def boxes_table(
+def make_boxes_table(
     frames: Sequence[Frame],
     careful: Mapping[int, Box],
     detections: Mapping[int, Sequence[Detection]],
-    resamples: Resamples,
+    resamples: MatchResamples,
     truth: str = "optimized",
 ) -> Table:
     """IoU and size error of every kind of box, over the same frames for each.
@@ -81,9 +81,9 @@ def boxes_table(
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
             opens the frames.
     """
-    compared = _comparable_boxes(frames, careful)
+    compared = _select_comparable_boxes(frames, careful)
     rows = [
-        _box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
+        _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
              len(careful), FrameRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
@@ -91,9 +91,11 @@ def boxes_table(
         found = [
             (frame, hit, box)
             for frame, box in compared
-            if (hit := _overlapping_detection(detections, frame, box))
+            if (hit := _find_overlapping_detection(detections, frame, box))
         ]
-        rows.append(_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
+        rows.append(
+            _make_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful))
+        )
     note = (
         f"{len(compared)} frames that have a reference box and a 3D ball, of {len(careful)} reference "
         f"boxes. Size error is |d - d reference| in per cent of the reference box's diagonal. "
@@ -103,7 +105,7 @@ def boxes_table(
     return Table("boxes", "Boxes against reference boxes", COLUMNS, tuple(rows), note)
 
 
-def boxes_figure(
+def make_boxes_figure(
     frames: Sequence[Frame], careful: Mapping[int, Box], distances: Mapping[int, float]
 ) -> Figure:
     """IoU and size error of each box of each frame, over the distance of the ball.
@@ -115,7 +117,7 @@ def boxes_figure(
     """
     compared = sorted(
         (distances[frame.id], frame.id, frame, box)
-        for frame, box in _comparable_boxes(frames, careful)
+        for frame, box in _select_comparable_boxes(frames, careful)
         if frame.id in distances
     )
     note = f"{plural(len(compared), 'frame')}; a point opens its frame."
@@ -128,14 +130,14 @@ def boxes_figure(
             title,
             Axis("Distance to the camera", "m"),
             axis,
-            tuple(_scatter_series(kind, label, compared, measure) for kind, label in ROWS),
+            tuple(_make_scatter_series(kind, label, compared, measure) for kind, label in ROWS),
         )
         for title, axis, measure in measures
     )
     return Figure("box_overlap", "Boxes against reference boxes", panels, note)
 
 
-def _scatter_series(
+def _make_scatter_series(
     kind: str,
     label: str,
     compared: Sequence[tuple[float, int, Frame, Box]],
@@ -152,7 +154,7 @@ def _scatter_series(
     )
 
 
-def _comparable_boxes(
+def _select_comparable_boxes(
     frames: Sequence[Frame], careful: Mapping[int, Box]
 ) -> list[tuple[Frame, Box]]:
     return [
@@ -167,11 +169,11 @@ def has_every_box(frame: Frame) -> bool:
     return all(kind in frame.boxes for kind, _ in ROWS)
 
 
-def _box_row(
+def _make_box_row(
     kind: str,
     label: str,
     compared: Sequence[tuple[Frame, Box, Box]],
-    resamples: Resamples,
+    resamples: MatchResamples,
     whole: int,
     behind: FrameRange | None = None,
 ) -> Row:
@@ -182,7 +184,7 @@ def _box_row(
     return Row(kind, label, cells, behind)
 
 
-def _overlapping_detection(
+def _find_overlapping_detection(
     detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box
 ) -> Box | None:
     found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
@@ -240,7 +242,9 @@ def evaluate(
         progress: Called with steps done, steps in all and a sentence.
     """
     say = progress or (lambda _done, _total=None, _sentence="": None)
-    resamples = Resamples.draw([item.match for item in frames], options.resamples, options.seed)
+    resamples = MatchResamples.draw(
+        [item.match for item in frames], options.resamples, options.seed
+    )
     scores = _score_all_cameras(frames, inputs, say)
     judged = judge_detections(frames, inputs.detections or {}, options.boxes)
     say(1, 4, "Placing balls")
@@ -248,23 +252,27 @@ def evaluate(
     say(2, 4, "Average precision")
     tables, figures = [], []
     if inputs.detections is not None:
-        tables += list(_detection_tables(judged, results, inputs, resamples))
-        figures += list(_detection_figures(judged, results, inputs))
+        tables += list(_make_detection_tables(judged, results, inputs, resamples))
+        figures += list(_make_detection_figures(judged, results, inputs))
     if inputs.careful is not None:
         tables.append(
-            boxes_table(frames, inputs.careful, inputs.detections or {}, resamples, options.boxes)
+            make_boxes_table(
+                frames, inputs.careful, inputs.detections or {}, resamples, options.boxes
+            )
         )
         distances = {
             item.frame_id: item.distance_m for item in results if item.distance_m is not None
         }
-        figures.append(boxes_figure(frames, inputs.careful, distances))
+        figures.append(make_boxes_figure(frames, inputs.careful, distances))
     if scores is not None:
         rows = [
             ("predicted", "Predicted cameras", scores[0]),
             ("dataset", "The dataset's own", scores[1]),
         ]
-        tables.append(cameras_table(rows, frames, resamples, {item.frame.id for item in judged}))
-        figures.append(jac_figure(rows, options.min_jac))
+        tables.append(
+            make_cameras_table(rows, frames, resamples, {item.frame.id for item in judged})
+        )
+        figures.append(make_jac_figure(rows, options.min_jac))
     say(3, 4, "Sensitivity")
     table, figure = _measure_sensitivity(frames, options)
     say(4, 4, "Done")
@@ -309,7 +317,7 @@ def _measure_frames(
         results.append(
             replace(
                 result,
-                predicted_jac=_jac_of_frame(scores[0], frame.id) if scores else None,
+                predicted_jac=_find_frame_jac(scores[0], frame.id) if scores else None,
                 box_iou=iou(item.truth, box)
                 if item.truth and box and has_every_box(frame)
                 else None,
@@ -318,7 +326,7 @@ def _measure_frames(
     return results
 
 
-def _jac_of_frame(scores: Scores, frame: int) -> float | None:
+def _find_frame_jac(scores: Scores, frame: int) -> float | None:
     """None without lines; lines without a camera count as 0, as they do in the table."""
     if frame not in scores:
         return None
@@ -326,25 +334,25 @@ def _jac_of_frame(scores: Scores, frame: int) -> float | None:
     return 0.0 if score is None else score.jac[0]
 
 
-def _detection_tables(
+def _make_detection_tables(
     judged: Sequence[JudgedFrame],
     results: Sequence[FrameResult],
     inputs: EvaluationInputs,
-    resamples: Resamples,
+    resamples: MatchResamples,
 ) -> Iterator[Table]:
     yield make_detection_summary(judged, resamples)
-    yield localization_table(results, resamples, predicted=inputs.cameras is not None)
-    yield detection_table(judged, results, SIZE)
-    yield detection_table(judged, results, DISTANCE)
+    yield make_localization_table(results, resamples, predicted=inputs.cameras is not None)
+    yield make_detection_table(judged, results, SIZE)
+    yield make_detection_table(judged, results, DISTANCE)
 
 
-def _detection_figures(
+def _make_detection_figures(
     judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: EvaluationInputs
 ) -> Iterator[Figure]:
     yield make_precision_recall_figure(judged)
     yield make_precision_distance_figure(results, predicted=inputs.cameras is not None)
     for bins in (DISTANCE, PARALLAX, SIZE):
-        yield error_figure(results, bins)
+        yield make_error_figure(results, bins)
 
 
 def _measure_sensitivity(
@@ -355,7 +363,9 @@ def _measure_sensitivity(
     samples = [
         sensitivity.measure_frame_sensitivity(frame, options.ball_diameter_m) for frame in chosen
     ]
-    return sensitivity.sensitivity_table(samples, able), sensitivity.sensitivity_figure(samples)
+    return sensitivity.make_sensitivity_table(samples, able), sensitivity.make_sensitivity_figure(
+        samples
+    )
 
 
 def _count_denominators(

@@ -11,7 +11,7 @@ from app.formats.fields import id_to_text
 from app.formats.frame_names import (
     frame_path_by_match,
     frame_path_in_split,
-    key_in_group,
+    prefix_view_key_with_group,
     with_export_key,
 )
 from app.formats.gamestate_reader import sequence_frame_path
@@ -158,7 +158,7 @@ class NamedFrame:
 
 
 @dataclass(frozen=True)
-class FrameNames:
+class FrameNameIndex:
     """Every spelling by which exactly one frame is meant.
 
     A broadcast frame is ``<match>/7_1.png``, with or without the folders before the match, its
@@ -179,7 +179,7 @@ class FrameNames:
     _views: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
 
     @staticmethod
-    def of(frames: Iterable[NamedFrame]) -> FrameNames:
+    def of(frames: Iterable[NamedFrame]) -> FrameNameIndex:
         """The index of a dataset's frames."""
         known = {frame.id: frame for frame in frames}
         index: dict[str, int] = {}
@@ -196,35 +196,35 @@ class FrameNames:
                 other = index.setdefault(name, frame.id)
                 if other != frame.id:
                     index[name] = _SEVERAL
-            for number in _numbers_of_frame(frame):
+            for number in _parse_frame_numbers(frame):
                 if numbered.setdefault(number, frame.id) != frame.id:
                     numbered[number] = _SEVERAL
             if not frame.station:
-                views.setdefault(_without_ending(frame.view), []).append(frame.id)
+                views.setdefault(_strip_suffix(frame.view), []).append(frame.id)
         by_station = {key: tuple(ids) for key, ids in stations.items()}
         rigs = {
             key: tuple(ids)
             for key, ids in views.items()
             if len(ids) > 1 and len({known[identity].match for identity in ids}) == 1
         }
-        return FrameNames(known, by_station, index, frozenset(telling), numbered, rigs)
+        return FrameNameIndex(known, by_station, index, frozenset(telling), numbered, rigs)
 
     def find(self, name: str) -> NamedFrame | None:
         """The one frame that a name means, or None.
 
         Folders before a known match do not matter: ``/data/labels/test/<match>/7_1.txt``.
         """
-        identity = self._lookup(name)
+        identity = self._find_frame_id(name)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
-    def find_number(self, text: str) -> NamedFrame | None:
+    def find_by_number(self, text: str) -> NamedFrame | None:
         """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
         number = _parse_number(text)
         identity = None if number is None else self._numbered.get(number)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
     def explain_unknown_number(self, text: str) -> str:
-        """Why ``find_number`` found nothing, in words."""
+        """Why ``find_by_number`` found nothing, in words."""
         if _parse_number(text) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
         return "is not a number that the name of a picture of the dataset has"
@@ -238,23 +238,23 @@ class FrameNames:
 
     def explain_unknown(self, name: str) -> str:
         """Why ``find`` found nothing, in words."""
-        if self._lookup(name) == _SEVERAL:
+        if self._find_frame_id(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"
-        if _without_ending(name).rsplit("/", 1)[-1] in self._index:
+        if _strip_suffix(name).rsplit("/", 1)[-1] in self._index:
             return "is not a frame of the dataset: its folders name none of the matches"
         return "is not a frame of the dataset"
 
-    def of_station(self, name: str) -> tuple[int, ...]:
+    def find_station_frames(self, name: str) -> tuple[int, ...]:
         """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""
-        last = _without_ending(name).rsplit("/", 1)[-1]
+        last = _strip_suffix(name).rsplit("/", 1)[-1]
         return (
             self.stations.get(last)
-            or self._views.get(_without_ending(name))
+            or self._views.get(_strip_suffix(name))
             or self._views.get(last, ())
         )
 
-    def _lookup(self, name: str) -> int | None:
-        parts = _without_ending(name).split("/")
+    def _find_frame_id(self, name: str) -> int | None:
+        parts = _strip_suffix(name).split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
             # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
@@ -271,16 +271,16 @@ def _parse_number(text: str) -> int | None:
     return int(found[0]) if found else None
 
 
-def _without_ending(name: str) -> str:
+def _strip_suffix(name: str) -> str:
     return _SUFFIX.sub("", name.replace("\\", "/").strip().strip("/"))
 
 
 def _distinguishing_names(frame: NamedFrame) -> set[str]:
     """Names that tell the match of a frame, or the group where it has no match."""
     view, group, match = (
-        _without_ending(frame.view),
-        _without_ending(frame.group),
-        _without_ending(frame.match),
+        _strip_suffix(frame.view),
+        _strip_suffix(frame.group),
+        _strip_suffix(frame.match),
     )
     last = match.rsplit("/", 1)[-1]
     places = {match, last} if _MATCH in last else {match}
@@ -289,37 +289,37 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
         names = {f"{place}/{name}" for place in places for name in within}
     else:
         names = within if frame.station else {f"{group}/{view}"}
-    return _joined_names(names) | {name for name in _exported_names(frame) if name}
+    return _add_separator_variants(names) | {name for name in _exported_names(frame) if name}
 
 
 def _names_within_dataset(frame: NamedFrame) -> set[str]:
     """Names that another match could have as well."""
-    last = _without_ending(frame.match).rsplit("/", 1)[-1]
+    last = _strip_suffix(frame.match).rsplit("/", 1)[-1]
     within = _names_within_match(frame)
     pictures = {
-        _without_ending(frame.picture),
-        _without_ending(frame.picture).rsplit("/", 1)[-1],
+        _strip_suffix(frame.picture),
+        _strip_suffix(frame.picture).rsplit("/", 1)[-1],
     } - {""}
-    return pictures | _joined_names(
+    return pictures | _add_separator_variants(
         within | ({f"{last}/{name}" for name in within} if last else set())
     )
 
 
 def _names_within_match(frame: NamedFrame) -> set[str]:
     """Names of a frame within its match."""
-    view, group = _without_ending(frame.view), _without_ending(frame.group)
+    view, group = _strip_suffix(frame.view), _strip_suffix(frame.group)
     return {f"{view}/{group}", f"{group}/{view}"} if frame.station else {view}
 
 
-def _joined_names(names: set[str]) -> set[str]:
+def _add_separator_variants(names: set[str]) -> set[str]:
     return names | {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
 
 
-def _numbers_of_frame(frame: NamedFrame) -> set[int]:
+def _parse_frame_numbers(frame: NamedFrame) -> set[int]:
     """Numbers that a frame's view, picture or (static camera) group is called by."""
-    names = {_without_ending(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
+    names = {_strip_suffix(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
     if frame.station:
-        names = {_without_ending(frame.group)}
+        names = {_strip_suffix(frame.group)}
     found = (_NUMBER.fullmatch(name) for name in names)
     return {int(match[1]) for match in found if match}
 
@@ -329,14 +329,16 @@ def _exported_names(frame: NamedFrame) -> Iterator[str]:
     station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
     view = View(frame.view, station)
     group = Group(frame.group, (view,), match=frame.match)
-    in_group, flat = (with_export_key(view, key_in_group(group, view, glue)) for glue in "/_")
+    in_group, flat = (
+        with_export_key(view, prefix_view_key_with_group(group, view, glue)) for glue in "/_"
+    )
     for called in (view, in_group):
-        yield _without_ending(frame_path_by_match(group, called, "", ".jpg"))
+        yield _strip_suffix(frame_path_by_match(group, called, "", ".jpg"))
     for called in (view, flat):
-        yield _without_ending(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])
-    yield _without_ending(frame_path_in_split(group, view, "", ".jpg").rsplit("/", 1)[-1])
+        yield _strip_suffix(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])
+    yield _strip_suffix(frame_path_in_split(group, view, "", ".jpg").rsplit("/", 1)[-1])
     for called in (view, in_group):
-        lines = _without_ending(line_frame_path(group, called, "", ".jpg").rsplit("/", 1)[-1])
+        lines = _strip_suffix(line_frame_path(group, called, "", ".jpg").rsplit("/", 1)[-1])
         # A plain number tells no match, and a static camera has one file of lines.
-        if not frame.station and lines != _without_ending(frame.view).rsplit("/", 1)[-1]:
+        if not frame.station and lines != _strip_suffix(frame.view).rsplit("/", 1)[-1]:
             yield lines

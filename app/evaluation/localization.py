@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.evaluation.bootstrap import Resamples
+from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.frame import Detection, Frame, JudgedFrame, iou
 from app.evaluation.result import (
     Axis,
@@ -17,8 +17,8 @@ from app.evaluation.result import (
     Figure,
     FrameRange,
     FrameResult,
-    Mark,
     Panel,
+    ReferenceLine,
     Row,
     Series,
     Table,
@@ -45,7 +45,8 @@ def measure_frame(
     hit = next((found for found in sure if truth is not None and iou(found.box, truth) > 0), None)
     distance = _distance_from_camera(frame)
     own, other = (
-        _place_errors(frame, camera, best, hit, diameter_m) for camera in (frame.camera, predicted)
+        _measure_hit_and_best_errors(frame, camera, best, hit, diameter_m)
+        for camera in (frame.camera, predicted)
     )
     return FrameResult(
         frame_id=frame.id,
@@ -90,7 +91,7 @@ def measure_position_error(
     return error if np.isfinite(error) else None
 
 
-def _place_errors(
+def _measure_hit_and_best_errors(
     frame: Frame,
     camera: Camera | None,
     best: Detection | None,
@@ -136,8 +137,8 @@ SOURCES = (
 """Name, words, and the fields of ``FrameResult`` for the two ways to choose a detection."""
 
 
-def localization_table(
-    frames: Sequence[FrameResult], resamples: Resamples, *, predicted: bool
+def make_localization_table(
+    frames: Sequence[FrameResult], resamples: MatchResamples, *, predicted: bool
 ) -> Table:
     """Two rows per kind of camera: as the paper counts, and over all frames.
 
@@ -153,8 +154,8 @@ def localization_table(
     balls = [frame for frame in frames if frame.ball and frame.distance_m is not None]
     rows = []
     for name, label, error, percent, any_error in SOURCES[: 1 + predicted]:
-        rows.append(_row_of_hits(balls, name, label, error, percent, resamples))
-        rows.append(_row_of_all_frames(balls, name, label, any_error, resamples))
+        rows.append(_make_hits_row(balls, name, label, error, percent, resamples))
+        rows.append(_make_all_frames_row(balls, name, label, any_error, resamples))
     note = (
         f"{plural(len(balls), 'frame')} with a 3D ball. MAE and median are over the frames whose detection "
         f"has a place; IoU > 0 rows leave out frames without an overlapping detection."
@@ -168,10 +169,12 @@ def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: 
     places = (np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     series = []
     for name, label, error, _percent, any_error in SOURCES[: 1 + predicted]:
-        placed = _known_values(balls, error)
-        missed = _known_values(balls, any_error)
-        series.append(_share_within_series(name, label, placed, len(placed), places, error))
-        everywhere = _share_within_series(
+        placed = _list_known_values(balls, error)
+        missed = _list_known_values(balls, any_error)
+        series.append(
+            _make_share_within_distance_series(name, label, placed, len(placed), places, error)
+        )
+        everywhere = _make_share_within_distance_series(
             f"{name}_all", f"{label}, all frames", missed, len(balls), places, any_error
         )
         series.append(replace(everywhere, kind="dashed"))
@@ -180,67 +183,67 @@ def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: 
         Axis("Distance from the ball", "m", 0.0, FARTHEST_M),
         Axis("Share of frames", "", 0.0, 1.0),
         tuple(series),
-        (Mark("x", NEAR_M, "2 m"),),
+        (ReferenceLine("x", NEAR_M, "2 m"),),
     )
     note = f"Solid: {OVERLAPPING}. Dashed: {EVERYWHERE} ({len(balls)})."
     return Figure("precision_distance", "Precision against distance", (panel,), note)
 
 
-def _row_of_hits(
+def _make_hits_row(
     balls: Sequence[FrameResult],
     name: str,
     label: str,
     error: str,
     percent: str,
-    resamples: Resamples,
+    resamples: MatchResamples,
 ) -> Row:
     kept = [frame for frame in balls if getattr(frame, error) is not None]
     matches = [frame.match for frame in kept]
-    values, shares = _known_values(kept, error), _known_values(kept, percent)
+    values, shares = _list_known_values(kept, error), _list_known_values(kept, percent)
     near = [float(value < NEAR_M) for value in values]
     cells = (
         resamples.mean(values, matches, len(balls)),
         resamples.mean(shares, matches, len(balls)),
         resamples.mean(near, matches, len(balls)),
-        _median_cell(values, len(balls)),
+        _make_median_cell(values, len(balls)),
     )
     return Row(name, f"{label}, IoU > 0", cells, FrameRange(error))
 
 
-def _row_of_all_frames(
-    balls: Sequence[FrameResult], name: str, label: str, error: str, resamples: Resamples
+def _make_all_frames_row(
+    balls: Sequence[FrameResult], name: str, label: str, error: str, resamples: MatchResamples
 ) -> Row:
     kept = [frame for frame in balls if getattr(frame, error) is not None]
-    values, matches = _known_values(kept, error), [frame.match for frame in kept]
+    values, matches = _list_known_values(kept, error), [frame.match for frame in kept]
     percent = [
         100 * value / frame.distance_m
         for value, frame in zip(values, kept, strict=True)
         if frame.distance_m
     ]
-    near = [float(_is_near(getattr(frame, error))) for frame in balls]
+    near = [float(_is_error_within_limit(getattr(frame, error))) for frame in balls]
     cells = (
         resamples.mean(values, matches, len(balls)),
         resamples.mean(percent, matches, len(balls)),
         resamples.mean(near, [frame.match for frame in balls]),
-        _median_cell(values, len(balls)),
+        _make_median_cell(values, len(balls)),
     )
     return Row(f"{name}_all", f"{label}, all frames", cells, FrameRange("distance_m"))
 
 
-def _is_near(error: float | None) -> bool:
+def _is_error_within_limit(error: float | None) -> bool:
     return error is not None and error < NEAR_M
 
 
-def _known_values(frames: Sequence[FrameResult], field: str) -> list[float]:
+def _list_known_values(frames: Sequence[FrameResult], field: str) -> list[float]:
     found = (getattr(frame, field) for frame in frames)
     return [value for value in found if value is not None]
 
 
-def _median_cell(values: Sequence[float], whole: int) -> Cell:
+def _make_median_cell(values: Sequence[float], whole: int) -> Cell:
     return Cell(float(np.median(values)) if values else None, count=len(values), of=whole)
 
 
-def _share_within_series(
+def _make_share_within_distance_series(
     name: str, label: str, values: Sequence[float], of: int, places: np.ndarray, field: str
 ) -> Series:
     ordered = np.sort(np.asarray(values, dtype=float))

@@ -12,7 +12,7 @@ Four formats, each a file, a folder or a zip:
           replay`` as in SNv3D.csv, in ``image`` or ``file_name``, or in ``frame`` (with ``camera``);
           the box in ``ball_bbox`` (``[x, y, w, h]``), ``x, y, w, h``, corners or centre and size;
           ``score`` may be missing. MOT's text files, too.
-``tracks`` The ball in 3D over time (``track_files``).
+``tracks`` The ball in 3D over time (``track_cameras_of_clip``).
 
 Names count before numbers. What is wrong is reported with file, record and field, and left out; frames that the dataset does
 not have are counted and listed. Nothing is evaluated.
@@ -28,26 +28,26 @@ from pathlib import Path, PurePosixPath
 from typing import Any, get_args
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNameIndex, NamedFrame
 from app.evaluation.prediction_run import (
     FieldError,
-    PredictionRun,
-    ReadPredictions,
-    in_field,
-    noted,
+    LoadedPredictions,
+    PredictionCollector,
+    raise_as_field_error,
     read_field,
+    report_invalid_record,
 )
-from app.evaluation.prediction_table import is_ball_table, is_mot, read_table, read_tracks
+from app.evaluation.prediction_table import is_ball_table, is_mot_text, read_table, read_tracks
 from app.formats import fields
-from app.formats.ball_names import is_ball
+from app.formats.ball_names import is_ball_name
 from app.formats.cameras import read_cameras
 from app.formats.fields import IdIndex, id_to_text
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits
 from app.formats.json_reader import describe_document, read_json, read_json_lines
 from app.formats.report import ReaderReport
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.geometry.camera import Camera
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 from app.soccer.picture import size_centred_on_principal_point
@@ -70,7 +70,7 @@ _NOT_LABELS = frozenset({"classes.txt", "readme.txt", "license.txt", "licence.tx
 
 
 @dataclass
-class ReadPredictedCameras:
+class LoadedPredictedCameras:
     """Cameras by id of the frame, at the annotated size, and what was wrong."""
 
     cameras: dict[int, Camera] = field(default_factory=dict)
@@ -82,13 +82,13 @@ class ReadPredictedCameras:
 def read_predictions(
     path: Path,
     format: str,  # noqa: A002
-    names: FrameNames,
+    names: FrameNameIndex,
     *,
     category: int | None = None,
     size: ImageSize | None = None,
     images: Path | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> ReadPredictions:
+    limits: ImportLimits = DEFAULT_LIMITS,
+) -> LoadedPredictions:
     """Read ball boxes.
 
     Args:
@@ -108,29 +108,29 @@ def read_predictions(
             f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)} and {AUTO}',
             pointer="/format",
         )
-    kind = _kind_by_ending(path, limits) if format == AUTO else format
-    run = PredictionRun(names, category, size)
-    with open_tree_while_read(path, run.found.report, limits) as tree:
+    kind = _guess_format_from_suffixes(path, limits) if format == AUTO else format
+    run = PredictionCollector(names, category, size)
+    with open_tree_context(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
         run.found.format = kind
         if images is not None and kind != "coco":
-            raise _unused_option_error("images", "a COCO document with the image list", kind)
+            raise _make_unused_option_error("images", "a COCO document with the image list", kind)
         if size is not None and kind == "yolo":
-            raise _unused_option_error(
+            raise _make_unused_option_error(
                 "size", "an image size: its coordinates are fractions of the image size", kind
             )
         if kind == "tracks":
             if size is not None or category is not None:
                 option = "size" if size is not None else "category"
-                raise _unused_option_error(
+                raise _make_unused_option_error(
                     option, f"a {option}: its rows are positions on the pitch", kind
                 )
             run.found.tracks = read_tracks(tree, path, run.found.report, limits)
             return run.found
         if kind == "coco":
-            beside = [] if images is None else _read_document(images, run, limits)
-            _read_coco(_json_documents(tree, path, run.found.report), run, beside)
+            beside = [] if images is None else _read_json_documents(images, run, limits)
+            _read_coco(_parse_json_documents(tree, path, run.found.report), run, beside)
         elif kind == "yolo":
             _read_yolo(tree, path, run)
         else:
@@ -139,7 +139,7 @@ def read_predictions(
     return run.found
 
 
-def _unused_option_error(option: str, what: str, kind: str) -> InputError:
+def _make_unused_option_error(option: str, what: str, kind: str) -> InputError:
     return InputError(
         f"predictions in the format {kind} do not use {what}",
         hint=f"Leave {option} out.",
@@ -147,10 +147,10 @@ def _unused_option_error(option: str, what: str, kind: str) -> InputError:
     )
 
 
-def _kind_by_ending(path: Path, limits: Limits) -> str:
+def _guess_format_from_suffixes(path: Path, limits: ImportLimits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
     # What is wrong is reported by whoever reads them then.
-    with open_tree_while_read(path, ReaderReport(), limits) as tree:
+    with open_tree_context(path, ReaderReport(), limits) as tree:
         names = [] if tree is None else tree.names()
         endings = {PurePosixPath(name).suffix.lower() for name in names}
         kind = next((kind for ending, kind in ENDINGS if ending in endings), "coco")
@@ -162,17 +162,17 @@ def _kind_by_ending(path: Path, limits: Limits) -> str:
         if tree is not None and kind == "yolo":
             first = next(name for name in names if name.lower().endswith(".txt"))
             # MOT's files end as YOLO's do.
-            return "csv" if is_mot(tree.read_bytes(first)) else kind
+            return "csv" if is_mot_text(tree.read_bytes(first)) else kind
     return kind
 
 
 def read_predicted_cameras(
     path: Path,
-    names: FrameNames,
+    names: FrameNameIndex,
     *,
     size: ImageSize | None = None,
-    limits: Limits = DEFAULT_LIMITS,
-) -> ReadPredictedCameras:
+    limits: ImportLimits = DEFAULT_LIMITS,
+) -> LoadedPredictedCameras:
     """Read camera files; one called like a static camera, or like views of one match, serves all of them.
 
     Args:
@@ -184,7 +184,7 @@ def read_predicted_cameras(
     Raises:
         InputError: No camera could be read.
     """
-    found = ReadPredictedCameras()
+    found = LoadedPredictedCameras()
     sizes: dict[str, ImageSize] = {}
     cameras = read_cameras(path, found.report, limits, sizes)
     if not cameras:
@@ -192,7 +192,7 @@ def read_predicted_cameras(
         raise found.report.problems[0] if found.report.problems else problem
     for name, camera in cameras.items():
         frame = names.find(name)
-        ids = (frame.id,) if frame is not None else names.of_station(name)
+        ids = (frame.id,) if frame is not None else names.find_station_frames(name)
         if not ids:
             found.unknown[name] += 1
             found.reasons[name] = names.explain_unknown(name)
@@ -221,14 +221,14 @@ Documents = list[tuple[str, Any]]
 """JSON lists and objects, each with the name of its file."""
 
 
-def _read_document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
-    with open_tree_while_read(path, run.found.report, limits) as tree:
+def _read_json_documents(path: Path, run: PredictionCollector, limits: ImportLimits) -> Documents:
+    with open_tree_context(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
-        return _json_documents(tree, path, run.found.report)
+        return _parse_json_documents(tree, path, run.found.report)
 
 
-def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> None:
+def _read_coco(documents: Documents, run: PredictionCollector, beside: Documents) -> None:
     # What was handed over counts before what lies beside the results.
     known = _CocoImages.of([*beside, *documents], run.found.report)
     several = any(isinstance(value, list) for _name, value in documents)
@@ -241,11 +241,11 @@ def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> N
             raise DatasetFormatError(shown, None, "annotations", "is not a list")
         for number, item in enumerate(annotations):
             run.found.report.read += 1
-            with noted(run.found.report, shown, f"result {number}"):
-                _add_coco(run, item, known)
+            with report_invalid_record(run.found.report, shown, f"result {number}"):
+                _add_coco_result(run, item, known)
 
 
-def _json_documents(tree: FileTree, path: Path, report: ReaderReport) -> Documents:
+def _parse_json_documents(tree: FileTree, path: Path, report: ReaderReport) -> Documents:
     found = []
     other = None
     for name in tree.names():
@@ -296,33 +296,33 @@ class _CocoImages:
         sizes: dict[str, ImageSize] = {}
         balls = False
         for shown, value in documents:
-            for number, item in enumerate(_list_of_name(value, "images")):
-                with noted(report, shown, f"image {number}"):
+            for number, item in enumerate(_get_list_field(value, "images")):
+                with report_invalid_record(report, shown, f"image {number}"):
                     image = fields.require_object(item)
                     name = str(image.get("file_name", ""))
-                    with noted(report, shown, f"image {number}"):
+                    with report_invalid_record(report, shown, f"image {number}"):
                         if image.get("width") and image.get("height"):
                             sides = (
                                 read_field(image, side, fields.parse_whole_number)
                                 for side in ("width", "height")
                             )
                             sizes[name] = ImageSize(*sides)
-                    _add_id(names, image, name)
-            for number, item in enumerate(_list_of_name(value, "categories")):
-                with noted(report, shown, f"category {number}"):
+                    _index_name_by_id(names, image, name)
+            for number, item in enumerate(_get_list_field(value, "categories")):
+                with report_invalid_record(report, shown, f"category {number}"):
                     category = fields.require_object(item)
                     name = str(category.get("name", ""))
-                    _add_id(classes, category, name)
-                    balls = balls or is_ball(name)
+                    _index_name_by_id(classes, category, name)
+                    balls = balls or is_ball_name(name)
         return _CocoImages(names, sizes, classes if balls else IdIndex())
 
 
-def _list_of_name(value: Any, name: str) -> list[Any]:
+def _get_list_field(value: Any, name: str) -> list[Any]:
     found = value.get(name) if isinstance(value, dict) else None
     return found if isinstance(found, list) else []
 
 
-def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
+def _index_name_by_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
     """Add the name of an image or a class by its id.
 
     Raises:
@@ -331,14 +331,16 @@ def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
     value = item.get("id")
     if not index.add(value, name) and (known := index.find(value)) != name:
         known_as = (
-            None if known is None else f"is {id_to_text(value)}, which is {quoted(known)} already"
+            None
+            if known is None
+            else f"is {id_to_text(value)}, which is {quote_text(known)} already"
         )
         raise FieldError(
             "id", f"{known_as or 'must be a number or a string'}; this entry is left out"
         )
 
 
-def _image_id_text(value: Any) -> str:
+def _format_image_id(value: Any) -> str:
     """An id of an image as text, 1.0 like 1.
 
     Raises:
@@ -350,7 +352,7 @@ def _image_id_text(value: Any) -> str:
     return text
 
 
-def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, str]:
+def _read_class(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, str]:
     """The id of the class of a result, and what a document calls it."""
     if "category_id" not in value:
         return 1, known.classes.find(1) or ""
@@ -364,16 +366,16 @@ def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, 
         return text, label
 
 
-def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
+def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) -> None:
     value = fields.require_object(item)
     own = next((name for field in _NAMES if isinstance(name := value.get(field), str) and name), "")
     identity = ""
     if not own or value.get("image_id") is not None:
-        with in_field("image_id"):
-            identity = _image_id_text(value.get("image_id"))
+        with raise_as_field_error("image_id"):
+            identity = _format_image_id(value.get("image_id"))
     box = read_field(value, "bbox", lambda item: Box(*fields.parse_numbers(item, 4)))
     score = read_field(value, "score", fields.parse_number) if "score" in value else None
-    if not run.wants(*_class_of(value, known)):
+    if not run.wants(*_read_class(value, known)):
         return
     named = known.names.find(identity) or ""
     if own:
@@ -386,12 +388,12 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
         frame = None
         run.miss(f"image {identity}", _NUMBER_ALONE)
     if frame is not None:
-        with in_field("bbox"):
+        with raise_as_field_error("bbox"):
             run.add(frame, box, score, known.sizes.get(own or named), from_corner=True)
 
 
 def _describe_contradiction(
-    run: PredictionRun, own: str, identity: str, named: str, frame: NamedFrame | None
+    run: PredictionCollector, own: str, identity: str, named: str, frame: NamedFrame | None
 ) -> str | None:
     """Why the name and the number of a result mean two frames, in words; None where they do not."""
     # Ultralytics' number is that of the name, and no id of a document.
@@ -409,7 +411,7 @@ def _describe_contradiction(
     return f'is "{own}", but {found}: two frames'
 
 
-def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
+def _read_yolo(tree: FileTree, path: Path, run: PredictionCollector) -> None:
     names = [
         name
         for name in tree.names()
@@ -424,7 +426,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
             lines = tree.read_bytes(name).decode("utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
             raise DatasetFormatError(shown, None, None, "is not UTF-8 text") from error
-        if is_mot("\n".join(lines[:20]).encode()):
+        if is_mot_text("\n".join(lines[:20]).encode()):
             raise DatasetFormatError(
                 shown, None, None, "is a comma-separated table (MOT): choose the format csv"
             )
@@ -436,20 +438,20 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
         else:
             run.matched = True
         rows.extend((shown, number, frame, cells) for number, cells in boxes)
-    tracked = _has_tracks([cells for _, _, _, cells in rows])
+    tracked = _has_track_ids([cells for _, _, _, cells in rows])
     if tracked:
         run.found.report.note(str(path), None, None, _TRACKED)
     for shown, number, frame, cells in rows:
         run.found.report.read += 1
-        with noted(run.found.report, shown, f"line {number}"):
-            _add_yolo(run, frame, cells, tracked)
+        with report_invalid_record(run.found.report, shown, f"line {number}"):
+            _add_yolo_row(run, frame, cells, tracked)
 
 
 _TRACK = re.compile(r"\d{1,18}", re.ASCII)
 _TRACKED = "the sixth number is the id of a track and no confidence: its boxes count as sure"
 
 
-def _has_tracks(rows: list[list[str]]) -> bool:
+def _has_track_ids(rows: list[list[str]]) -> bool:
     """Whether the last of six numbers is the id of a track, as a tracker writes it without confidence.
 
     All of them are whole then, and one is beyond 1.
@@ -458,8 +460,8 @@ def _has_tracks(rows: list[list[str]]) -> bool:
     return bool(last) and all(map(_TRACK.fullmatch, last)) and any(int(cell) > 1 for cell in last)
 
 
-def _add_yolo(
-    run: PredictionRun, frame: NamedFrame | None, cells: list[str], tracked: bool
+def _add_yolo_row(
+    run: PredictionCollector, frame: NamedFrame | None, cells: list[str], tracked: bool
 ) -> None:
     if len(cells) not in (5, 6, 7):
         raise ValueError(
@@ -474,5 +476,5 @@ def _add_yolo(
         return
     across, down = frame.size.width, frame.size.height
     box = Box((x - width / 2) * across, (y - height / 2) * down, width * across, height * down)
-    with in_field("cx, cy, w, h"):
+    with raise_as_field_error("cx, cy, w, h"):
         run.add(frame, box, score, frame.size, from_corner=True)

@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.errors import InputError
-from app.evaluation.frame import Detection, FrameNames, NamedFrame
-from app.formats.ball_names import is_ball
+from app.evaluation.frame import Detection, FrameNameIndex, NamedFrame
+from app.formats.ball_names import is_ball_name
 from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
-from app.soccer.frames import Box, ImageSize, box_from_corner, box_to_corner
+from app.soccer.frames import Box, ImageSize, box_from_corner_origin, box_to_corner_origin
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ T = TypeVar("T")
 
 
 @dataclass
-class ReadPredictions:
+class LoadedPredictions:
     """What a file held, by id of the frame.
 
     Attributes:
@@ -96,12 +96,12 @@ class ReadPredictions:
         return sum(map(len, self.detections.values()))
 
 
-class PredictionRun:
+class PredictionCollector:
     """One file under way: every box passes here on its way to its frame."""
 
-    def __init__(self, names: FrameNames, category: int | None, size: ImageSize | None):
+    def __init__(self, names: FrameNameIndex, category: int | None, size: ImageSize | None):
         self.names, self.category, self.size = names, category, size
-        self.found = ReadPredictions()
+        self.found = LoadedPredictions()
         self.categories: Counter[int | str] = Counter()
         self.labels: dict[int | str, str] = {}
         self.left_out = 0
@@ -120,7 +120,7 @@ class PredictionRun:
 
     def numbered(self, text: str) -> NamedFrame | None:
         """The frame of a number as its picture or view has it in its name, ``4`` for ``0004.jpg``."""
-        found = self.names.find(text) or self.names.find_number(text)
+        found = self.names.find(text) or self.names.find_by_number(text)
         if found is None:
             self.miss(text, self.names.explain_unknown_number(text))
         else:
@@ -137,7 +137,7 @@ class PredictionRun:
         self.categories[category] += 1
         if label:
             self.labels[category] = label
-        wanted = is_ball(label) if self.category is None and label else None
+        wanted = is_ball_name(label) if self.category is None and label else None
         if wanted or (wanted is None and self.category in (None, category)):
             return True
         self.left_out += 1
@@ -181,8 +181,8 @@ class PredictionRun:
         self._near_corner += max(box.x + box.width, box.y + box.height) <= _LARGEST_SHARE
         if from_corner or seen != frame.size:
             # Images are resized about the corner of their first pixel.
-            corner = box if from_corner else box_to_corner(box)
-            box = box_from_corner(_scale_box(corner, seen, frame.size))
+            corner = box if from_corner else box_to_corner_origin(box)
+            box = box_from_corner_origin(_scale_box(corner, seen, frame.size))
         found.append(Detection(box, 1.0 if score is None else score))
 
     def finish(self, path: Path) -> None:
@@ -191,14 +191,14 @@ class PredictionRun:
         unlabelled = [name for name in self.categories if name not in self.labels]
         if self.category is None and len(self.categories) > 1 and unlabelled:
             raise InputError(
-                f"{path.name} contains several classes ({self._classes()})",
+                f"{path.name} contains several classes ({self._describe_classes()})",
                 hint="Name the class of the ball as category.",
                 pointer="/category",
             )
         if self.categories and self.left_out == self.categories.total():
             wanted = "called ball" if self.category is None else f"{self.category}"
             raise InputError(
-                f"{path.name} contains no class {wanted}; its classes are {self._classes()}",
+                f"{path.name} contains no class {wanted}; its classes are {self._describe_classes()}",
                 hint="Name the class of the ball as category.",
                 pointer="/category",
             )
@@ -219,7 +219,7 @@ class PredictionRun:
         if self.left_out:
             report.counts["other classes"] = self.left_out
 
-    def _classes(self) -> str:
+    def _describe_classes(self) -> str:
         """The classes of the file, with their names where it says them."""
         names = sorted(self.categories, key=lambda name: (isinstance(name, str), name))
         return ", ".join(
@@ -260,11 +260,11 @@ class FieldError(ValueError):
 def read_field(value: Mapping[str, Any], name: str, parse: Callable[[Any], T]) -> T:
     if name not in value:
         raise FieldError(name, "is missing")
-    with in_field(name):
+    with raise_as_field_error(name):
         return parse(value[name])
 
 
-class in_field:  # noqa: N801
+class raise_as_field_error:  # noqa: N801
     """Says which field a ValueError is about."""
 
     def __init__(self, name: str):
@@ -278,7 +278,7 @@ class in_field:  # noqa: N801
             raise FieldError(self.name, str(error)) from error
 
 
-class noted:  # noqa: N801
+class report_invalid_record:  # noqa: N801
     """Notes a record that is wrong, and goes on with the next one."""
 
     def __init__(self, report: ReaderReport, path: str, record: str):

@@ -22,17 +22,17 @@ from app.evaluation.frame import NamedFrame
 from app.evaluation.prediction_run import (
     FieldError,
     PredictedTrack,
-    PredictionRun,
-    in_field,
-    noted,
+    PredictionCollector,
+    raise_as_field_error,
     read_field,
+    report_invalid_record,
 )
 from app.formats import fields
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.fields import id_to_text
-from app.formats.file_tree import FileTree, Limits
+from app.formats.file_tree import FileTree, ImportLimits
 from app.formats.report import ReaderReport
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.choices import BallEventKind
 from app.soccer.frames import Box, ImageSize
 
@@ -72,13 +72,13 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _NUMBERS_ONLY = re.compile(rb"\s*[-+.\d][-+.\deE]*(?:\s*,\s*[-+.\d][-+.\deE]*){5,}\s*", re.ASCII)
 
 
-def is_mot(content: bytes) -> bool:
+def is_mot_text(content: bytes) -> bool:
     """Whether a text is MOT's: numbers with commas between them, and no header."""
     first = next((line for line in content[:4096].splitlines() if line.strip()), b"")
     return bool(_NUMBERS_ONLY.fullmatch(first))
 
 
-def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -> None:
+def read_table(tree: FileTree, path: Path, run: PredictionCollector, limits: ImportLimits) -> None:
     """Read the one table of a tree.
 
     Raises:
@@ -87,7 +87,7 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
     names = [name for name in tree.names() if name.lower().endswith((".csv", ".tsv"))]
     if not names:
         texts = [name for name in tree.names() if name.lower().endswith(".txt")]
-        names = [name for name in texts if is_mot(tree.read_bytes(name))]
+        names = [name for name in texts if is_mot_text(tree.read_bytes(name))]
     if len(names) != 1:
         what = "no CSV file" if not names else f"{len(names)} CSV files; give exactly one"
         raise DatasetFormatError(str(path), None, None, f"holds {what}")
@@ -96,10 +96,10 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
     for line, cells in _read_rows(tree.read_bytes(names[0]), shown, limits):
         if columns is None:
             columns = list(cells)
-            if problem := _wrong_columns(columns):
+            if problem := _find_column_problem(columns):
                 raise DatasetFormatError(shown, None, None, problem)
         run.found.report.read += 1
-        with noted(run.found.report, shown, f"line {line}"):
+        with report_invalid_record(run.found.report, shown, f"line {line}"):
             _add_row(run, cells)
     if columns is None:
         raise DatasetFormatError(
@@ -108,10 +108,10 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
 
 
 def _read_rows(
-    content: bytes, shown: str, limits: Limits
+    content: bytes, shown: str, limits: ImportLimits
 ) -> Iterator[tuple[int, Mapping[str, str]]]:
     """The rows with their line numbers, by the plain name of a column."""
-    if is_mot(content):
+    if is_mot_text(content):
         header = ",".join((*_MOT, "x", "y", "z")).encode()
         for line, cells in read_rows(header + b"\n" + content, shown, (), limits):
             boxed = {name: cells.get(name, "") for name in _MOT}
@@ -136,7 +136,7 @@ def _read_rows(
         )
 
 
-def _wrong_columns(columns: Iterable[str]) -> str | None:
+def _find_column_problem(columns: Iterable[str]) -> str | None:
     """Why a table with these columns cannot be read, in words; None where it can."""
     there = set(columns)
     frame = there & {"main_action", *_FRAME_NUMBERS, *_NAMES}
@@ -150,15 +150,15 @@ def _wrong_columns(columns: Iterable[str]) -> str | None:
     return f"has the columns {listed}{more}; {_MEANT}"
 
 
-def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
-    box, where = _row_box(cells)
+def _add_row(run: PredictionCollector, cells: Mapping[str, str]) -> None:
+    box, where = _read_row_box(cells)
     if box is None:
         return
     score_name = next((name for name in SCORES if not is_missing(cells.get(name))), None)
     score = read_field(cells, score_name, fields.parse_number) if score_name else None
     if not _is_ball_row(run, cells):
         return
-    frame = _row_frame(run, cells)
+    frame = _find_row_frame(run, cells)
     if frame is not None:
         size = None
         if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
@@ -166,11 +166,11 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
                 read_field(cells, "img_w", fields.parse_whole_number),
                 read_field(cells, "img_h", fields.parse_whole_number),
             )
-        with in_field(where):
+        with raise_as_field_error(where):
             run.add(frame, box, score, size)
 
 
-def _is_ball_row(run: PredictionRun, cells: Mapping[str, str]) -> bool:
+def _is_ball_row(run: PredictionCollector, cells: Mapping[str, str]) -> bool:
     """Whether the class of a row is the ball's."""
     column = next((name for name in _CLASSES if not is_missing(cells.get(name))), None)
     if column is None:
@@ -185,7 +185,7 @@ def _is_ball_row(run: PredictionRun, cells: Mapping[str, str]) -> bool:
         return run.wants(text, text)
 
 
-def _row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
+def _read_row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
     """The box of a row, None where the row has none; and the columns that it stands in."""
     for name in _BOX:
         if name in cells:
@@ -207,7 +207,7 @@ def _row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
     raise FieldError("ball_bbox", "is missing, and so are x, y, w and h")
 
 
-def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | None:
+def _find_row_frame(run: PredictionCollector, cells: Mapping[str, str]) -> NamedFrame | None:
     """The frame of a row; one that is none is counted."""
     number = next((name for name in _FRAME_NUMBERS if not is_missing(cells.get(name))), None)
     if not is_missing(cells.get("main_action")):
@@ -249,7 +249,7 @@ def is_ball_table(content: bytes) -> bool:
 
 
 def read_tracks(
-    tree: FileTree, path: Path, report: ReaderReport, limits: Limits
+    tree: FileTree, path: Path, report: ReaderReport, limits: ImportLimits
 ) -> dict[str, PredictedTrack]:
     """Predicted tracks by the folders that they lie in, the file at the top under the empty name.
 
@@ -267,24 +267,26 @@ def read_tracks(
         raise DatasetFormatError(str(path), None, None, f"holds {what}")
     found = {}
     for name, folder in zip(names, folders, strict=True):
-        balls = _Balls()
-        _rows_by_track(tree, name, (*_PLACE,), report, limits, balls.add)
+        balls = _PredictedTrackBuilder()
+        _process_track_rows(tree, name, (*_PLACE,), report, limits, balls.add)
         beside = EVENTS if folder == "." else f"{folder}/{EVENTS}"
         events: list[tuple[str, int | None, float | None]] | None = None
         if beside in tables:
             events = []
-            _rows_by_track(tree, beside, ("kind",), report, limits, partial(_add_event, events))
+            _process_track_rows(
+                tree, beside, ("kind",), report, limits, partial(_add_event, events)
+            )
         report.imported += len(balls.position)
         found["" if folder == "." else folder] = balls.track(events)
     return found
 
 
-def _rows_by_track(
+def _process_track_rows(
     tree: FileTree,
     name: str,
     columns: tuple[str, ...],
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
     add: Callable[[Mapping[str, str]], object],
 ) -> None:
     """Hand on the rows of a table; what is wrong with one is noted."""
@@ -293,11 +295,11 @@ def _rows_by_track(
         if "frame" not in row and "time_s" not in row:
             raise DatasetFormatError(shown, None, "frame", "is missing, and so is time_s")
         report.read += 1
-        with noted(report, shown, f"line {line}"):
+        with report_invalid_record(report, shown, f"line {line}"):
             add(row)
 
 
-class _Balls:
+class _PredictedTrackBuilder:
     """The rows of one table, gathered."""
 
     def __init__(self) -> None:
@@ -311,7 +313,7 @@ class _Balls:
         """A row; without a place it is a gap."""
         if all(is_missing(row.get(name)) for name in _PLACE):
             return
-        frame, time = _read_instant(row)
+        frame, time = _read_frame_and_time(row)
         if (frame if frame is not None else time) in self._seen:
             raise FieldError("frame", "has a ball in an earlier row; this row is left out")
         x, y, z = (read_field(row, name, _read_metres) for name in _PLACE)
@@ -333,7 +335,7 @@ class _Balls:
         )
 
 
-def _read_instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
+def _read_frame_and_time(row: Mapping[str, str]) -> tuple[int | None, float | None]:
     frame = (
         None
         if is_missing(row.get("frame"))
@@ -369,5 +371,5 @@ def _read_sigma(row: Mapping[str, str]) -> tuple[float, float, float] | None:
 def _add_event(events: list[tuple[str, int | None, float | None]], row: Mapping[str, str]) -> None:
     kind = row["kind"].strip().lower()
     if kind not in KINDS:
-        raise FieldError("kind", f"is {quoted(kind)}; kinds are {', '.join(KINDS)}")
-    events.append((kind, *_read_instant(row)))
+        raise FieldError("kind", f"is {quote_text(kind)}; kinds are {', '.join(KINDS)}")
+    events.append((kind, *_read_frame_and_time(row)))

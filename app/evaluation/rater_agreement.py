@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from app.evaluation.annotation_distance import GroupDistance, ViewDistance
-from app.evaluation.bootstrap import Resamples, percentile_interval
+from app.evaluation.bootstrap import MatchResamples, percentile_interval
 from app.geometry.arrays import FloatArray
 
 Rated = Sequence[Sequence[Hashable | None]]
@@ -22,7 +22,7 @@ Rated = Sequence[Sequence[Hashable | None]]
 
 
 @dataclass(frozen=True)
-class Coefficient:
+class AgreementCoefficient:
     """One coefficient of agreement.
 
     Attributes:
@@ -43,7 +43,7 @@ class Coefficient:
     items: int
 
 
-def cohen_kappa(first: Sequence[Hashable], second: Sequence[Hashable]) -> Coefficient:
+def cohen_kappa(first: Sequence[Hashable], second: Sequence[Hashable]) -> AgreementCoefficient:
     """Cohen's kappa of two raters who judged the same items.
 
     kappa = (p_o - p_e) / (1 - p_e), with p_o the share of items both call the same, and p_e the
@@ -60,10 +60,10 @@ def cohen_kappa(first: Sequence[Hashable], second: Sequence[Hashable]) -> Coeffi
     parts = np.zeros((len(first), count, count))
     for row, (a, b) in enumerate(zip(first, second, strict=True)):
         parts[row, names[a], names[b]] = 1
-    return _resampled_coefficient("cohen", parts, _cohen_of_tables)
+    return _compute_coefficient_with_interval("cohen", parts, _cohen_kappa_from_tables)
 
 
-def fleiss_kappa(rated: Rated) -> Coefficient:
+def fleiss_kappa(rated: Rated) -> AgreementCoefficient:
     """Fleiss' kappa of items that were judged by equally many people, not always the same.
 
     Args:
@@ -81,10 +81,12 @@ def fleiss_kappa(rated: Rated) -> Coefficient:
     counts = _count_categories(rated)
     raters = counts.sum(axis=1, keepdims=True)
     agreeing = (counts * (counts - 1)).sum(axis=1, keepdims=True) / (raters * (raters - 1))
-    return _resampled_coefficient("fleiss", np.hstack([agreeing, counts / raters]), _fleiss_of_sums)
+    return _compute_coefficient_with_interval(
+        "fleiss", np.hstack([agreeing, counts / raters]), _fleiss_kappa_from_sums
+    )
 
 
-def krippendorff_alpha(rated: Rated) -> Coefficient:
+def krippendorff_alpha(rated: Rated) -> AgreementCoefficient:
     """Krippendorff's alpha of categories, where not everybody judged every item.
 
     alpha = 1 - D_o / D_e over the coincidence matrix o_ck, to which an item with m judgements
@@ -102,57 +104,57 @@ def krippendorff_alpha(rated: Rated) -> Coefficient:
     pairs = counts[:, :, None] * counts[:, None, :]
     places = np.arange(counts.shape[1])
     pairs[:, places, places] -= counts
-    return _resampled_coefficient(
-        "krippendorff", pairs / (judged - 1)[:, None, None], _alpha_of_coincidences
+    return _compute_coefficient_with_interval(
+        "krippendorff", pairs / (judged - 1)[:, None, None], _alpha_from_coincidence_matrices
     )
 
 
-def _resampled_coefficient(
+def _compute_coefficient_with_interval(
     name: Literal["cohen", "fleiss", "krippendorff"],
     parts: FloatArray,
     compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
-) -> Coefficient:
+) -> AgreementCoefficient:
     """A coefficient from each item's part, shape (N, ...), and its interval by resampling."""
     items = len(parts)
     if not items:
-        return Coefficient(name, None, None, None, None, 0)
+        return AgreementCoefficient(name, None, None, None, None, 0)
     value, observed = compute(parts.sum(axis=0)[None])
     keys = [f"{number:09d}" for number in range(items)]
-    counts = Resamples.draw(keys).counts
+    counts = MatchResamples.draw(keys).counts
     low, high = None, None
     if np.isfinite(value[0]) and len(counts):
         sums = (counts @ parts.reshape(items, -1)).reshape(len(counts), *parts.shape[1:])
         low, high = percentile_interval(compute(sums)[0])
     known = float(value[0]) if np.isfinite(value[0]) else None
-    return Coefficient(name, known, low, high, float(observed[0]), items)
+    return AgreementCoefficient(name, known, low, high, float(observed[0]), items)
 
 
-def _cohen_of_tables(table: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cohen_kappa_from_tables(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Kappa and observed agreement of tables of counts, shape (R, K, K)."""
     share = table / table.sum(axis=(1, 2), keepdims=True)
     observed = np.trace(share, axis1=1, axis2=2)
     chance = (share.sum(axis=1) * share.sum(axis=2)).sum(axis=1)
-    return _beyond_chance(observed, chance), observed
+    return _correct_for_chance(observed, chance), observed
 
 
-def _fleiss_of_sums(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _fleiss_kappa_from_sums(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Kappa and observed agreement of sums of agreement and shares, shape (R, 1 + K)."""
     items = sums[:, 1:].sum(axis=1)
     observed = sums[:, 0] / items
     chance = ((sums[:, 1:] / items[:, None]) ** 2).sum(axis=1)
-    return _beyond_chance(observed, chance), observed
+    return _correct_for_chance(observed, chance), observed
 
 
-def _alpha_of_coincidences(coincidences: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _alpha_from_coincidence_matrices(coincidences: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Alpha and observed agreement of coincidence matrices, shape (R, K, K)."""
     totals = coincidences.sum(axis=2)
     judged = totals.sum(axis=1)
     observed = np.trace(coincidences, axis1=1, axis2=2) / judged
     chance = (totals * (totals - 1)).sum(axis=1) / (judged * (judged - 1))
-    return _beyond_chance(observed, chance), observed
+    return _correct_for_chance(observed, chance), observed
 
 
-def _beyond_chance(observed: FloatArray, chance: FloatArray) -> FloatArray:
+def _correct_for_chance(observed: FloatArray, chance: FloatArray) -> FloatArray:
     """(observed - chance) / (1 - chance), NaN where chance alone agrees always."""
     room = 1 - chance
     found = np.full(len(room), np.nan)
@@ -232,7 +234,7 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
-class Spread:
+class MedianAndTail:
     """The middle and the bad end of one measure.
 
     Attributes:
@@ -258,13 +260,13 @@ def find_disagreements(
         verdicts: Of each, None where there is none yet.
         limits: What is allowed.
     """
-    found = list(_disagreements_of_group(distance, verdicts, limits))
+    found = list(_find_group_disagreements(distance, verdicts, limits))
     for view in distance.views:
-        found.extend(_disagreements_of_view(view, limits))
+        found.extend(_find_view_disagreements(view, limits))
     return tuple(sorted(found, key=lambda item: -item.weight))
 
 
-def measure_spreads(distances: Iterable[GroupDistance]) -> dict[str, Spread]:
+def measure_spreads(distances: Iterable[GroupDistance]) -> dict[str, MedianAndTail]:
     """Each of ``MEASURES`` over many groups: of every line, every ball, every view and group."""
     values: dict[str, list[float | None]] = {name: [] for name in MEASURES}
     for distance in distances:
@@ -276,18 +278,20 @@ def measure_spreads(distances: Iterable[GroupDistance]) -> dict[str, Spread]:
             values["diameter_px"].append(None if wider is None else abs(wider))
             values["jac"].extend(view.jac)
             values["position_m"].append(view.position_m)
-    return {name: _median_and_tail(numbers, name == "jac") for name, numbers in values.items()}
+    return {
+        name: _compute_median_and_tail(numbers, name == "jac") for name, numbers in values.items()
+    }
 
 
-def _median_and_tail(numbers: list[float | None], low: bool) -> Spread:
+def _compute_median_and_tail(numbers: list[float | None], low: bool) -> MedianAndTail:
     known = [number for number in numbers if number is not None]
     if not known:
-        return Spread(0)
+        return MedianAndTail(0)
     median, tail = np.quantile(known, [0.5, 0.05 if low else 0.95]).tolist()
-    return Spread(len(known), median, tail)
+    return MedianAndTail(len(known), median, tail)
 
 
-def _disagreements_of_group(
+def _find_group_disagreements(
     distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: AgreementLimits
 ) -> Iterator[Disagreement]:
     first, second = verdicts
@@ -306,7 +310,7 @@ def _disagreements_of_group(
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
 
 
-def _disagreements_of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
+def _find_view_disagreements(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     if view.included[0] != view.included[1]:
         yield Disagreement(
             "view", f"only annotation {'ba'[view.included[0]]} uses the view", view.view
@@ -330,14 +334,14 @@ def _disagreements_of_view(view: ViewDistance, limits: AgreementLimits) -> Itera
     if wider is not None and abs(wider) > limits.diameter_px:
         text = f"the ball of annotation {'b' if wider > 0 else 'a'} is {abs(wider):.1f} px wider"
         yield Disagreement("diameter_px", text, view.view, None, abs(wider), limits.diameter_px)
-    yield from _disagreements_of_lines(view, limits)
-    jac = view.jac_least
+    yield from _find_line_disagreements(view, limits)
+    jac = view.lowest_jac
     if jac is not None and jac < limits.jac:
         text = f"the camera of one annotation fits the lines of the other with JaC {jac:.2f}"
         yield Disagreement("jac", text, view.view, None, jac, limits.jac)
 
 
-def _disagreements_of_lines(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
+def _find_line_disagreements(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     alone = [line for line in view.lines if line.only is not None]
     if len(alone) > limits.markings:
         names = ", ".join(f"{line.marking} (annotation {line.only})" for line in alone)

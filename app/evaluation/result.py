@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from app.errors import InputError
-from app.formats.csv_text import Value, csv_cell
+from app.formats.csv_text import Value, format_csv_cell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -154,7 +154,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Mark:
+class ReferenceLine:
     """A dashed line across the panel; ``axis`` is ``x`` or ``y``."""
 
     axis: Literal["x", "y"]
@@ -170,7 +170,7 @@ class Panel:
     x: Axis
     y: Axis
     series: tuple[Series, ...]
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[ReferenceLine, ...] = ()
     color: Axis | None = None
 
 
@@ -187,13 +187,13 @@ class Figure:
 def figure_to_csv(figure: Figure) -> str:
     """The curves of a figure; the header says what the axes show, with their units."""
     x, y = (
-        _axes_name([panel.x for panel in figure.panels]),
-        _axes_name([panel.y for panel in figure.panels]),
+        _join_axis_labels([panel.x for panel in figure.panels]),
+        _join_axis_labels([panel.y for panel in figure.panels]),
     )
-    color = _axes_name([panel.color for panel in figure.panels if panel.color]) or "color"
+    color = _join_axis_labels([panel.color for panel in figure.panels if panel.color]) or "color"
     header = ("panel", "series", "kind", x or "x", y or "y", "low", "high", "count", color)
-    return _csv_text(
-        (*header, "group_id"), (row for panel in figure.panels for row in _panel_rows(panel))
+    return _format_csv(
+        (*header, "group_id"), (row for panel in figure.panels for row in _list_panel_rows(panel))
     )
 
 
@@ -207,16 +207,16 @@ def table_to_csv(table: Table) -> str:
                      for value in (item.value, item.low, item.high, item.count, item.of))]
         for row in table.rows
     )  # fmt: skip
-    return _csv_text(header, rows)
+    return _format_csv(header, rows)
 
 
-def _axes_name(axes: Sequence[Axis]) -> str:
+def _join_axis_labels(axes: Sequence[Axis]) -> str:
     """The name of a column; panels whose axes differ stand in it one after the other."""
     names = [f"{axis.label} ({axis.unit})" if axis.unit else axis.label for axis in axes]
     return " / ".join(dict.fromkeys(names))
 
 
-def _panel_rows(panel: Panel) -> Iterator[list[Value]]:
+def _list_panel_rows(panel: Panel) -> Iterator[list[Value]]:
     for series in panel.series:
         for place in range(len(series.x)):
             yield [
@@ -225,22 +225,22 @@ def _panel_rows(panel: Panel) -> Iterator[list[Value]]:
                 series.kind,
                 series.x[place],
                 series.y[place],
-                *(_value_at(series, name, place) for name in ("low", "high", "count")),
+                *(_get_series_value(series, name, place) for name in ("low", "high", "count")),
                 series.color,
                 series.group_id,
             ]
 
 
-def _value_at(series: Series, name: str, place: int) -> Value:
+def _get_series_value(series: Series, name: str, place: int) -> Value:
     values: tuple[float, ...] = getattr(series, name)
     return values[place] if values else None
 
 
-def _csv_text(header: tuple[str, ...] | list[str], rows: Iterator[list[Value]]) -> str:
+def _format_csv(header: tuple[str, ...] | list[str], rows: Iterator[list[Value]]) -> str:
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows([csv_cell(value) for value in row] for row in rows)
+    writer.writerows([format_csv_cell(value) for value in row] for row in rows)
     return file.getvalue()
 
 
@@ -369,13 +369,13 @@ def figure_to_png(figure: Figure) -> bytes:
 def _draw_panel(axes: Axes, panel: Panel, title: str) -> None:
     axes.set(title=title, xlabel=_axis_label(panel.x), ylabel=_axis_label(panel.y))
     colors = [item.color for item in panel.series if item.color is not None]
-    scale = _color_scale(axes, colors, panel.color) if colors else None
+    scale = _draw_color_bar(axes, colors, panel.color) if colors else None
     for index, item in enumerate(panel.series):
         color = PALETTE[index % len(PALETTE)] if scale is None else scale.to_rgba(item.color)
         _draw_series(axes, item, color, 2.2 if scale is None else 1.1)
-    _set_limits(axes, panel)
+    _set_axis_limits(axes, panel)
     for mark in panel.marks:
-        _draw_mark(axes, mark)
+        _draw_reference_line(axes, mark)
     handles, labels = axes.get_legend_handles_labels()
     if scale is None and handles:
         axes.legend(handles[:MAX_LEGEND], labels[:MAX_LEGEND])
@@ -393,7 +393,7 @@ def _draw_series(axes: Axes, item: Series, color: Any, width: float) -> None:
         axes.vlines(item.x, item.low, item.high, color=color, linewidth=3)
 
 
-def _color_scale(axes: Axes, colors: list[float], meaning: Axis | None) -> Any:
+def _draw_color_bar(axes: Axes, colors: list[float], meaning: Axis | None) -> Any:
     """What the colours of the curves mean, as a bar beside the axes."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -408,7 +408,7 @@ def _color_scale(axes: Axes, colors: list[float], meaning: Axis | None) -> Any:
     return scale
 
 
-def _set_limits(axes: Axes, panel: Panel) -> None:
+def _set_axis_limits(axes: Axes, panel: Panel) -> None:
     """The ends that the axes shall have, and a few stray points shall not flatten the rest."""
     axes.set_xlim(panel.x.low, panel.x.high)
     axes.set_ylim(panel.y.low, panel.y.high)
@@ -420,7 +420,7 @@ def _set_limits(axes: Axes, panel: Panel) -> None:
             axes.set_ylim(low, high)
 
 
-def _draw_mark(axes: Axes, mark: Mark) -> None:
+def _draw_reference_line(axes: Axes, mark: ReferenceLine) -> None:
     across = mark.axis == "x"
     (axes.axvline if across else axes.axhline)(mark.at, color=MARK, linestyle="--", linewidth=1.4)
     place = (mark.at, 0.97) if across else (0.01, mark.at)

@@ -77,7 +77,7 @@ def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
     origin = position_from_diameter(camera, center, diameter, diameter_m)
     step = np.array([frame.size.diagonal / 100, 0.0])
 
-    def moved(shift: float, percent: float) -> float:
+    def measure_displacement(shift: float, percent: float) -> float:
         place = position_from_diameter(
             camera, center + shift * step, diameter * (1 + percent / 100), diameter_m
         )
@@ -87,8 +87,8 @@ def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
     return BallSample(
         frame,
         float(np.linalg.norm(origin - camera.position)),
-        np.array([moved(0.0, percent) for percent in make_size_changes()]),
-        np.array([moved(shift, 0.0) for shift in make_centre_shifts()]),
+        np.array([measure_displacement(0.0, percent) for percent in make_size_changes()]),
+        np.array([measure_displacement(shift, 0.0) for shift in make_centre_shifts()]),
         size_slope * diameter / 100,
         shift_slope * frame.size.diagonal / 100,
     )
@@ -104,7 +104,7 @@ def error_slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, fl
     half = np.array([0.0, box.diameter / 2])
     center = np.array(box.center)
     if camera.is_wide:
-        return _wide_slopes(camera, center, box.diameter, diameter_m)
+        return _error_slopes_of_wide_lens(camera, center, box.diameter, diameter_m)
     pixels = np.vstack([center, center + half, center - half])
     ideal = camera.pixel_to_ideal(pixels)
     inverse = np.linalg.inv(camera.model.jacobian(ideal, camera.distortion)) @ np.linalg.inv(
@@ -114,30 +114,30 @@ def error_slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, fl
     gap = float(np.linalg.norm(apart))
     ray = np.append(ideal[0], 1.0)
 
-    def slope(of_ray: FloatArray, of_ends: FloatArray) -> float:
+    def compute_slope(of_ray: FloatArray, of_ends: FloatArray) -> float:
         of_gap = float(apart @ of_ends) / gap
         return float(np.linalg.norm(np.append(of_ray, 0.0) - ray * of_gap / gap)) * diameter_m / gap
 
     down, along = np.array([0.0, 0.5]), np.array([1.0, 0.0])
-    by_diameter = slope(np.zeros(2), inverse[1] @ down + inverse[2] @ down)
-    by_shift = slope(inverse[0] @ along, (inverse[1] - inverse[2]) @ along)
+    by_diameter = compute_slope(np.zeros(2), inverse[1] @ down + inverse[2] @ down)
+    by_shift = compute_slope(inverse[0] @ along, (inverse[1] - inverse[2]) @ along)
     return by_diameter, by_shift
 
 
-def _wide_slopes(
+def _error_slopes_of_wide_lens(
     camera: Camera, center: FloatArray, diameter: float, diameter_m: float
 ) -> tuple[float, float]:
     """``error_slopes`` through a wide lens: along the ray exactly, along a row by central differences."""
 
-    def place(shift: float) -> FloatArray:
+    def locate_ball(shift: float) -> FloatArray:
         moved = center + np.array([shift, 0.0])
         return position_from_diameter(camera, moved, diameter, diameter_m)
 
-    away = float(np.linalg.norm(place(0.0) - camera.position))
-    return away / diameter, float(np.linalg.norm(place(0.5) - place(-0.5)))
+    away = float(np.linalg.norm(locate_ball(0.0) - camera.position))
+    return away / diameter, float(np.linalg.norm(locate_ball(0.5) - locate_ball(-0.5)))
 
 
-def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
+def make_sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
     """Both panels, a curve per ball coloured by its distance, the derivative dashed beside it."""
     color = Axis("Distance to the camera", "m")
     size = Panel(
@@ -147,7 +147,9 @@ def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _curve_and_slope(item, make_size_changes(), item.by_size, item.size_slope)
+            for line in _make_curve_and_slope_series(
+                item, make_size_changes(), item.by_size, item.size_slope
+            )
         ),
         color=color,
     )
@@ -158,7 +160,7 @@ def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _curve_and_slope(
+            for line in _make_curve_and_slope_series(
                 item, make_centre_shifts(), item.by_shift, item.shift_slope
             )
         ),
@@ -168,11 +170,11 @@ def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
     return Figure("sensitivity", "Sensitivity of the ball from one view", (size, shift), note)
 
 
-def sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
+def make_sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
     """How far the ball moves at the ends of both curves, and what that has to do with distance."""
     rows = (
-        _sensitivity_row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
-        _sensitivity_row(
+        _make_sensitivity_row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
+        _make_sensitivity_row(
             "shift", f"Centre ± {SHIFT_PERCENT:g} % of the diagonal", samples, able, SHIFT_PERCENT
         ),
     )
@@ -190,7 +192,7 @@ def sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
     return Table("sensitivity", "Sensitivity", columns, rows, note)
 
 
-def _sensitivity_row(
+def _make_sensitivity_row(
     name: str, label: str, samples: Sequence[BallSample], able: int, percent: float
 ) -> Row:
     curves = [item.by_size if name == "size" else item.by_shift for item in samples]
@@ -211,7 +213,7 @@ def _sensitivity_row(
     return Row(name, label, cells)
 
 
-def _curve_and_slope(
+def _make_curve_and_slope_series(
     item: BallSample, places: FloatArray, moved: FloatArray, slope: float
 ) -> tuple[Series, ...]:
     name = f"{item.frame.group} {item.frame.view}"

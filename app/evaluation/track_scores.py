@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from app.errors import InputError
-from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
+from app.evaluation.bootstrap import RESAMPLES, SEED, MatchResamples
 from app.evaluation.prediction_run import PredictedTrack
 from app.evaluation.prediction_table import KINDS
 from app.evaluation.result import (
@@ -18,8 +18,8 @@ from app.evaluation.result import (
     Column,
     Evaluation,
     Figure,
-    Mark,
     Panel,
+    ReferenceLine,
     Row,
     Series,
     Table,
@@ -61,7 +61,7 @@ _MODES = (("flight", "In the air"), ("roll", "On the grass"))
 
 
 @dataclass(frozen=True)
-class TrueTrack:
+class GroundTruthTrack:
     """The ball over a stretch, as people accepted it.
 
     Attributes:
@@ -91,7 +91,7 @@ class TrueTrack:
 
 
 @dataclass
-class _Compared:
+class _TrackComparison:
     """True frames with a ball, one after the other, beside what was predicted for them.
 
     Attributes:
@@ -116,7 +116,7 @@ class _Compared:
 
 
 def evaluate_tracks(
-    truth: Sequence[TrueTrack], predicted: Mapping[str, PredictedTrack]
+    truth: Sequence[GroundTruthTrack], predicted: Mapping[str, PredictedTrack]
 ) -> Evaluation:
     """Tables and figures of predicted tracks.
 
@@ -129,7 +129,7 @@ def evaluate_tracks(
         InputError: Nothing that is predicted is of an instant with a true ball.
     """
     own, unknown = _match_tracks(truth, predicted)
-    found = _Compared()
+    found = _TrackComparison()
     for track in truth:
         _compare_track(found, track, own.get(track.key))
     error = np.array(found.error)
@@ -153,14 +153,14 @@ def evaluate_tracks(
         + sum(len(predicted[name].position) for name in unknown),
     }
     note = _describe_counts(counts, missed, unknown)
-    tables = [_places_table(found, note)]
+    tables = [_make_positions_table(found, note)]
     if found.events:
-        tables.append(_events_table(found))
-    return Evaluation(counts, tuple(tables), (_share_within_figure(error),), ())
+        tables.append(_make_events_table(found))
+    return Evaluation(counts, tuple(tables), (_make_share_within_distance_figure(error),), ())
 
 
 def _match_tracks(
-    truth: Sequence[TrueTrack], predicted: Mapping[str, PredictedTrack]
+    truth: Sequence[GroundTruthTrack], predicted: Mapping[str, PredictedTrack]
 ) -> tuple[dict[str, PredictedTrack], list[str]]:
     """Predictions by key of their stretch, and the names of those that are of none."""
     names = {name.casefold(): track.key for track in truth for name in (track.folder, track.key)}
@@ -177,16 +177,18 @@ def _match_tracks(
     return found, unknown
 
 
-def _compare_track(found: _Compared, track: TrueTrack, predicted: PredictedTrack | None) -> None:
+def _compare_track(
+    found: _TrackComparison, track: GroundTruthTrack, predicted: PredictedTrack | None
+) -> None:
     there = track.there
     rows = np.full(len(track.frames), -1)
     if predicted is not None:
-        place = _rows_of(track, predicted)
+        place = _match_predictions_to_rows(track, predicted)
         known = np.flatnonzero(place >= 0)
         rows[place[known[::-1]]] = known[::-1]
         found.beside += len(place) - int((there & (rows >= 0)).sum())
         if predicted.events is not None:
-            found.events.append(_events_of(track, predicted))
+            found.events.append(_pair_track_events(track, predicted))
     position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)
     sigma = np.zeros((0, 3)) if predicted is None else predicted.sigma_array
     for row in np.flatnonzero(there):
@@ -200,10 +202,10 @@ def _compare_track(found: _Compared, track: TrueTrack, predicted: PredictedTrack
         found.mode.append(track.mode[row])
 
 
-def _rows_of(track: TrueTrack, predicted: PredictedTrack) -> IntArray:
+def _match_predictions_to_rows(track: GroundTruthTrack, predicted: PredictedTrack) -> IntArray:
     """The row of the true track of each predicted ball, -1 where there is none, shape (M,)."""
     by_frame = {int(frame): row for row, frame in enumerate(track.frames)}
-    half = _frame_seconds(track) / 2
+    half = _estimate_frame_interval_s(track) / 2
     found = np.full(len(predicted.position), -1)
     for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True)):
         if frame is not None:
@@ -214,17 +216,17 @@ def _rows_of(track: TrueTrack, predicted: PredictedTrack) -> IntArray:
     return found
 
 
-def _frame_seconds(track: TrueTrack) -> float:
+def _estimate_frame_interval_s(track: GroundTruthTrack) -> float:
     return float(np.median(np.diff(track.times))) if len(track.times) > 1 else 0.04
 
 
-def _events_of(
-    track: TrueTrack, predicted: PredictedTrack
+def _pair_track_events(
+    track: GroundTruthTrack, predicted: PredictedTrack
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]], float]:
     by_frame = {
         int(frame): float(time) for frame, time in zip(track.frames, track.times, strict=True)
     }
-    step = _frame_seconds(track)
+    step = _estimate_frame_interval_s(track)
     said = []
     for kind, frame, time in predicted.events or ():
         if frame is not None and frame in by_frame:
@@ -234,8 +236,8 @@ def _events_of(
     return list(track.events), said, EVENT_FRAMES * step + step / 2
 
 
-def _places_table(found: _Compared, note: str) -> Table:
-    resamples = Resamples.draw(found.stretch, RESAMPLES, SEED)
+def _make_positions_table(found: _TrackComparison, note: str) -> Table:
+    resamples = MatchResamples.draw(found.stretch, RESAMPLES, SEED)
     state, mode = np.array(found.state), np.array(found.mode)
     parts = [("all", "All frames", np.ones(len(state), dtype=bool))]
     parts += [(name, label, np.isin(state, names)) for name, label, names in _ROWS]
@@ -243,12 +245,12 @@ def _places_table(found: _Compared, note: str) -> Table:
     if len(set(found.stretch)) > 1:
         keys = np.array(found.stretch)
         parts += [(f"stretch {key}", key, keys == key) for key in dict.fromkeys(found.stretch)]
-    rows = [_place_row(found, resamples, *part) for part in parts if part[2].any()]
+    rows = [_make_position_row(found, resamples, *part) for part in parts if part[2].any()]
     return Table("tracks", "The ball over time", COLUMNS, tuple(rows), note)
 
 
-def _place_row(
-    found: _Compared, resamples: Resamples, name: str, label: str, part: BoolArray
+def _make_position_row(
+    found: _TrackComparison, resamples: MatchResamples, name: str, label: str, part: BoolArray
 ) -> Row:
     chosen = np.flatnonzero(part).tolist()
     of = len(chosen)
@@ -274,10 +276,10 @@ def _place_row(
     )
 
 
-def _events_table(found: _Compared) -> Table:
-    rows = [_event_row("any", "Events of any kind", found, None)]
+def _make_events_table(found: _TrackComparison) -> Table:
+    rows = [_make_event_row("any", "Events of any kind", found, None)]
     rows += [
-        _event_row(kind, f"{kind.capitalize()}s" if kind != "out" else "Out", found, kind)
+        _make_event_row(kind, f"{kind.capitalize()}s" if kind != "out" else "Out", found, kind)
         for kind in KINDS
     ]
     note = (
@@ -287,7 +289,7 @@ def _events_table(found: _Compared) -> Table:
     return Table("track_events", "Events of the ball", EVENT_COLUMNS, tuple(rows), note)
 
 
-def _event_row(name: str, label: str, found: _Compared, kind: str | None) -> Row:
+def _make_event_row(name: str, label: str, found: _TrackComparison, kind: str | None) -> Row:
     true = said = hits = 0
     for real, predicted, slack in found.events:
         times = [
@@ -318,7 +320,7 @@ def _count_matched_events(true: Sequence[float], said: Sequence[float], slack: f
     return hits
 
 
-def _share_within_figure(error: FloatArray) -> Figure:
+def _make_share_within_distance_figure(error: FloatArray) -> Figure:
     """Share of frames within a distance, against the distance."""
     places = (np.arange(round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     below = np.searchsorted(np.sort(error[np.isfinite(error)]), places, side="left")
@@ -339,7 +341,7 @@ def _share_within_figure(error: FloatArray) -> Figure:
         Axis("Distance from the ball", "m", 0.0, FARTHEST_M),
         Axis("Share of frames", "", 0.0, 1.0),
         tuple(series),
-        (Mark("x", NEAR_M, "2 m"),),
+        (ReferenceLine("x", NEAR_M, "2 m"),),
     )
     note = "Solid: frames with a predicted ball. Dashed: all frames with a true one."
     return Figure("track_distance", "Precision of tracks against distance", (panel,), note)

@@ -24,7 +24,7 @@ _OF_SOCCER = frozenset(
 """Words that may stand beside it; any other makes it another ball (basket, hand) or no ball (boy)."""
 
 
-def is_ball(name: str) -> bool:
+def is_ball_name(name: str) -> bool:
     """Whether a name means the ball of a football match, whatever its case, separators and digits.
 
     Example:
@@ -43,7 +43,7 @@ def is_ball(name: str) -> bool:
 
 def is_same_name(one: str, other: str) -> bool:
     """Whether two names differ in case, separators and accents alone."""
-    return _letters_and_digits(one) == _letters_and_digits(other)
+    return _keep_letters_and_digits(one) == _keep_letters_and_digits(other)
 
 
 def strip_accents(name: str) -> str:
@@ -53,7 +53,7 @@ def strip_accents(name: str) -> str:
     return unicodedata.normalize("NFKC", kept)
 
 
-def _letters_and_digits(name: str) -> str:
+def _keep_letters_and_digits(name: str) -> str:
     return re.sub(r"[\W_]+", "", strip_accents(name)).casefold()
 
 
@@ -84,7 +84,7 @@ HOW = "if one of them is the ball, name it (Category of the ball, --ball-categor
 
 
 @dataclass(frozen=True)
-class Category:
+class CocoCategory:
     """One category; a file that lists none has one without a name for each id."""
 
     id: str
@@ -98,7 +98,7 @@ class Category:
         return f'"{self.name[:60]}"' if self.name else f"id {self.id[:40]}"
 
 
-class Categories:
+class CocoCategories:
     """The categories of one file.
 
     Args:
@@ -118,8 +118,8 @@ class Categories:
         ball: str = "",
     ):
         self._path, self._report, self._named = path, report, ball
-        self._index: IdIndex[Category] = IdIndex()
-        self._all: list[Category] = []
+        self._index: IdIndex[CocoCategory] = IdIndex()
+        self._all: list[CocoCategory] = []
         self._found: Counter[str] = Counter()
         self.listed = bool(listed)
         found = (
@@ -133,7 +133,7 @@ class Categories:
             else:
                 report.note(path, f"category {category.shown}", "id", "is listed twice; left out")
 
-    def find(self, value: Any) -> Category | None:
+    def find(self, value: Any) -> CocoCategory | None:
         """The category of an annotation's ``category_id``; some tools write its name there."""
         found = self._index.find(value)
         if found is None and isinstance(value, str):
@@ -141,7 +141,7 @@ class Categories:
             return named[0] if len(named) == 1 else None
         return found
 
-    def count_ball(self, category: Category) -> None:
+    def count_ball(self, category: CocoCategory) -> None:
         """Note a ball that was read."""
         self._found[category.id] += 1
 
@@ -161,7 +161,7 @@ class Categories:
             names = " and ".join(item.shown for item in taken if self._found[item.id])
             count = plural(self.balls, "annotation")
             why = "" if self.listed else "; the file lists no categories"
-            self._report.remark(f"{self._path}: category {names} is the ball ({count}){why}")
+            self._report.add_remark(f"{self._path}: category {names} is the ball ({count}){why}")
             return
         if taken:
             names = " or ".join(item.shown for item in taken[:_SHOWN])
@@ -177,9 +177,9 @@ class Categories:
         if alone:
             self._report.note(self._path, None, "categories", sentence)
         else:
-            self._report.remark(f"{self._path}: {sentence}")
+            self._report.add_remark(f"{self._path}: {sentence}")
 
-    def _read_listed_categories(self, listed: Sequence[Any]) -> Iterable[tuple[Any, Category]]:
+    def _read_listed_categories(self, listed: Sequence[Any]) -> Iterable[tuple[Any, CocoCategory]]:
         for index, item in enumerate(listed):
             record = f"categories[{index}]"
             if not isinstance(item, dict) or id_to_text(item.get("id")) is None:
@@ -193,22 +193,22 @@ class Categories:
                 name = ""
             yield item["id"], self._make_category(item["id"], name.strip(), item)
 
-    def _make_category(self, value: Any, name: str, item: Mapping[str, Any]) -> Category:
+    def _make_category(self, value: Any, name: str, item: Mapping[str, Any]) -> CocoCategory:
         text = id_to_text(value) or ""
         points = item.get("keypoints")
         keypoints = tuple(map(str, points)) if isinstance(points, list) else ()
-        return Category(text, name, keypoints, self._is_ball(text, name))
+        return CocoCategory(text, name, keypoints, self._is_ball(text, name))
 
     def _is_ball(self, text: str, name: str) -> bool:
         if self._named:
             return id_to_text(self._named) == text or (
                 bool(name) and is_same_name(name, self._named)
             )
-        return is_ball(name)
+        return is_ball_name(name)
 
     def _make_categories_from_ids(
         self, annotations: Sequence[Any]
-    ) -> Iterable[tuple[Any, Category]]:
+    ) -> Iterable[tuple[Any, CocoCategory]]:
         """A category for each id; the only one is the ball where no picture has two of it."""
         images: dict[str, Counter[str]] = {}
         for item in annotations:
@@ -218,4 +218,4 @@ class Categories:
         for text, counts in images.items():
             only = len(images) == 1 and max(counts.values()) == 1
             named = id_to_text(self._named) == text if self._named else only
-            yield text, Category(text, "", (), named)
+            yield text, CocoCategory(text, "", (), named)

@@ -9,11 +9,11 @@ import numpy as np
 
 from app.errors import DatasetFormatError, GeometryError
 from app.formats import fields
-from app.geometry.arrays import FloatArray, row_by_row
-from app.geometry.camera import Camera, camera_covariance, rotation_from_pan_tilt_roll
+from app.geometry.arrays import FloatArray, flatten_covariance
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll, validate_camera_covariance
 from app.geometry.lens import BROWN_CONRADY, LENSES
 from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, X, Z
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.frames import ImageSize
 
 MAX_DISAGREEMENT_DEGREES = 0.01
@@ -39,7 +39,7 @@ def camera_to_json(
     """The camera as SoccerNet spells it: angles, matrix and all three distortion arrays.
 
     Every number is a plain float, so that ``repr`` and JSON keep it exactly. ``skew`` is ours
-    and stands there only when it is not zero. A wide lens has ``lens`` and ``lens_coefficients``
+    and stands there only when it is not zero. A wide lens has ``lens`` and ``read_lens_coefficients``
     in place of the three arrays: whoever expects those must not take it for a pinhole.
 
     Args:
@@ -79,7 +79,7 @@ def covariance_to_json(
         camera: With one radial term.
         size: Of its images.
     """
-    ways = _file_number_derivatives(camera, size)
+    ways = _compute_file_value_jacobian(camera, size)
     known = np.reshape(covariance, (PARAMETERS, PARAMETERS))
     rows: list[list[float]] = (ways @ known @ ways.T).tolist()
     return rows
@@ -103,12 +103,12 @@ def covariance_from_json(
     rows = [fields.parse_numbers(row, PARAMETERS) for row in fields.require_list(found)]
     if len(rows) != PARAMETERS:
         raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
-    known = np.reshape(camera_covariance(number for row in rows for number in row), (8, 8))
-    back = np.linalg.inv(_file_number_derivatives(camera, size))
-    return camera_covariance(row_by_row(back @ known @ back.T))
+    known = np.reshape(validate_camera_covariance(number for row in rows for number in row), (8, 8))
+    back = np.linalg.inv(_compute_file_value_jacobian(camera, size))
+    return validate_camera_covariance(flatten_covariance(back @ known @ back.T))
 
 
-def _file_number_derivatives(camera: Camera, size: ImageSize) -> FloatArray:
+def _compute_file_value_jacobian(camera: Camera, size: ImageSize) -> FloatArray:
     """Derivatives of a file's numbers by the camera's parameters, shape (8, 8)."""
     focal = float(np.sqrt(camera.focal_length[0] * camera.focal_length[1]))
     ways = np.zeros((PARAMETERS, PARAMETERS))
@@ -150,18 +150,18 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
     """
     if not isinstance(value, dict):
         raise DatasetFormatError(path, record, None, "is not a camera object")
-    reader = _CameraFields(value, path, record)
+    reader = _CameraFieldReader(value, path, record)
     rotation = _read_rotation(reader)
     lens, coefficients = _read_lens(reader)
     try:
         return Camera(
             rotation=rotation,
-            position=np.array(reader.read_field("position_meters", _three_numbers)),
+            position=np.array(reader.read_field("position_meters", _parse_three_numbers)),
             focal_length=(
-                reader.read_field("x_focal_length", _positive_number),
-                reader.read_field("y_focal_length", _positive_number),
+                reader.read_field("x_focal_length", _parse_positive_number),
+                reader.read_field("y_focal_length", _parse_positive_number),
             ),
-            principal_point=reader.read_field("principal_point", _two_numbers),
+            principal_point=reader.read_field("principal_point", _parse_two_numbers),
             skew=reader.read_field("skew", fields.parse_number) if "skew" in value else 0.0,
             distortion=np.array(coefficients),
             lens=lens,
@@ -170,7 +170,7 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
         raise DatasetFormatError(path, record, None, error.message) from error
 
 
-class _CameraFields:
+class _CameraFieldReader:
     """One camera object, read field by field."""
 
     def __init__(self, value: Mapping[str, Any], path: str, record: str | None):
@@ -180,7 +180,7 @@ class _CameraFields:
         if name not in self.value:
             raise self.error(name, "is missing")
         try:
-            return _require_plausible_size(parse(self.value[name]))
+            return _require_plausible_magnitude(parse(self.value[name]))
         except ValueError as error:
             raise self.error(name, str(error)) from error
 
@@ -193,7 +193,7 @@ class _CameraFields:
         return DatasetFormatError(self.path, self.record, name, problem)
 
 
-def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
+def _read_lens(reader: _CameraFieldReader) -> tuple[str, tuple[float, ...]]:
     """Name of the lens and its coefficients, in the order that the camera has them."""
     name = reader.value.get(LENS)
     if name is None or name == BROWN_CONRADY:
@@ -205,7 +205,7 @@ def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
         k1, k2, k3, k4, k5, k6 = radial
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
     if not isinstance(name, str) or name not in LENSES:
-        raise reader.error(LENS, f"is {quoted(str(name), 40)}; lenses are {_list_lens_names()}")
+        raise reader.error(LENS, f"is {quote_text(str(name), 40)}; lenses are {_list_lens_names()}")
     for other, count in _DISTORTION:
         if any(reader.read_distortion(other, count)):
             raise reader.error(
@@ -221,12 +221,12 @@ def _list_lens_names() -> str:
     return " or ".join(name for name in LENSES if name != BROWN_CONRADY)
 
 
-def _read_rotation(reader: _CameraFields) -> FloatArray:
+def _read_rotation(reader: _CameraFieldReader) -> FloatArray:
     pan, tilt, roll = (reader.read_field(name, fields.parse_number) for name in _ANGLES)
     rotation = rotation_from_pan_tilt_roll(*np.radians([pan, tilt, roll]))
     if reader.value.get("rotation_matrix") is None:
         return rotation
-    matrix = np.array(reader.read_field("rotation_matrix", _three_by_three_matrix))
+    matrix = np.array(reader.read_field("rotation_matrix", _parse_three_by_three_matrix))
     if float(np.abs(matrix - rotation).max()) < ROUNDING:
         # The same rotation: the matrix keeps the last digits that the angles lose, so what we
         # wrote comes back exactly.
@@ -240,29 +240,29 @@ def _read_rotation(reader: _CameraFields) -> FloatArray:
     return rotation
 
 
-def _require_plausible_size(value: T) -> T:
+def _require_plausible_magnitude(value: T) -> T:
     if np.abs(np.asarray(value)).max() > MAX_NUMBER:
         raise ValueError(f"is larger than any camera has (at most {MAX_NUMBER:.0e})")
     return value
 
 
-def _positive_number(value: Any) -> float:
+def _parse_positive_number(value: Any) -> float:
     result = fields.parse_number(value)
     if result <= 0:
         raise ValueError(f"is {result:g}; a focal length is positive")
     return result
 
 
-def _two_numbers(value: Any) -> tuple[float, float]:
+def _parse_two_numbers(value: Any) -> tuple[float, float]:
     x, y = fields.parse_numbers(value, 2)
     return x, y
 
 
-def _three_numbers(value: Any) -> tuple[float, ...]:
+def _parse_three_numbers(value: Any) -> tuple[float, ...]:
     return fields.parse_numbers(value, 3)
 
 
-def _three_by_three_matrix(value: Any) -> list[tuple[float, ...]]:
+def _parse_three_by_three_matrix(value: Any) -> list[tuple[float, ...]]:
     rows = fields.require_list(value)
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")

@@ -17,7 +17,7 @@ import yaml
 
 from app.errors import DatasetFormatError, GeometryError
 from app.formats import fields
-from app.formats.file_tree import BROKEN, Limits
+from app.formats.file_tree import BROKEN, ImportLimits
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_vector
 from app.soccer.pitch import Pitch
@@ -52,27 +52,31 @@ MAX_DISTANCE_M = 1000.0
 """No camera of a pitch stands farther away: beyond it the file is in other units."""
 
 
-def holds_matrices(value: Mapping[str, Any]) -> bool:
+def has_camera_matrices(value: Mapping[str, Any]) -> bool:
     """Whether an object describes a camera by matrices."""
-    intrinsic = _first_given_name(value, _INTRINSICS) or all(name in value for name in _FOCAL[0])
+    intrinsic = _find_first_present_name(value, _INTRINSICS) or all(
+        name in value for name in _FOCAL[0]
+    )
     intrinsic = intrinsic or all(name in value for name in _FOCAL[1])
-    placed = _first_given_name(value, _TRANSLATIONS) or _first_given_name(value, _POSITIONS)
+    placed = _find_first_present_name(value, _TRANSLATIONS) or _find_first_present_name(
+        value, _POSITIONS
+    )
     return bool(
-        (intrinsic and _first_given_name(value, _ROTATIONS) and placed)
-        or _first_given_name(value, _PROJECTIONS)
+        (intrinsic and _find_first_present_name(value, _ROTATIONS) and placed)
+        or _find_first_present_name(value, _PROJECTIONS)
     )
 
 
-def holds_homography(value: Any) -> bool:
+def contains_homography(value: Any) -> bool:
     """Whether a value is a homography, or an object with one and without a camera."""
     if isinstance(value, dict):
-        return _first_given_name(value, _HOMOGRAPHIES) is not None
+        return _find_first_present_name(value, _HOMOGRAPHIES) is not None
     rows = value if isinstance(value, list) else []
     return len(rows) == 3 and all(isinstance(row, list) and len(row) == 3 for row in rows)
 
 
 def camera_from_matrices(value: Mapping[str, Any], path: str, record: str | None) -> Camera:
-    """The camera of an object for which ``holds_matrices`` is true.
+    """The camera of an object for which ``has_camera_matrices`` is true.
 
     Args:
         value: The object; matrices are nested lists, flat lists or OpenCV's ``rows, cols, data``.
@@ -84,26 +88,28 @@ def camera_from_matrices(value: Mapping[str, Any], path: str, record: str | None
     """
     name = ""
     try:
-        name = _first_given_name(value, _ROTATIONS) or ""
-        placed = _first_given_name(value, _TRANSLATIONS) or _first_given_name(value, _POSITIONS)
+        name = _find_first_present_name(value, _ROTATIONS) or ""
+        placed = _find_first_present_name(value, _TRANSLATIONS) or _find_first_present_name(
+            value, _POSITIONS
+        )
         if name and placed:
             rotation = _parse_rotation(value[name])
             name = placed
-            place = _flat_array(value[name], 3)
+            place = _parse_flat_array(value[name], 3)
             position = place if name in _POSITIONS else -rotation.T @ place
-            name = _first_given_name(value, _INTRINSICS) or ""
+            name = _find_first_present_name(value, _INTRINSICS) or ""
             intrinsic = (
-                _normalize_camera_matrix(_flat_array(value[name], 9).reshape(3, 3))
+                _normalize_camera_matrix(_parse_flat_array(value[name], 9).reshape(3, 3))
                 if name
                 else _camera_matrix_from_focal_length(value)
             )
         else:
-            name = _first_given_name(value, _PROJECTIONS) or ""
+            name = _find_first_present_name(value, _PROJECTIONS) or ""
             intrinsic, rotation, position = _decompose_projection_matrix(
-                _flat_array(value[name], 12).reshape(3, 4)
+                _parse_flat_array(value[name], 12).reshape(3, 4)
             )
-        pose = _pose_problem(rotation, position)
-        name = _first_given_name(value, _DISTORTIONS) or ""
+        pose = _find_pose_problem(rotation, position)
+        name = _find_first_present_name(value, _DISTORTIONS) or ""
         distortion = _parse_distortion(value.get(name))
         name = ""
         if pose:
@@ -122,11 +128,11 @@ def camera_from_matrices(value: Mapping[str, Any], path: str, record: str | None
         raise DatasetFormatError(path, record, None, error.message) from error
 
 
-def _first_given_name(value: Mapping[str, Any], names: Sequence[str]) -> str | None:
+def _find_first_present_name(value: Mapping[str, Any], names: Sequence[str]) -> str | None:
     return next((name for name in names if value.get(name) is not None), None)
 
 
-def _flat_array(value: Any, count: int) -> FloatArray:
+def _parse_flat_array(value: Any, count: int) -> FloatArray:
     """Numbers of a list, nested as it may be, or of OpenCV's ``{rows, cols, data}``."""
     flat = _flatten_numbers(value)
     if len(flat) != count:
@@ -160,7 +166,7 @@ def _parse_rotation(value: Any) -> FloatArray:
     numbers = _flatten_numbers(value)
     if len(numbers) == 3:
         return rotation_from_vector(np.array(numbers))
-    matrix = _flat_array(numbers, 9).reshape(3, 3)
+    matrix = _parse_flat_array(numbers, 9).reshape(3, 3)
     left, _, right = np.linalg.svd(matrix)
     nearest: FloatArray = left @ right
     if np.abs(nearest - matrix).max() > MAX_SKEWNESS:
@@ -222,7 +228,7 @@ def _parse_distortion(value: Any) -> FloatArray:
     return result
 
 
-def _pose_problem(rotation: FloatArray, position: FloatArray) -> str | None:
+def _find_pose_problem(rotation: FloatArray, position: FloatArray) -> str | None:
     """Why a pose cannot be that of a camera of a pitch, in words; None where it can."""
     distance, z = float(np.linalg.norm(position)), float(position[2])
     if distance > MAX_DISTANCE_M:
@@ -267,7 +273,7 @@ _MERGE = "tag:yaml.org,2002:merge"
 
 
 def read_camera_arrays(
-    content: bytes, key: str, path: str, limits: Limits
+    content: bytes, key: str, path: str, limits: ImportLimits
 ) -> list[tuple[str | None, Any]]:
     """The cameras of an ``.npz`` file as objects of matrices, each with its name.
 
@@ -283,7 +289,7 @@ def read_camera_arrays(
         there = ", ".join(sorted(arrays)[:10]) or "nothing"
         raise DatasetFormatError(path, None, missing[0], f"is missing; the file holds {there}")
     parts = {
-        name: _one_row_per_camera(arrays[name], shape, name, path)
+        name: _reshape_to_one_row_per_camera(arrays[name], shape, name, path)
         for name, shape in _SHAPES.items()
     }
     if _DISTORTION in arrays:
@@ -300,7 +306,7 @@ def read_camera_arrays(
         count = 1
     if count > MOST_CAMERAS:
         longest = max(parts, key=lambda name: len(parts[name]))
-        raise _too_many_cameras_error(path, longest, f"has {count:,} rows")
+        raise _make_too_many_cameras_error(path, longest, f"has {count:,} rows")
     objects = [
         {name: part[min(at, len(part) - 1)].tolist() for name, part in parts.items()}
         for at in range(count)
@@ -327,7 +333,7 @@ def cameras_to_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
     """
     count = max(cameras, default=-1) + 1
     if count > MOST_CAMERAS:
-        raise _too_many_cameras_error(path, "K", f"would have {count:,} rows")
+        raise _make_too_many_cameras_error(path, "K", f"would have {count:,} rows")
     arrays = {name: np.full((count, *shape), np.nan) for name, shape in _SHAPES.items()}
     lens = np.full((count, 12), np.nan)
     for frame, camera in cameras.items():
@@ -342,7 +348,7 @@ def cameras_to_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
     return {**arrays, _DISTORTION: lens[:, : next(size for size in (5, 8, 12) if used < size)]}
 
 
-def _one_row_per_camera(
+def _reshape_to_one_row_per_camera(
     array: npt.NDArray[Any], shape: tuple[int, ...], name: str, path: str
 ) -> npt.NDArray[Any]:
     """An array as a row a camera."""
@@ -356,7 +362,9 @@ def _one_row_per_camera(
     return array.reshape(-1, *shape)
 
 
-def _read_number_arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[Any]]:
+def _read_number_arrays(
+    content: bytes, path: str, limits: ImportLimits
+) -> dict[str, npt.NDArray[Any]]:
     """The arrays of numbers by name; nothing is unpickled, and no header is believed about its size.
 
     Arrays that say nothing of cameras are named, and not read: they stay empty.
@@ -402,12 +410,12 @@ def _read_array(
                 "holds an array whose size differs from the size that it declares: the file is damaged"
             )
         if numbers > MOST_CAMERAS * _NUMBERS[name]:
-            raise _too_many_cameras_error(path, name, f"holds {numbers:,} numbers")
+            raise _make_too_many_cameras_error(path, name, f"holds {numbers:,} numbers")
         body = file.read()
     return np.frombuffer(body, kind).reshape(shape, order="F" if fortran else "C").astype(float)
 
 
-def _too_many_cameras_error(path: str, name: str, problem: str) -> DatasetFormatError:
+def _make_too_many_cameras_error(path: str, name: str, problem: str) -> DatasetFormatError:
     return DatasetFormatError(
         path,
         None,

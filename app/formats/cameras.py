@@ -18,20 +18,20 @@ from app.formats.camera_json import (
 )
 from app.formats.camera_matrix import (
     camera_from_matrices,
-    holds_matrices,
+    has_camera_matrices,
     read_camera_arrays,
     read_opencv_storage,
 )
 from app.formats.export_record import ExportRecord
 from app.formats.fields import parse_image_size
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.formats.frame_names import fold_file_name, frame_name_claims, view_file_path
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
+from app.formats.frame_names import map_frame_names_to_owners, normalize_file_name, view_file_path
 from app.formats.json_reader import describe_document, is_camera, read_json, read_json_lines
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import CAMERAS, LINES, find_original_frame_path, read_match_info
-from app.formats.synloc import camera_from_synloc, index_image_records, is_synloc
-from app.formats.trees import open_tree_while_read
-from app.formats.view_files import PutText, write_to_disk
+from app.formats.synloc import camera_from_synloc, index_image_records, is_synloc_image_record
+from app.formats.trees import open_tree_context
+from app.formats.view_files import PutText, make_disk_writer
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.soccer.frames import HALF, ImageSize
@@ -73,7 +73,7 @@ _MEANT = (
 def read_cameras(
     path: Root,
     report: ReaderReport,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
     covariances: dict[str, Any] | None = None,
 ) -> dict[str, Camera]:
@@ -89,7 +89,7 @@ def read_cameras(
     takes the size of the images of each camera whose file states it, ``covariances`` what a file
     says of how well its camera is known (for ``covariance_from_json``).
     """
-    with open_tree_while_read(path, report, limits) as tree:
+    with open_tree_context(path, report, limits) as tree:
         if tree is None:
             return {}
         names = tree.names()
@@ -100,9 +100,9 @@ def read_cameras(
                 str(path),
                 None,
                 None,
-                f"holds no camera files ({_ENDINGS}), but {_name_some_endings(endings)}",
+                f"holds no camera files ({_ENDINGS}), but {_format_first_suffixes(endings)}",
             )
-        places = _frame_places_of_export(tree, names)
+        places = _map_camera_files_to_frames(tree, names)
         cameras = read_camera_files(tree, files, report, places, limits, sizes, covariances)
     report.imported += len(cameras)
     return cameras
@@ -113,33 +113,33 @@ def read_camera_files(
     names: Sequence[str],
     report: ReaderReport,
     places: Mapping[str, str] | None = None,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
     covariances: dict[str, Any] | None = None,
 ) -> dict[str, Camera]:
     """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
-    stated = _StatedValues(
+    stated = _CameraSizesAndCovariances(
         {} if sizes is None else sizes, {} if covariances is None else covariances
     )
     known = places or {}
     stems = Counter(_camera_key(name, deep=False) for name in names)
     for name in names:
         deep = stems[_camera_key(name, deep=False)] > 1
-        _read_file(
+        _read_camera_file(
             tree, name, known.get(name) or _camera_key(name, deep), cameras, stated, report, limits
         )
     return cameras
 
 
-class _StatedValues(NamedTuple):
+class _CameraSizesAndCovariances(NamedTuple):
     """What files say beside their cameras, by key."""
 
     sizes: dict[str, ImageSize]
     covariances: dict[str, Any]
 
 
-def _frame_places_of_export(tree: FileTree, names: list[str]) -> dict[str, str]:
+def _map_camera_files_to_frames(tree: FileTree, names: list[str]) -> dict[str, str]:
     """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
     found = {}
     # What is wrong with the file is no matter of cameras.
@@ -151,7 +151,7 @@ def _frame_places_of_export(tree: FileTree, names: list[str]) -> dict[str, str]:
     return found
 
 
-def _name_some_endings(endings: Sequence[str]) -> str:
+def _format_first_suffixes(endings: Sequence[str]) -> str:
     return ", ".join(endings[:5]) + (" and others" if len(endings) > 5 else "")
 
 
@@ -171,14 +171,14 @@ def _camera_key(name: str, deep: bool) -> str:
     return "/".join((*keep, stem))
 
 
-def _read_file(
+def _read_camera_file(
     tree: FileTree,
     name: str,
     key: str,
     cameras: dict[str, Camera],
-    stated: _StatedValues,
+    stated: _CameraSizesAndCovariances,
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
 ) -> None:
     shown = tree.shown(name)
     try:
@@ -240,7 +240,7 @@ _Items = list[tuple[str | None, Any]]
 
 
 def _parse_camera_items(
-    content: bytes, name: str, key: str, shown: str, report: ReaderReport, limits: Limits
+    content: bytes, name: str, key: str, shown: str, report: ReaderReport, limits: ImportLimits
 ) -> _Items:
     ending = PurePosixPath(name).suffix.lower()
     if ending == ".npz":
@@ -254,15 +254,19 @@ def _parse_camera_items(
         if lines is None:
             raise
         value = lines
-    several = _named_cameras(value, shown)
+    several = _list_named_cameras(value, shown)
     if several is not None:
         return several
     # A camera file is called like its view; any other may say the name of its image inside.
-    own = None if PurePosixPath(name).name.startswith("camera_") else _image_name_of_camera(value)
+    own = (
+        None
+        if PurePosixPath(name).name.startswith("camera_")
+        else _find_image_name_of_camera(value)
+    )
     return [(own, value)]
 
 
-def _named_cameras(value: Any, shown: str) -> _Items | None:
+def _list_named_cameras(value: Any, shown: str) -> _Items | None:
     """The cameras by name when the file holds several, else None."""
     if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
         value = value["cameras"]
@@ -276,7 +280,7 @@ def _named_cameras(value: Any, shown: str) -> _Items | None:
         if not any(map(is_camera, map(_unwrap_camera, value))):
             return None
         return [
-            (_image_name_of_camera(item) or f"camera {number}", item)
+            (_find_image_name_of_camera(item) or f"camera {number}", item)
             for number, item in enumerate(value)
         ]
     if (
@@ -298,7 +302,7 @@ def _unwrap_camera(value: Any) -> Any:
     return value
 
 
-def _image_name_of_camera(value: Any) -> str | None:
+def _find_image_name_of_camera(value: Any) -> str | None:
     """How a camera object names its image; None where it does not."""
     if not isinstance(value, dict):
         return None
@@ -314,7 +318,7 @@ def _image_name_of_camera(value: Any) -> str | None:
 
 
 def _parse_camera(item: Any, shown: str, record: str | None) -> Camera:
-    if is_synloc(item):
+    if is_synloc_image_record(item):
         return camera_from_synloc(item, shown, record)
     value = (
         item["cam_params"]
@@ -322,7 +326,7 @@ def _parse_camera(item: Any, shown: str, record: str | None) -> Camera:
         else _unwrap_camera(item)
     )
     if isinstance(value, dict) and "pan_degrees" not in value:
-        if holds_matrices(value):
+        if has_camera_matrices(value):
             return camera_from_matrices(value, shown, record)
         known = {"position_meters", "x_focal_length", "lens", *_CAMERA_FIELDS}
         if not known & value.keys():
@@ -337,7 +341,7 @@ def _parse_camera(item: Any, shown: str, record: str | None) -> Camera:
     return camera
 
 
-def camera_file_text(
+def format_camera_file(
     camera: Camera, covariance: Sequence[float] | None = None, size: ImageSize | None = None
 ) -> str:
     """The text of one camera file (``camera_to_json``)."""
@@ -371,18 +375,18 @@ def write_camera_files(
     """
     counts = {"groups": 0, "cameras": 0}
     written: dict[str, tuple[str, ...]] = {}
-    put = put or write_to_disk(root)
+    put = put or make_disk_writer(root)
     for record in records:
         counts["groups"] += 1
         for view in record.group.views:
             name, camera = (
-                _camera_file_of_view(record.group, record.named(view)),
+                _make_camera_file_path(record.group, record.named(view)),
                 record.camera(view),
             )
             if camera is None:
                 continue
             owner = find_camera_owner(record.group, view)
-            first = written.setdefault(fold_file_name(name), owner)
+            first = written.setdefault(normalize_file_name(name), owner)
             if first != owner:
                 raise InputError(
                     f"the cameras of two frames ({', '.join(first)} and {', '.join(owner)})"
@@ -390,7 +394,7 @@ def write_camera_files(
                     hint="Rename one of them in the source, and import it again.",
                 )
             if len(written) > counts["cameras"]:
-                put(name, camera_file_text(camera, record.covariance(view), view.size))
+                put(name, format_camera_file(camera, record.covariance(view), view.size))
                 counts["cameras"] = len(written)
     return counts
 
@@ -400,11 +404,11 @@ def find_camera_owner(group: Group, view: View) -> tuple[str, ...]:
     return (view.station.key,) if view.station.shared else (group.key, view.key)
 
 
-def camera_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def map_camera_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``)."""
-    camera = {_camera_file_of_view(group, view): find_camera_owner(group, view)}
-    return {**camera, **frame_name_claims(group, view, split)}
+    camera = {_make_camera_file_path(group, view): find_camera_owner(group, view)}
+    return {**camera, **map_frame_names_to_owners(group, view, split)}
 
 
-def _camera_file_of_view(group: Group, view: View) -> str:
+def _make_camera_file_path(group: Group, view: View) -> str:
     return camera_file_name(view_file_path(group, view))

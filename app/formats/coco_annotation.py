@@ -14,9 +14,9 @@ from app.formats import fields
 from app.formats.fields import IdIndex, id_to_text
 from app.formats.picture_finder import split_picture_name
 from app.formats.report import ReaderReport
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box, box_from_corner
+from app.soccer.frames import Box, box_from_corner_origin
 
 Annotation = tuple[str, Mapping[str, Any]]
 """Its place in the file (``annotations[3]``), and itself."""
@@ -70,11 +70,11 @@ class JoinedAnnotations:
         if captions:
             report.counts["captions"] += captions
         if shared:
-            report.remark(
+            report.add_remark(
                 f"{path}: {shared:,} annotations have the id of another one; all are read"
             )
 
-    def is_alone(self, name: str) -> bool:
+    def is_unique_image_name(self, name: str) -> bool:
         """Whether one image alone has a name, as the last part of its own."""
         return len(self._names.get(name, [])) == 1
 
@@ -84,7 +84,7 @@ class JoinedAnnotations:
     def _add_image(self, index: int, item: Any) -> None:
         if not isinstance(item, dict):
             return
-        if parts := _name_parts(item.get("file_name")):
+        if parts := _split_image_name(item.get("file_name")):
             self._names.setdefault(parts[-1], []).append(index)
         value = item.get("id")
         if not self._ids.add(value, index):
@@ -108,7 +108,11 @@ class JoinedAnnotations:
             return None
         value = item["image_id"]
         image = self._ids.find(value)
-        if image is None and (parts := _name_parts(value)) and self.is_alone(parts[-1]):
+        if (
+            image is None
+            and (parts := _split_image_name(value))
+            and self.is_unique_image_name(parts[-1])
+        ):
             return self._names[parts[-1]][0]
         if image is None:
             self._report.counts["annotations without image"] += 1
@@ -120,11 +124,11 @@ class JoinedAnnotations:
 def quote_value(value: Any) -> str:
     """A value as the file spells it, no longer than a sentence can take."""
     if isinstance(value, str):
-        return quoted(value, 40)
+        return quote_text(value, 40)
     return "null" if value is None else str(value)[:40]
 
 
-def _name_parts(name: Any) -> tuple[str, ...]:
+def _split_image_name(name: Any) -> tuple[str, ...]:
     return split_picture_name(name) if isinstance(name, str) else ()
 
 
@@ -172,13 +176,13 @@ def ball_from_annotation(item: Mapping[str, Any], names: Sequence[str] = ()) -> 
     if box is None or not (box.width and box.height):
         points = _read_labelled_keypoints(item.get("keypoints"), names)
         if points:
-            point = _center_keypoint(points)
+            point = _choose_center_keypoint(points)
             box, hidden = Box(point.x, point.y, 0.0, 0.0), not point.visible
     if box is None:
         box = _box_around_polygons(item.get("segmentation"))
     if max(box.x + box.width, box.y + box.height) <= 1 and min(box.x, box.y) >= 0:
         raise MissingPositionError("bbox", "is in fractions of the image, and COCO's are in pixels")
-    ours = box_from_corner(box)
+    ours = box_from_corner_origin(box)
     occluded = hidden or is_occluded(item)
     if ours.width and ours.height:
         return BallAnnotation(box=ours, occluded=occluded)
@@ -196,7 +200,7 @@ def box_from_annotation(item: Mapping[str, Any]) -> Box:
         points = _read_labelled_keypoints(item.get("keypoints"), ())
         corners = [(point.x, point.y) for point in points]
         box = _bounding_box(corners) if corners else _box_around_polygons(item.get("segmentation"))
-    return box_from_corner(box)
+    return box_from_corner_origin(box)
 
 
 def is_occluded(item: Mapping[str, Any]) -> bool:
@@ -250,7 +254,7 @@ def _read_labelled_keypoints(value: Any, names: Sequence[str]) -> list[Keypoint]
     return found
 
 
-def _center_keypoint(points: Sequence[Keypoint]) -> Keypoint:
+def _choose_center_keypoint(points: Sequence[Keypoint]) -> Keypoint:
     if len(points) == 1:
         return points[0]
     named = [point for point in points if point.name.strip().lower() in CENTERS]

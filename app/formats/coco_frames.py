@@ -20,7 +20,7 @@ from app.formats.picture_finder import (
     PictureFinder,
     PictureSearchResult,
     assign_pictures,
-    split_of_word,
+    parse_split_name,
     split_picture_name,
 )
 from app.formats.report import ReaderReport
@@ -38,7 +38,7 @@ _SHOWN = 5
 
 
 @dataclass
-class Frame:
+class CocoFrame:
     """One image of a foreign file, and what was said of it.
 
     Attributes:
@@ -79,7 +79,7 @@ class FrameFile:
 
     path: str
     home: LabelLocation
-    frames: list[Frame]
+    frames: list[CocoFrame]
 
     @property
     def scope(self) -> str:
@@ -104,7 +104,7 @@ def group_frames(
         report: Takes contradictions, and pictures that are missing or cannot be told apart.
     """
     finder = PictureFinder(names)
-    for file in _with_folders_of_others(files):
+    for file in _mark_folders_of_other_files(files):
         _find_pictures(file, finder, report)
     frames = _merge_frames(files, report)
     for key, members in _group_by_key(frames, report):
@@ -121,7 +121,7 @@ def group_frames(
         )
 
 
-def _with_folders_of_others(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
+def _mark_folders_of_other_files(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
     """The files, each knowing which pictures are those of others."""
     subsets = {file.home.subset.lower() for file in files} - {"", "default", *PICTURE_FOLDERS}
     roots = {file.home.root for file in files} - {""}
@@ -137,13 +137,13 @@ def _with_folders_of_others(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
 
 
 def _find_pictures(file: FrameFile, finder: PictureFinder, report: ReaderReport) -> None:
-    first: dict[tuple[str, ...], Frame] = {}
+    first: dict[tuple[str, ...], CocoFrame] = {}
     for frame in file.frames:
         first.setdefault(frame.parts, frame)
     found = assign_pictures({parts: _find_picture(parts, file.home, finder) for parts in first})
     for frame in file.frames:
         frame.place = found[frame.parts].place
-    _report_pictures(file, found, first, finder, report)
+    _report_picture_problems(file, found, first, finder, report)
 
 
 def _find_picture(
@@ -156,10 +156,10 @@ def _find_picture(
     return found
 
 
-def _report_pictures(
+def _report_picture_problems(
     file: FrameFile,
     found: Mapping[tuple[str, ...], PictureSearchResult],
-    first: Mapping[tuple[str, ...], Frame],
+    first: Mapping[tuple[str, ...], CocoFrame],
     finder: PictureFinder,
     report: ReaderReport,
 ) -> None:
@@ -180,31 +180,31 @@ def _report_pictures(
         elif item.parts < len(parts):
             guessed.append(f"{name} is {item.place}")
     if guessed:
-        report.remark(
+        report.add_remark(
             f"{file.path}: {plural(len(guessed), 'picture was', 'pictures were')} found by the end of"
-            f" the name: {_list_some_names(guessed)}"
+            f" the name: {_format_first_names(guessed)}"
         )
     if missing:
         where = ", ".join(f"{folder or '.'}/" for folder in list(file.home.folders())[:_SHOWN])
         sentence = (
-            f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_list_some_names(missing)}"
+            f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_format_first_names(missing)}"
             f" (looked in {where} and everywhere else)"
         )
         if finder.has_pictures:
             report.note(file.path, None, "file_name", sentence)
         else:
-            report.remark(f"{file.path}: {sentence}")
+            report.add_remark(f"{file.path}: {sentence}")
 
 
-def _merge_frames(files: Sequence[FrameFile], report: ReaderReport) -> list[Frame]:
+def _merge_frames(files: Sequence[FrameFile], report: ReaderReport) -> list[CocoFrame]:
     """Each frame once, with all that the files say of it."""
-    known: dict[tuple[str, ...], list[Frame]] = {}
-    frames: list[Frame] = []
+    known: dict[tuple[str, ...], list[CocoFrame]] = {}
+    frames: list[CocoFrame] = []
     for file in files:
         for frame in file.frames:
             same = known.setdefault(frame.identity, [])
             # A picture may be a view of several groups; who names no group speaks of any.
-            other = next((item for item in same if _is_one_view(item, frame)), None)
+            other = next((item for item in same if _is_same_view(item, frame)), None)
             if other is None:
                 same.append(frame)
                 frames.append(frame)
@@ -213,13 +213,13 @@ def _merge_frames(files: Sequence[FrameFile], report: ReaderReport) -> list[Fram
     return frames
 
 
-def _is_one_view(one: Frame, other: Frame) -> bool:
+def _is_same_view(one: CocoFrame, other: CocoFrame) -> bool:
     if one.group is None or other.group is None:
         return True
     return (one.group, one.view) == (other.group, other.view)
 
 
-def _merge_records_of_frame(frame: Frame, other: Frame, report: ReaderReport) -> None:
+def _merge_records_of_frame(frame: CocoFrame, other: CocoFrame, report: ReaderReport) -> None:
     """Add what another record says of a frame; what contradicts is named, and the first one counts."""
     first = f"{frame.path}, {frame.record}" if other.path != frame.path else frame.record
     if other.size != frame.size:
@@ -257,10 +257,10 @@ def _class_and_points(box: Mapping[str, Any]) -> tuple[Any, Any]:
 
 
 def _add_ball(
-    frame: Frame, ball: BallAnnotation, other: Frame, first: str, report: ReaderReport
+    frame: CocoFrame, ball: BallAnnotation, other: CocoFrame, first: str, report: ReaderReport
 ) -> None:
     for place, known in enumerate(frame.balls):
-        if _is_one_ball(known, ball):
+        if _is_same_ball(known, ball):
             occluded = known.occluded or ball.occluded
             kept = ball if known.box is None and ball.box is not None else known
             frame.balls[place] = replace(kept, occluded=occluded)
@@ -275,7 +275,7 @@ def _add_ball(
     frame.balls.append(ball)
 
 
-def _is_one_ball(one: BallAnnotation, other: BallAnnotation) -> bool:
+def _is_same_ball(one: BallAnnotation, other: BallAnnotation) -> bool:
     """Whether two annotations are of one ball: equal boxes, or a point that lies in the box."""
     if one.box is not None and other.box is not None:
         sides = zip(_box_corners(one.box), _box_corners(other.box), strict=True)
@@ -292,10 +292,10 @@ def _box_corners(box: Box) -> tuple[float, ...]:
 
 
 def _group_by_key(
-    frames: Sequence[Frame], report: ReaderReport
-) -> Iterator[tuple[str, list[Frame]]]:
+    frames: Sequence[CocoFrame], report: ReaderReport
+) -> Iterator[tuple[str, list[CocoFrame]]]:
     """Groups by key; where sets of frames use one key for different frames, each has its own."""
-    groups: dict[str, list[Frame]] = {}
+    groups: dict[str, list[CocoFrame]] = {}
     for frame in frames:
         groups.setdefault(frame.key if frame.group is None else frame.group, []).append(frame)
     taken = set(groups)
@@ -304,7 +304,7 @@ def _group_by_key(
         views = Counter(frame.view for frame in members)
         scopes = list(dict.fromkeys(frame.scope for frame in members))
         if max(views.values()) == 1 or len(scopes) == 1:
-            yield key, _unique_frames(key, members, report)
+            yield key, _drop_duplicate_frames(key, members, report)
             continue
         # The views of one name are of different sets, so that their groups are, too.
         for scope in scopes:
@@ -313,10 +313,10 @@ def _group_by_key(
             while name != key and name in taken:
                 name = f"{scope}/{name}"
             taken.add(name)
-            yield name, _unique_frames(name, own, report)
+            yield name, _drop_duplicate_frames(name, own, report)
 
 
-def _add_folders_to_view_names(frames: Sequence[Frame]) -> None:
+def _add_folders_to_view_names(frames: Sequence[CocoFrame]) -> None:
     """Give views that no file names, and whose files have one name, their folders as well."""
     if len({frame.split for frame in frames}) > 1:
         return
@@ -327,9 +327,11 @@ def _add_folders_to_view_names(frames: Sequence[Frame]) -> None:
                 frame.view = long(frame).strip("/")
 
 
-def _unique_frames(key: str, frames: Sequence[Frame], report: ReaderReport) -> list[Frame]:
+def _drop_duplicate_frames(
+    key: str, frames: Sequence[CocoFrame], report: ReaderReport
+) -> list[CocoFrame]:
     """The frames of a group, one of each name."""
-    views: dict[str, Frame] = {}
+    views: dict[str, CocoFrame] = {}
     for frame in frames:
         other = views.setdefault(frame.view, frame)
         if other is not frame:
@@ -341,7 +343,7 @@ def _unique_frames(key: str, frames: Sequence[Frame], report: ReaderReport) -> l
     return list(views.values())
 
 
-def _make_view(group: str, frame: Frame, tree: FileTree, calibration: str) -> View:
+def _make_view(group: str, frame: CocoFrame, tree: FileTree, calibration: str) -> View:
     # A group of one view is the place of its frame, and so is its camera.
     alone = frame.group is None
     key = group if alone else frame.view
@@ -352,7 +354,7 @@ def _make_view(group: str, frame: Frame, tree: FileTree, calibration: str) -> Vi
     return View(key, station, tuple(frame.balls), media, extras=Extras(tuple(frame.boxes)))
 
 
-def _choose_split(frames: Sequence[Frame], key: str, report: ReaderReport) -> str:
+def _choose_split(frames: Sequence[CocoFrame], key: str, report: ReaderReport) -> str:
     splits = list(dict.fromkeys(frame.split for frame in frames if frame.split))
     for other in splits[1:]:
         frame = next(item for item in frames if item.split == other)
@@ -361,15 +363,15 @@ def _choose_split(frames: Sequence[Frame], key: str, report: ReaderReport) -> st
     return splits[0] if splits else ""
 
 
-def _group_label(frame: Frame, key: str) -> str:
+def _group_label(frame: CocoFrame, key: str) -> str:
     kind = "Image" if frame.group is None else "Group"
     return f"{kind} {PurePosixPath(key).name}"
 
 
-def split_of_folders(parts: Sequence[str]) -> str:
+def find_split_in_folders(parts: Sequence[str]) -> str:
     """The split that the innermost folder of a name says; empty where none does."""
-    return next((split for part in reversed(parts) if (split := split_of_word(part))), "")
+    return next((split for part in reversed(parts) if (split := parse_split_name(part))), "")
 
 
-def _list_some_names(items: Sequence[str]) -> str:
+def _format_first_names(items: Sequence[str]) -> str:
     return ", ".join(items[:_SHOWN]) + (", ..." if len(items) > _SHOWN else "")

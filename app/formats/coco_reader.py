@@ -16,8 +16,8 @@ from app.formats.ball_names import (
     OUTSIDE,
     PREFIX,
     STATE,
-    Categories,
-    Category,
+    CocoCategories,
+    CocoCategory,
 )
 from app.formats.camera_json import camera_from_json
 from app.formats.coco_annotation import (
@@ -29,25 +29,25 @@ from app.formats.coco_annotation import (
     is_occluded,
     quote_value,
 )
-from app.formats.coco_frames import Frame, FrameFile, group_frames, split_of_folders
+from app.formats.coco_frames import CocoFrame, FrameFile, find_split_in_folders, group_frames
 from app.formats.fields import id_to_text
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import UNASSIGNED
 from app.formats.json_reader import describe_document, is_gamestate, read_json
 from app.formats.picture_finder import (
     LabelLocation,
     PictureFinder,
+    find_split_in_word,
     split_picture_name,
-    split_within_word,
 )
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
-from app.formats.synloc import camera_from_synloc, is_synloc
-from app.formats.trees import open_tree_while_read
-from app.formats.view_state import PlacedView, StateReader, ViewGroups
+from app.formats.synloc import camera_from_synloc, is_synloc_image_record
+from app.formats.trees import open_tree_context
+from app.formats.view_state import GroupAssembler, PlacedView, StateReader
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.frames import Box, box_from_corner
+from app.soccer.frames import Box, box_from_corner_origin
 from app.soccer.group import Group, Media, View
 from app.wording import plural
 
@@ -64,7 +64,7 @@ def read_coco(
     report: ReaderReport,
     *,
     calibration: str = "given",
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
     ball_category: str = "",
 ) -> Iterator[Group]:
     """The images of every COCO file below ``root``.
@@ -82,24 +82,24 @@ def read_coco(
         limits: Caps on what is read.
         ball_category: Name or id of the category of others that is the ball; empty: by its name.
     """
-    with open_tree_while_read(root, report, limits) as tree:
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
-        finder, groups = PictureFinder(names), ViewGroups(report)
-        files: list[_CocoFile] = []
+        finder, groups = PictureFinder(names), GroupAssembler(report)
+        files: list[_CocoFileReader] = []
         for name in names:
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json" or place.name in _OURS:
                 continue
             value = _read_coco_file(tree, name, report, limits)
             if value is not None:
-                file = _CocoFile(tree, name, finder, value, report, ball_category)
+                file = _CocoFileReader(tree, name, finder, value, report, ball_category)
                 files.append(file)
                 for view in file.views():
                     yield from groups.add(view, tree.shown(name))
                 file.release_parsed_content()
-        yield from groups.incomplete_groups()
+        yield from groups.release_incomplete_groups()
         foreign = [file.frames for file in files if file.frames.frames]
         yield from group_frames(foreign, tree, names, calibration, report)
         _report_ball_categories(files, report)
@@ -108,7 +108,7 @@ def read_coco(
 
 
 def _read_coco_file(
-    tree: FileTree, name: str, report: ReaderReport, limits: Limits
+    tree: FileTree, name: str, report: ReaderReport, limits: ImportLimits
 ) -> dict[str, Any] | None:
     """A file with a list of images; None for any other, which is said."""
     shown = tree.shown(name)
@@ -123,11 +123,11 @@ def _read_coco_file(
             return value
         report.note(shown, None, None, describe_document(value))
         return None
-    report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
+    report.add_remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
 
 
-def _report_ball_categories(files: list[_CocoFile], report: ReaderReport) -> None:
+def _report_ball_categories(files: list[_CocoFileReader], report: ReaderReport) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
     some = any(file.categories.balls for file in files)
     foreign = [file for file in files if file.frames.frames]
@@ -135,7 +135,7 @@ def _report_ball_categories(files: list[_CocoFile], report: ReaderReport) -> Non
         file.categories.report_ball_category(alone=not some)
 
 
-class _CocoFile:
+class _CocoFileReader:
     """One file on its way to views (images of ours) and frames (of others)."""
 
     def __init__(
@@ -156,14 +156,14 @@ class _CocoFile:
         split = (
             ""
             if stem == UNASSIGNED
-            else split_within_word(stem) or split_of_folders(place.parts[:-1])
+            else find_split_in_word(stem) or find_split_in_folders(place.parts[:-1])
         )
         folder = "" if str(place.parent) == "." else str(place.parent)
-        known = task is not None or bool(split_within_word(stem))
+        known = task is not None or bool(find_split_in_word(stem))
         self._home = LabelLocation(folder, subset if known and subset != "default" else "", split)
         self.frames = FrameFile(self.path, self._home, [])
         annotations = self._get_list("annotations")
-        self.categories = Categories(
+        self.categories = CocoCategories(
             self._get_list("categories"), annotations, self.path, report, ball_category
         )
         self._joined = JoinedAnnotations(value["images"], annotations, self.path, report)
@@ -198,9 +198,9 @@ class _CocoFile:
                 else:
                     self.frames.frames.append(self._read_foreign_image(image, index))
             except DatasetFormatError as error:
-                self._report.skip(self._count_annotations_in_error(error, index))
+                self._report.skip(self._add_annotation_count_to_error(error, index))
 
-    def _count_annotations_in_error(
+    def _add_annotation_count_to_error(
         self, error: DatasetFormatError, index: int
     ) -> DatasetFormatError:
         """Why an image is left out, with how many annotations go with it."""
@@ -244,7 +244,7 @@ class _CocoFile:
             if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
                 box = self._read_bbox(item, record)
                 if box is not None:
-                    box = box_from_corner(box) if from_corner else box
+                    box = box_from_corner_origin(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 
@@ -265,7 +265,7 @@ class _CocoFile:
                 not self._is_crowd(item, record)
                 and (box := self._read_bbox(item, record)) is not None
             ):
-                box = box_from_corner(box) if from_corner else box
+                box = box_from_corner_origin(box) if from_corner else box
                 ball = BallAnnotation(box=box, occluded=is_occluded(item))
                 if ball in balls:
                     self._report_problem(
@@ -286,12 +286,12 @@ class _CocoFile:
         place = self._finder.find_picture(split_picture_name(name), self._home).place
         return None if place is None else self._tree.media(place)
 
-    def _read_foreign_image(self, image: StateReader, index: int) -> Frame:
+    def _read_foreign_image(self, image: StateReader, index: int) -> CocoFrame:
         parts = split_picture_name(image.text("file_name"))
-        key = self._image_key(image, parts)
-        group, view = self._group_and_view(image, key)
-        split = self._home.split or split_of_folders(parts[:-1])
-        frame = Frame(
+        key = self._make_image_key(image, parts)
+        group, view = self._read_group_and_view(image, key)
+        split = self._home.split or find_split_in_folders(parts[:-1])
+        frame = CocoFrame(
             self.path, image.record, parts, key, group, view, image.size(), split,
             self._read_foreign_camera(image), named=image.value.get("view") is not None,
         )  # fmt: skip
@@ -299,7 +299,7 @@ class _CocoFile:
             self._add_annotation(frame, item, record)
         return frame
 
-    def _image_key(self, image: StateReader, parts: tuple[str, ...]) -> str:
+    def _make_image_key(self, image: StateReader, parts: tuple[str, ...]) -> str:
         """Key of an image: its name; of one on another machine the last part, where that is enough."""
         text = image.text("file_name")
         key = "/".join(parts)
@@ -307,13 +307,13 @@ class _CocoFile:
             if not parts:
                 require_safe_path(text)
                 raise image.error("file_name", "is not a file name")
-            if not _is_relative_path(text) and self._joined.is_alone(parts[-1]):
+            if not _is_relative_path(text) and self._joined.is_unique_image_name(parts[-1]):
                 key = parts[-1]
             return require_safe_path(key)
         except UnsafePathError as error:
             raise image.error("file_name", error.message) from error
 
-    def _add_annotation(self, frame: Frame, item: Mapping[str, Any], record: str) -> None:
+    def _add_annotation(self, frame: CocoFrame, item: Mapping[str, Any], record: str) -> None:
         """One annotation of a frame: its ball, or the box of something else."""
         category = self.categories.find(item.get("category_id"))
         if category is None:
@@ -325,12 +325,14 @@ class _CocoFile:
                 self._add_ball(frame, item, category, record)
             else:
                 name = "" if category is None else category.name.lower()
-                frame.boxes.append(_box_of_other_category(name, item, box_from_annotation(item)))
+                frame.boxes.append(
+                    _make_box_of_other_category(name, item, box_from_annotation(item))
+                )
         except MissingPositionError as error:
             self._report_problem(record, error.field, f"{error.problem}; left out")
 
     def _add_ball(
-        self, frame: Frame, item: Mapping[str, Any], category: Category, record: str
+        self, frame: CocoFrame, item: Mapping[str, Any], category: CocoCategory, record: str
     ) -> None:
         if self._is_crowd(item, record):
             return
@@ -352,16 +354,16 @@ class _CocoFile:
         """The camera that a file of somebody else gives; one that is none is reported."""
         given = image.value.get(CAMERA)
         try:
-            if is_synloc(image.value):
+            if is_synloc_image_record(image.value):
                 return camera_from_synloc(image.value, self.path, image.record)
             return None if given is None else camera_from_json(given, self.path, image.record)
         except DatasetFormatError as error:
-            of_camera = [] if is_synloc(image.value) else [CAMERA]
+            of_camera = [] if is_synloc_image_record(image.value) else [CAMERA]
             field = ".".join([*of_camera, *filter(None, [error.field])])
             self._report_problem(image.record, field, f"{error.problem}; left out")
             return None
 
-    def _group_and_view(self, image: StateReader, key: str) -> tuple[str | None, str]:
+    def _read_group_and_view(self, image: StateReader, key: str) -> tuple[str | None, str]:
         """Group and name of a view; no group where the file says none."""
         group, view = image.value.get("group_id"), image.value.get("view")
         if group is None or isinstance(group, bool) or not isinstance(group, str | int | float):
@@ -393,7 +395,9 @@ def _is_relative_path(name: str) -> bool:
         return False
 
 
-def _box_of_other_category(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:
+def _make_box_of_other_category(
+    category: str, item: Mapping[str, Any], box: Box
+) -> Mapping[str, Any]:
     """A box of another category in the shape that all datasets show."""
     corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
     return {"class": category or None, "ID": str(item.get("id", "")), "points": corners}

@@ -16,9 +16,9 @@ from app.formats.ball_names import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STAT
 from app.formats.camera_json import camera_to_json
 from app.formats.export_record import ExportRecord, choose_ball_box, find_export_frame_name
 from app.formats.frame_names import UNASSIGNED
-from app.formats.view_state import head_to_json, view_to_json
+from app.formats.view_state import group_head_to_json, view_to_json
 from app.json_text import json_text
-from app.soccer.frames import Box, box_to_corner
+from app.soccer.frames import Box, box_to_corner_origin
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
 
@@ -139,7 +139,7 @@ def _image_to_json(
         "view": view.key,
         **computed,
         STATE: {
-            **head_to_json(record.group),
+            **group_head_to_json(record.group),
             "position": record.group.views.index(view),
             **view_to_json(view),
             ORIGIN: CORNER,
@@ -186,5 +186,5 @@ def _ball_fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tupl
 
 
 def _box_to_bbox(box: Box) -> list[float]:
-    box = box_to_corner(box)
+    box = box_to_corner_origin(box)
     return [*map(float, (box.x, box.y, box.width, box.height))]

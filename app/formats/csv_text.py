@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import IO, Any
 
 from app.errors import DatasetFormatError
-from app.formats.file_tree import Limits
-from app.json_text import quoted
+from app.formats.file_tree import ImportLimits
+from app.json_text import quote_text
 
 MAX_CELL = 1024 * 1024
 """Longest cell, characters; a camera takes about a thousand."""
@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 Value = str | bool | int | float | None
 
 
-def csv_cell(value: Value) -> str:
+def format_csv_cell(value: Value) -> str:
     """The text of one cell.
 
     Missing values (None, NaN) are empty. Text that a spreadsheet would run as a formula gets an
@@ -40,19 +40,19 @@ def csv_cell(value: Value) -> str:
     return repr(float(value)) if math.isfinite(value) else ""
 
 
-def csv_line(values: Iterable[Value]) -> str:
+def format_csv_line(values: Iterable[Value]) -> str:
     """A row of a CSV file with its end."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow([csv_cell(value) for value in values])
+    csv.writer(text, lineterminator="\n").writerow([format_csv_cell(value) for value in values])
     return text.getvalue()
 
 
-def list_text(values: Sequence[float | int]) -> str:
+def format_number_list(values: Sequence[float | int]) -> str:
     """A list as text, ``[1.0, 2.0]``, with every digit."""
-    return "[" + ", ".join(repr(_plain_number(value)) for value in values) + "]"
+    return "[" + ", ".join(repr(_to_builtin_number(value)) for value in values) + "]"
 
 
-def _plain_number(value: float) -> float:
+def _to_builtin_number(value: float) -> float:
     # numpy's own numbers would spell themselves np.float64(...).
     return int(value) if isinstance(value, int) else float(value)
 
@@ -67,10 +67,10 @@ class CsvTable:
 
     def add(self, values: Iterable[Value]) -> None:
         """One row; its index is the number of rows before it."""
-        self.add_cells(map(csv_cell, values))
+        self.add_cells(map(format_csv_cell, values))
 
     def add_cells(self, cells: Iterable[str]) -> None:
-        """One row of what ``csv_cell`` made."""
+        """One row of what ``format_csv_cell`` made."""
         self._writer.writerow([str(self.rows), *cells])
         self.rows += 1
 
@@ -79,7 +79,7 @@ def read_rows(
     content: bytes,
     path: str,
     required: Iterable[str],
-    limits: Limits,
+    limits: ImportLimits,
     *,
     delimiter: str = ",",
 ) -> Iterator[tuple[int, Mapping[str, str]]]:
@@ -117,7 +117,7 @@ def read_rows(
 
 
 def _unescape_formula(text: str) -> str:
-    """A cell without the apostrophe that ``csv_cell`` put before a formula."""
+    """A cell without the apostrophe that ``format_csv_cell`` put before a formula."""
     if text.startswith("'") and text.lstrip("'").startswith(_FORMULA):
         return text[1:]
     return text
@@ -139,7 +139,7 @@ def parse_number_list(text: str, count: int) -> tuple[float, ...]:
     bare = _WORDS.sub(" ", text)
     parts = [part for part in _BETWEEN.split(bare) if part]
     if not all(_NUMBER.fullmatch(part) for part in parts):
-        raise ValueError(f"is {quoted(text, 60)}, not a list of numbers")
+        raise ValueError(f"is {quote_text(text, 60)}, not a list of numbers")
     if len(parts) != count:
         raise ValueError(f"has {len(parts)} numbers, not {count}")
     values = tuple(map(float, parts))

@@ -8,26 +8,26 @@ from pathlib import Path
 from typing import get_args
 
 from app.errors import InputError
-from app.formats.cameras import camera_name_claims, write_camera_files
+from app.formats.cameras import map_camera_names_to_owners, write_camera_files
 from app.formats.coco_writer import write_coco
 from app.formats.export_record import ExportRecord
 from app.formats.frame_names import (
     Claims,
-    ExportNames,
+    ExportKeyAssigner,
     FrameName,
     Outline,
-    frame_name_claims,
     frame_path_by_match,
     frame_path_in_split,
+    map_frame_names_to_owners,
 )
-from app.formats.gamestate_reader import sequence_frame_path, sequence_name_claims
+from app.formats.gamestate_reader import map_sequence_names_to_owners, sequence_frame_path
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
 from app.formats.issia_3d import write_issia_3d
 from app.formats.issia_writer import write_issia
 from app.formats.manifest import SOFTWARE, read_software_version
 from app.formats.parquet import write_parquet
-from app.formats.sn_calibration import line_frame_path, line_name_claims
+from app.formats.sn_calibration import line_frame_path, map_line_names_to_owners
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import (
     labels_frame_path,
@@ -71,9 +71,9 @@ LAYOUTS: Mapping[str, FrameName] = {
 }
 """Where a format looks for the frames of its views, unless beside the labels of a match."""
 CLAIMS: Mapping[str, Claims] = {
-    "cameras": camera_name_claims,
-    "gamestate": sequence_name_claims,
-    "sn-calibration": line_name_claims,
+    "cameras": map_camera_names_to_owners,
+    "gamestate": map_sequence_names_to_owners,
+    "sn-calibration": map_line_names_to_owners,
 }
 """The names that a format makes of a view, unless that of its frame alone."""
 PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
@@ -221,12 +221,12 @@ def find_frame_path_rule(format: str) -> FrameName:  # noqa: A002
     return LAYOUTS.get(format, frame_path_by_match)
 
 
-def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # noqa: A002
+def make_export_names(format: str, outlines: Iterable[Outline]) -> ExportKeyAssigner:  # noqa: A002
     """By which keys a format calls the files of the views that will be exported."""
     if format in PRESCRIBED:
-        return ExportNames(lambda group, view, split: {})
+        return ExportKeyAssigner(lambda group, view, split: {})
     glue = "_" if format == "gamestate" else "/"
-    return ExportNames(CLAIMS.get(format, frame_name_claims), outlines, glue)
+    return ExportKeyAssigner(CLAIMS.get(format, map_frame_names_to_owners), outlines, glue)
 
 
 def describe_box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.formats.frame_names import expected_frame_suffix, frame_path_by_match, with_export_key
+from app.formats.frame_names import frame_path_by_match, guess_frame_suffix, with_export_key
 from app.geometry.camera import Camera
-from app.soccer.ball_boxes import ball_fit, collect_ball_boxes, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, has_ball_3d
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
@@ -28,7 +28,7 @@ class ExportRecord:
         override: The gate against which it was accepted, or None.
         splits: Split by view, where views of one group are split.
         frames: Where the frame of each view was placed in the export, by view key; relative.
-        names: Keys by which the files of views are called, where not by their own (``ExportNames``).
+        names: Keys by which the files of views are called, where not by their own (``ExportKeyAssigner``).
     """
 
     group: Group
@@ -73,7 +73,7 @@ class ExportRecord:
 
     def ball_fit(self, view: View, everything: bool) -> BallFit | None:
         """The 3D ball in one view; in views of no valid pair only when everything is asked."""
-        return ball_fit(self.solution, view, everything)
+        return find_ball_fit(self.solution, view, everything)
 
     def has_ball_3d(self, view: View) -> bool:
         """Whether the 3D ball holds in one view; every format's count of balls counts these."""
@@ -114,5 +114,5 @@ def find_export_frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
     placed, called = record.frames.get(view.key), record.named(view)
     return placed or frame_path_by_match(
-        record.group, called, record.split(view), expected_frame_suffix(view)
+        record.group, called, record.split(view), guess_frame_suffix(view)
     )

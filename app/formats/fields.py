@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.frames import MAX_PIXEL, MAX_SIDE, ImageSize
 
 T = TypeVar("T")
@@ -79,9 +79,9 @@ def parse_number(value: Any) -> float:
     if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"is {_kind_of_value(value)}, not a number")
+        raise ValueError(f"is {_describe_value_kind(value)}, not a number")
     if isinstance(value, str):
-        return _number_of_text(value)
+        return _parse_number_text(value)
     try:
         result = float(value)
     except OverflowError:
@@ -91,12 +91,12 @@ def parse_number(value: Any) -> float:
     return result
 
 
-def _number_of_text(text: str) -> float:
+def _parse_number_text(text: str) -> float:
     stripped = text.strip()
     if not stripped:
         raise ValueError("is blank")
     if len(stripped) > 400 or not _NUMBER.fullmatch(stripped):
-        raise ValueError(f"is {quoted(stripped, 40)}, not a number")
+        raise ValueError(f"is {quote_text(stripped, 40)}, not a number")
     result = float(stripped)
     if not math.isfinite(result):
         raise ValueError("is too large for a number")
@@ -134,7 +134,7 @@ def parse_numbers(value: Any, count: int) -> tuple[float, ...]:
         ValueError: Not a list, another length, or a member that is no number.
     """
     if not isinstance(value, (list, tuple)):
-        raise ValueError(f"is {_kind_of_value(value)}, not a list of {count} numbers")
+        raise ValueError(f"is {_describe_value_kind(value)}, not a list of {count} numbers")
     if len(value) != count:
         raise ValueError(f"has {len(value)} numbers, not {count}")
     return tuple(parse_number(item) for item in value)
@@ -147,7 +147,7 @@ def require_object(value: Any) -> dict[str, Any]:
         ValueError: Anything else.
     """
     if not isinstance(value, dict):
-        raise ValueError(f"is {_kind_of_value(value)}, not an object")
+        raise ValueError(f"is {_describe_value_kind(value)}, not an object")
     return value
 
 
@@ -158,11 +158,11 @@ def require_list(value: Any) -> list[Any]:
         ValueError: Anything else.
     """
     if not isinstance(value, (list, tuple)):
-        raise ValueError(f"is {_kind_of_value(value)}, not a list")
+        raise ValueError(f"is {_describe_value_kind(value)}, not a list")
     return list(value)
 
 
-def _kind_of_value(value: Any) -> str:
+def _describe_value_kind(value: Any) -> str:
     if value is None:
         return "null"
     names = {bool: "a truth value", str: "text", dict: "an object", list: "a list"}

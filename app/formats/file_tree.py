@@ -25,7 +25,7 @@ BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplemented
 
 
 @dataclass(frozen=True)
-class Limits:
+class ImportLimits:
     """How much an importer takes from one folder or archive.
 
     Attributes:
@@ -41,12 +41,12 @@ class Limits:
     ratio: int = 200
 
     @staticmethod
-    def of(settings: Settings) -> Limits:
+    def of(settings: Settings) -> ImportLimits:
         """The limits that an operator has set."""
-        return Limits(members=settings.max_members, file_bytes=settings.max_file_bytes)
+        return ImportLimits(members=settings.max_members, file_bytes=settings.max_file_bytes)
 
 
-DEFAULT_LIMITS = Limits()
+DEFAULT_LIMITS = ImportLimits()
 
 Root = Path | StoredPath
 """Where a dataset lies: on a disk, or in an object store."""

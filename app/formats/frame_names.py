@@ -57,27 +57,27 @@ def frame_path_in_split(group: Group, view: View, split: str, suffix: str) -> st
     Labels have the name without its ending: views that would share it have a digest of theirs, too.
     """
     ending = PurePosixPath(view.key).suffix.lower()
-    stem = _file_safe_stem(view.key)
-    if sum(_file_safe_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
+    stem = _make_file_safe_stem(view.key)
+    if sum(_make_file_safe_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
         stem = f"{stem}_{_key_digest(view.key)}"
     ending = ending if ending in IMAGE_SUFFIXES else suffix
-    return f"images/{split_folder(split)}/{_key_digest(group.key)}_{stem}{ending}"
+    return f"images/{folder_name_of_split(split)}/{_key_digest(group.key)}_{stem}{ending}"
 
 
-def _file_safe_stem(key: str) -> str:
-    return _UNSAFE.sub("-", view_stem(key))
+def _make_file_safe_stem(key: str) -> str:
+    return _UNSAFE.sub("-", strip_image_suffix(key))
 
 
 def _key_digest(key: str) -> str:
     return hashlib.sha256(key.encode()).hexdigest()[:12]
 
 
-def split_folder(split: str) -> str:
+def folder_name_of_split(split: str) -> str:
     """Name of a split as a folder; YOLO says ``val``, and what has no split trains."""
     return {"valid": "val", "test": "test", "challenge": "test"}.get(split, "train")
 
 
-def expected_frame_suffix(view: View) -> str:
+def guess_frame_suffix(view: View) -> str:
     """Ending that a copy of a view's frame would most likely have."""
     media = view.media
     name = "" if media is None else media.member or unseal_address(media.path)[0]
@@ -85,7 +85,7 @@ def expected_frame_suffix(view: View) -> str:
     return suffix if suffix in IMAGE_SUFFIXES else ".jpg"
 
 
-def view_stem(key: str) -> str:
+def strip_image_suffix(key: str) -> str:
     """Key of a view without the ending of an image's name."""
     place = PurePosixPath(key)
     return str(place.with_suffix("")) if place.suffix.lower() in IMAGE_SUFFIXES else key
@@ -95,7 +95,7 @@ def view_file_path(group: Group, view: View) -> str:
     """Where the files of a view go, without prefix and ending: ``<match>/7_1``."""
     # The key of a frame that is a group alone is the place of its file.
     match = group.match if view.key != group.key else ""
-    return str(PurePosixPath(match) / view_stem(view.key))
+    return str(PurePosixPath(match) / strip_image_suffix(view.key))
 
 
 Outline = tuple[Group, Mapping[str, str]]
@@ -104,7 +104,7 @@ Claims = Callable[[Group, View, str], Mapping[str, Hashable]]
 """The names that a view would have in an export, from its group and split; whose each would be."""
 
 
-def fold_file_name(name: str) -> str:
+def normalize_file_name(name: str) -> str:
     """The same for names that a disk may take for one: they differ in case or composition only."""
     return unicodedata.normalize("NFC", name).casefold()
 
@@ -115,30 +115,30 @@ def with_export_key(view: View, name: str | None) -> View:
     return view if name is None else replace(view, key=name, extras=Extras())
 
 
-def frame_identity(group: Group, view: View) -> Hashable:
+def identify_frame(group: Group, view: View) -> Hashable:
     """Which frame a view shows: the file where there is one, which several groups may show."""
     if view.media is None:
         return group.key, view.key
     return view.media, view.station.flipped
 
 
-def frame_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def map_frame_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """Of formats whose records name the picture alone."""
     return {
-        frame_path_by_match(group, view, split, expected_frame_suffix(view)): frame_identity(
+        frame_path_by_match(group, view, split, guess_frame_suffix(view)): identify_frame(
             group, view
         )
     }
 
 
-def key_in_group(group: Group, view: View, glue: str = "/") -> str:
+def prefix_view_key_with_group(group: Group, view: View, glue: str = "/") -> str:
     """The key of a view with the name of its group before it, ``kick-1/north``."""
     own = group.key.removeprefix(f"{group.match}/") if group.match else group.key
     key = view.key if view.key == group.key else f"{own}/{view.key}"
     return key.replace("/", glue)
 
 
-class ExportNames:
+class ExportKeyAssigner:
     """Gives each view of an export the key by which its files are called.
 
     That is its own key, unless several frames would then have one name: each of them has the name
@@ -158,7 +158,7 @@ class ExportNames:
         self._contested: set[int] = set()
         for group, splits in outlines:
             for view in group.views:
-                for name, owner in self._hash_claims(group, view, splits):
+                for name, owner in self._hash_names_and_owners(group, view, splits):
                     if self._owners.setdefault(name, owner) != owner:
                         self._contested.add(name)
 
@@ -178,7 +178,7 @@ class ExportNames:
     def _choose_free_key(self, group: Group, view: View, splits: Mapping[str, str]) -> str:
         for key in self._candidate_keys(group, view):
             other = None if key == view.key else key
-            names = self._hash_claims(group, view, splits, other)
+            names = self._hash_names_and_owners(group, view, splits, other)
             if all(
                 name not in self._contested and self._owners.get(name, owner) == owner
                 for name, owner in names
@@ -193,15 +193,15 @@ class ExportNames:
 
     def _candidate_keys(self, group: Group, view: View) -> Iterator[str]:
         yield view.key
-        yield key_in_group(group, view, self._glue)
-        stem = view_stem(view.key)
+        yield prefix_view_key_with_group(group, view, self._glue)
+        stem = strip_image_suffix(view.key)
         ending = view.key.removeprefix(stem)
         digest = hashlib.sha256(f"{group.key}\0{view.key}".encode()).hexdigest()[:12]
         yield f"{stem.replace('/', self._glue)}_{digest}{ending}"
 
-    def _hash_claims(
+    def _hash_names_and_owners(
         self, group: Group, view: View, splits: Mapping[str, str], key: str | None = None
     ) -> list[tuple[int, int]]:
         split = splits.get(view.key, group.split)
         wanted = self._claims(group, with_export_key(view, key), split)
-        return [(hash(fold_file_name(name)), hash(owner)) for name, owner in wanted.items()]
+        return [(hash(normalize_file_name(name)), hash(owner)) for name, owner in wanted.items()]

@@ -12,12 +12,12 @@ from typing import Any
 
 from app.config import Settings
 from app.errors import DatasetFormatError, ImageError, InputError, NotFoundError, TooLargeError
-from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file, require_safe_path
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.object_store.path import (
     StoredPath,
     find_path,
@@ -45,7 +45,7 @@ SizeOf = Callable[[bytes, str], ImageSize]
 TooLargeError."""
 
 
-def check_grouping(grouping: str) -> re.Pattern[str] | None:
+def parse_grouping_pattern(grouping: str) -> re.Pattern[str] | None:
     """What the names of pictures must look like to be grouped by them; None: they need not.
 
     Example:
@@ -75,7 +75,7 @@ def read_frames(
     root: Root,
     size_of: SizeOf,
     report: ReaderReport,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
     grouping: str = "",
 ) -> Iterator[Group]:
     """Every picture of a folder, a zip or a store, or one alone, in the order of their names.
@@ -91,8 +91,8 @@ def read_frames(
         grouping: Empty: each picture is a group; ``folder``: those of a folder are one; else a pattern
             of their names with ``{instant}`` and ``{camera}``, by instant and folder.
     """
-    pattern = check_grouping(grouping)
-    with open_tree_while_read(root, report, limits) as tree:
+    pattern = parse_grouping_pattern(grouping)
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         pictures = []
@@ -140,11 +140,11 @@ def _report_groups(report: ReaderReport, groups: dict[str, list[str]], grouping:
     how = "by folder" if grouping == BY_FOLDER else f"by {grouping}"
     count = plural(sum(map(len, groups.values())), "picture")
     example = "" if names == [key] else f"; for example {key}: {shown}{more}"
-    report.remark(f"Grouped {how}: {count} in {plural(len(groups), 'group')}{example}.")
+    report.add_remark(f"Grouped {how}: {count} in {plural(len(groups), 'group')}{example}.")
     alone = sum(names == [key] for key, names in groups.items())
     if alone and grouping != BY_FOLDER:
         fit = plural(alone, "picture does", "pictures do")
-        report.remark(f"{fit} not fit {grouping}: each is a group of its own.")
+        report.add_remark(f"{fit} not fit {grouping}: each is a group of its own.")
 
 
 def _read_views(
@@ -201,7 +201,7 @@ class FrameList:
         settings: Settings,
         folder: StoredPath | None,
         report: ReaderReport,
-        limits: Limits = DEFAULT_LIMITS,
+        limits: ImportLimits = DEFAULT_LIMITS,
     ):
         self._settings, self._folder = settings, folder
         self._shown, self._report = shown, report
@@ -218,14 +218,18 @@ class FrameList:
                 report.note(shown, f"frames/{number}", None, error.message)
 
     def _add_frame(self, item: Any) -> None:
-        def text(name: str) -> str | None:
+        def read_text_field(name: str) -> str | None:
             found = item.get(name) if isinstance(item, dict) else None
             if found is not None and not (isinstance(found, str) and 0 < len(found) <= 1000):
                 raise InputError(f"{name} is not a text of 1 to 1000 characters")
             return found
 
-        group, view, path = text("group"), text("view"), text("path")
-        member, digest = text("member"), text("sha256")
+        group, view, path = (
+            read_text_field("group"),
+            read_text_field("view"),
+            read_text_field("path"),
+        )
+        member, digest = read_text_field("member"), read_text_field("sha256")
         if group is None or view is None or path is None:
             raise InputError("needs group, view and path")
         if digest is not None and not _SHA256.fullmatch(digest):
@@ -255,7 +259,7 @@ class FrameList:
             self._sealed[address] = seal_address(address, stored.etag)
         return self._sealed[address]
 
-    def with_listed_frames(self, groups: Iterator[Group]) -> Iterator[Group]:
+    def replace_listed_frames(self, groups: Iterator[Group]) -> Iterator[Group]:
         """The groups, each view with the frame that the list names for it; others keep theirs.
 
         Entries that name no view are reported in the end.
@@ -264,7 +268,7 @@ class FrameList:
         for group in groups:
             for view in group.views:
                 unused.pop((group.key, view.key), None)
-            views = tuple(self._with_listed_frame(group.key, view) for view in group.views)
+            views = tuple(self._replace_listed_frame(group.key, view) for view in group.views)
             yield replace(group, views=views)
         if unused:
             count = plural(len(unused), "entry names", "entries name")
@@ -273,13 +277,13 @@ class FrameList:
             problem = f"{count} no view of what was read: {names}{more}"
             self._report.note(self._shown, None, "frames", problem)
 
-    def _with_listed_frame(self, group: str, view: View) -> View:
+    def _replace_listed_frame(self, group: str, view: View) -> View:
         media = self._media.get((group, view.key))
         return view if media is None else replace(view, media=media)
 
 
 def read_frame_list(
-    place: Root, settings: Settings, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+    place: Root, settings: Settings, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> FrameList:
     """The list at a place, on a disk or in a store.
 

@@ -9,16 +9,16 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats import fields
-from app.formats.ball_names import is_ball
+from app.formats.ball_names import is_ball_name
 from app.formats.fields import IdIndex
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
-from app.formats.frame_names import UNASSIGNED, view_stem
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
+from app.formats.frame_names import UNASSIGNED, strip_image_suffix
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -51,13 +51,13 @@ def frame_file_name(group: Group, view: View) -> str:
     image = read_source_fields(view).get("image")
     if isinstance(image, dict) and isinstance(image.get("file_name"), str):
         return str(image["file_name"])
-    stem = view_stem(view.key)
+    stem = strip_image_suffix(view.key)
     if view.station.shared:
         stem = f"{group.key}_{stem}"
     return f"{PurePosixPath(stem).name}{PurePosixPath(view.key).suffix or '.jpg'}"
 
 
-def sequence_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def map_sequence_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The name of a view in an export, and whose it is (``export_names.Claims``).
 
     Files of one sequence in several splits are one sequence to who reads them, and images are
@@ -87,14 +87,14 @@ def read_gamestate(
     report: ReaderReport,
     *,
     calibration: str = "given",
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
 ) -> Iterator[Group]:
     """Every image of every sequence below ``root``, keyed ``<sequence>/<stem>``.
 
     People go to ``Extras.boxes`` with their whole annotation; whatever else the file holds is
     kept for the way back.
     """
-    with open_tree_while_read(root, report, limits) as tree:
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -135,7 +135,12 @@ class _LabelledSequence:
     """One Labels-GameState.json on its way to groups."""
 
     def __init__(
-        self, tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: Limits
+        self,
+        tree: FileTree,
+        name: str,
+        names: list[str],
+        report: ReaderReport,
+        limits: ImportLimits,
     ):
         self.path, self._report, self._tree = tree.shown(name), report, tree
         content = tree.read_bytes(name)
@@ -176,7 +181,7 @@ class _LabelledSequence:
         """
         images: list[_AnnotatedImage] = []
         index: IdIndex[_AnnotatedImage] = IdIndex()
-        for identity, record, size in self._image_records(stems):
+        for identity, record, size in self._read_image_records(stems):
             image = _AnnotatedImage(record, size)
             if not index.add(identity, image):
                 problem = f"is {identity}, the id of an earlier image, too: that one gets all its annotations"
@@ -196,7 +201,9 @@ class _LabelledSequence:
             label = f"{self.key} · {PurePosixPath(key).stem}"
             yield Group(name, (view,), match=self.key, split=self.split, label=label)
 
-    def _image_records(self, names: set[str]) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
+    def _read_image_records(
+        self, names: set[str]
+    ) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
         """Sound image records with their ids, each name once."""
         for index, record in enumerate(self._get_list("images")):
             self._report.read += 1
@@ -226,7 +233,7 @@ class _LabelledSequence:
 
     def _join_annotations(self, images: IdIndex[_AnnotatedImage]) -> None:
         """Give each annotation to its image; one that joins none is named."""
-        categories = self._category_names()
+        categories = self._read_category_names()
         for index, item in enumerate(self._get_list("annotations")):
             where = f"annotations[{index}]"
             image = images.find(item.get("image_id")) if isinstance(item, dict) else None
@@ -240,14 +247,14 @@ class _LabelledSequence:
                 self._report.note(self.path, where, "category_id", problem)
             if name == PITCH:
                 self._add_lines(image, item, image.size, where)
-            elif name is not None and is_ball(name):
+            elif name is not None and is_ball_name(name):
                 self._add_ball(image, item, where)
             elif isinstance(item.get("bbox_image"), dict):
-                image.boxes.append(_person_box(item))
+                image.boxes.append(_make_person_box(item))
             else:
                 image.kept.setdefault("others", []).append(item)
 
-    def _category_names(self) -> IdIndex[str]:
+    def _read_category_names(self) -> IdIndex[str]:
         """Name of each category by its id; the usual ones where a file does not list them."""
         found: IdIndex[str] = IdIndex()
         listed = self._value.get("categories")
@@ -318,7 +325,7 @@ def _read_ball(item: Mapping[str, Any]) -> BallAnnotation:
     return BallAnnotation(box=box)
 
 
-def _person_box(item: Mapping[str, Any]) -> Mapping[str, Any]:
+def _make_person_box(item: Mapping[str, Any]) -> Mapping[str, Any]:
     """A person in the shape that all datasets show, with the annotation as it was."""
     attributes = item.get("attributes")
     details = attributes if isinstance(attributes, dict) else {}

@@ -17,7 +17,7 @@ from app.errors import InputError
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
 from app.formats.export_record import ExportRecord
-from app.formats.frame_names import fold_file_name
+from app.formats.frame_names import normalize_file_name
 from app.formats.gamestate_reader import (
     BALL_ID,
     CAMERA_ID,
@@ -83,7 +83,7 @@ class _LabelsFile:
     tracks: dict[Hashable, int] = field(default_factory=dict)
 
     def to_json_text(self) -> str:
-        info = _compact_json(self.kept.get("info") or self._sequence_info())
+        info = _compact_json(self.kept.get("info") or self._make_sequence_info())
         categories = _compact_json(self.kept.get("categories") or _CATEGORIES)
         images, annotations = ",\n".join(self.images), ",\n".join(self.annotations)
         return (
@@ -91,7 +91,7 @@ class _LabelsFile:
             f'"categories":{categories}}}\n'
         )
 
-    def _sequence_info(self) -> dict[str, Any]:
+    def _make_sequence_info(self) -> dict[str, Any]:
         info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
         return {**info, "seq_length": len(self.images)}
 
@@ -135,7 +135,7 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                 if split not in touched:
                     path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
                     # Whatever its split, a sequence is known by the name of its folder.
-                    other = matches.setdefault(fold_file_name(path.parent.name), match)
+                    other = matches.setdefault(normalize_file_name(path.parent.name), match)
                     if other != match:
                         raise InputError(
                             f"the matches {other} and {match} would be written to the same folder,"
@@ -143,14 +143,14 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                             hint="Rename one of them in the source, and import it again.",
                         )
                     if path in files:
-                        _reload_file(files[path], path)
+                        _reload_labels_file(files[path], path)
                     else:
                         files[path] = _LabelsFile(path.parent.name, len(files) + 1, split)
                     touched[split] = path
                 _reserve_image_name(names, record, view)
                 _add_view(files[touched[split]], record, view, counts)
         for path in sorted(touched.values()):
-            _write_file(files[path], path)
+            _write_labels_file(files[path], path)
     return counts
 
 
@@ -160,7 +160,9 @@ def _reserve_image_name(
     """Keep the name of an image; raises InputError where another one of its sequence has it."""
     name = frame_file_name(record.group, record.named(view))
     whose = f"{record.group.key}, {view.key}"
-    first = names.setdefault((record.group.match, fold_file_name(PurePosixPath(name).stem)), whose)
+    first = names.setdefault(
+        (record.group.match, normalize_file_name(PurePosixPath(name).stem)), whose
+    )
     if first != whose:
         raise InputError(
             f"the images of two frames ({first} and {whose}) would both be called {name}",
@@ -168,14 +170,14 @@ def _reserve_image_name(
         )
 
 
-def _write_file(file: _LabelsFile, path: Path) -> None:
+def _write_labels_file(file: _LabelsFile, path: Path) -> None:
     """Write a file, and forget what it holds until its match comes again."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(file.to_json_text(), encoding="utf-8")
     file.images, file.annotations = [], []
 
 
-def _reload_file(file: _LabelsFile, path: Path) -> None:
+def _reload_labels_file(file: _LabelsFile, path: Path) -> None:
     earlier = json.loads(path.read_text(encoding="utf-8"))
     file.images = [_compact_json(item) for item in earlier["images"]]
     file.annotations = [_compact_json(item) for item in earlier["annotations"]]
@@ -189,14 +191,14 @@ def _add_view(file: _LabelsFile, record: ExportRecord, view: View, counts: dict[
     kept = read_source_fields(view)
     file.kept = file.kept or kept
     camera = record.camera(view)
-    people = _people_of_view(file, record.group, view, camera)
+    people = _make_people_annotations(file, record.group, view, camera)
     image = _image_to_json(file, record, view, camera, people)
     file.images.append(_compact_json(image))
     identity = str(image.get("image_id", image.get("id")))
     annotations = [
         *people,
-        *_ball_annotations(file, record, view),
-        *_other_annotations(view, camera),
+        *_make_ball_annotations(file, record, view),
+        *_make_other_annotations(view, camera),
     ]
     if annotations:
         found = [
@@ -242,7 +244,7 @@ def _can_store_camera(camera: Camera | None) -> bool:
     return camera is not None and not camera.is_wide
 
 
-def _people_of_view(
+def _make_people_annotations(
     file: _LabelsFile, group: Group, view: View, camera: Camera | None
 ) -> list[dict[str, Any]]:
     """The people of an image, as they came or made anew, each track once."""
@@ -253,23 +255,23 @@ def _people_of_view(
         if isinstance(box.get(METADATA), dict):
             people.append(dict(box[METADATA]))
             continue
-        person = _person_annotation(box)
+        person = _make_person_annotation(box)
         if person is None:
             continue
-        track = file.track_number(_track_owner(box, group, view, index))
+        track = file.track_number(_identify_track_owner(box, group, view, index))
         if track in seen:
             track = file.track_number((group.key, view.key, index))
         seen.add(track)
         person["track_id"] = track
         people.append(person)
         made.append(person)
-    standing = _boxes_on_pitch(camera, [person["bbox_image"] for person in made])
+    standing = _project_boxes_to_pitch(camera, [person["bbox_image"] for person in made])
     for person, place in zip(made, standing, strict=True):
         person["bbox_pitch"] = place
     return people
 
 
-def _track_owner(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
+def _identify_track_owner(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
     """Whose box it is: a shirt number is the same all match long, another tag in its group."""
     # A class that is no text is kept as it came, like all that datasets bring.
     name, tag = str(box.get("class")), box.get("ID")
@@ -279,7 +281,7 @@ def _track_owner(box: Mapping[str, Any], group: Group, view: View, index: int) -
     return (name, text) if text.isdigit() else (name, text, group.key)
 
 
-def _boxes_on_pitch(
+def _project_boxes_to_pitch(
     camera: Camera | None, boxes: Sequence[Mapping[str, float]]
 ) -> list[dict[str, float] | None]:
     """Where the lower edge of each box stands on the grass, metres; None without a place there."""
@@ -287,39 +289,39 @@ def _boxes_on_pitch(
         return [None] * len(boxes)
     left, wide, low = np.array([(box["x"], box["w"], box["y"] + box["h"]) for box in boxes]).T
     edges = np.column_stack([left, low, left + wide / 2, low, left + wide, low])
-    places = np.round(camera.on_ground(edges.reshape(-1, 2)).reshape(-1, 6), _PLACE_DIGITS)
+    places = np.round(camera.project_to_ground(edges.reshape(-1, 2)).reshape(-1, 6), _PLACE_DIGITS)
     stand = np.isfinite(places.sum(axis=1)).tolist()
     return [
-        _bbox_pitch(place) if stands else None
+        _make_bbox_pitch(place) if stands else None
         for place, stands in zip(places.tolist(), stand, strict=True)
     ]
 
 
-def _bbox_pitch(place: Sequence[float]) -> dict[str, float]:
+def _make_bbox_pitch(place: Sequence[float]) -> dict[str, float]:
     """``bbox_pitch`` of x and y of the left, middle and right of a lower edge, pitch frame."""
     return dict(zip(_PITCH_BOX, place, strict=True))
 
 
-def _ball_annotations(
+def _make_ball_annotations(
     file: _LabelsFile, record: ExportRecord, view: View
 ) -> Iterator[dict[str, Any]]:
     rest = read_source_fields(view).get("balls") or []
     balls = [ball for ball in view.balls if ball.center is not None]
     for index, ball in enumerate(balls):
-        kept = rest[index] if index < len(rest) else _new_ball_fields(file, record, view, index)
-        yield {**_BALL, **kept, "bbox_image": _bbox_of_ball(ball)}
+        kept = rest[index] if index < len(rest) else _make_ball_fields(file, record, view, index)
+        yield {**_BALL, **kept, "bbox_image": _make_bbox_of_ball(ball)}
 
 
-def _new_ball_fields(
+def _make_ball_fields(
     file: _LabelsFile, record: ExportRecord, view: View, index: int
 ) -> dict[str, Any]:
     return {
         "track_id": file.track_number(("ball", index)),
-        "bbox_pitch": _spot_below_ball(record, view),
+        "bbox_pitch": _locate_spot_below_ball(record, view),
     }
 
 
-def _spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
+def _locate_spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     """The spot below the 3D ball, where that holds: the box of a ball in the air stands elsewhere."""
     camera, point = record.camera(view), record.point
     if camera is None or point is None or not record.has_ball_3d(view):
@@ -329,10 +331,10 @@ def _spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | Non
     share = PAPER.ball_diameter_m / 2 / max(math.hypot(x, y), 1e-9)
     (east, south, _), right, down = point, x * share, y * share
     edge = (east - right, south - down, east, south, east + right, south + down)
-    return _bbox_pitch([round(value, _PLACE_DIGITS) for value in edge])
+    return _make_bbox_pitch([round(value, _PLACE_DIGITS) for value in edge])
 
 
-def _other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
+def _make_other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
     """The lines, the camera, and what else there was."""
     kept = read_source_fields(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:
@@ -348,16 +350,16 @@ def _other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, 
     yield from (dict(item) for item in kept.get("others") or [])
 
 
-def _bbox_of_ball(ball: BallAnnotation) -> dict[str, float]:
+def _make_bbox_of_ball(ball: BallAnnotation) -> dict[str, float]:
     assert ball.center is not None, "the caller leaves out what is out of view"
     x, y = ball.center
     box = ball.box
-    return _bbox_image(
+    return _make_bbox_image(
         *((x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height))
     )
 
 
-def _bbox_image(x: float, y: float, width: float, height: float) -> dict[str, float]:
+def _make_bbox_image(x: float, y: float, width: float, height: float) -> dict[str, float]:
     return {
         "x": x,
         "y": y,
@@ -369,27 +371,27 @@ def _bbox_image(x: float, y: float, width: float, height: float) -> dict[str, fl
 
 
 @lru_cache(maxsize=256)
-def _role_and_team(name: str) -> tuple[str, str | None]:
+def _parse_role_and_team(name: str) -> tuple[str, str | None]:
     """What SoccerNet's class of a person says."""
     words = name.lower().split()
     role = next((role for role in _ROLES if role in words), "other")
     return role, next((side for side in ("left", "right") if side in words), None)
 
 
-def _person_annotation(box: Mapping[str, Any]) -> dict[str, Any] | None:
+def _make_person_annotation(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
         x1, y1, x2, y2 = [fields.parse_number(corners[name]) for name in CORNERS]  # type: ignore[index]
     except (TypeError, KeyError, ValueError):
         return None
-    role, team = _role_and_team(str(box.get("class") or ""))
+    role, team = _parse_role_and_team(str(box.get("class") or ""))
     number = str(box.get("ID"))
     return {
         "track_id": None,
         "supercategory": "object",
         "category_id": _ROLES.get(role, _OTHER),
         "attributes": {"role": role, "jersey": number if number.isdigit() else None, "team": team},
-        "bbox_image": _bbox_image(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1)),
+        "bbox_image": _make_bbox_image(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1)),
         "bbox_pitch": None,
     }

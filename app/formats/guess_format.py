@@ -16,7 +16,7 @@ from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_fi
 from app.formats.json_reader import EVALUATE, EXPORT
 from app.formats.report import ReaderReport
 from app.formats.safe_path import MAX_PART
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.object_store.path import StoredPath
 from app.zip_file import list_first_member_names
 
@@ -45,10 +45,10 @@ _DOCUMENTS = re.compile(
 
 def guess_format(path: Path | StoredPath) -> str | None:
     """Name of the format for ``touchline import``, or None where nothing looks familiar."""
-    return guess_format_of_names(islice(_file_names(path), MAX_NAMES))
+    return guess_format_from_names(islice(_list_file_names(path), MAX_NAMES))
 
 
-def guess_format_of_names(found: Iterable[str]) -> str | None:
+def guess_format_from_names(found: Iterable[str]) -> str | None:
     """The same of names of files."""
     parts = (name.rpartition("/")[2] for name in found if not is_system_file(name))
     names = [part for part in parts if 0 < len(part) <= MAX_PART]
@@ -62,7 +62,7 @@ def guess_format_of_names(found: Iterable[str]) -> str | None:
 
 def holds_only_videos(path: Path | StoredPath) -> bool:
     """Whether a folder, a zip or a file is a video, or holds nothing but videos and documents."""
-    names = [name for name in islice(_file_names(path), MAX_NAMES) if not is_system_file(name)]
+    names = [name for name in islice(_list_file_names(path), MAX_NAMES) if not is_system_file(name)]
     parts = (name.rpartition("/")[2] for name in names if not name.endswith("/"))
     suffixes = _suffixes(part for part in parts if not _DOCUMENTS.fullmatch(part))
     return bool(suffixes) and suffixes <= set(VIDEO_SUFFIXES)
@@ -72,7 +72,7 @@ def _suffixes(names: Iterable[str]) -> set[str]:
     return {PurePosixPath(name).suffix.lower() for name in names}
 
 
-def _file_names(path: Path | StoredPath) -> Iterable[str]:
+def _list_file_names(path: Path | StoredPath) -> Iterable[str]:
     if isinstance(path, StoredPath):
         return _object_names(path)
     if path.is_dir():
@@ -145,7 +145,7 @@ class FormatGuess:
         return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))
 
 
-def _key_patterns(*names: str) -> tuple[re.Pattern[bytes], ...]:
+def _compile_key_patterns(*names: str) -> tuple[re.Pattern[bytes], ...]:
     """That all of some keys stand in a JSON text."""
     return tuple(re.compile(rb'"%s"\s*:' % name.encode()) for name in names)
 
@@ -160,30 +160,36 @@ _MOT = re.compile(rb"\A\s*\d{1,9}, ?-?\d{1,9}(?:, ?%s){4,8}\s*(?:\r?\n|\Z)" % _N
 _Kinds = tuple[tuple[tuple[re.Pattern[bytes], ...], FormatGuess], ...]
 """What is found where all of some patterns are; the first one that fits."""
 _JSON: _Kinds = (
-    (_key_patterns("imageMetadata", "calibration"), FormatGuess("soccernet-v3d", "soccernet-v3d")),
-    (_key_patterns("imageMetadata"), FormatGuess("soccernet-v3", "soccernet-v3")),
-    (_key_patterns("bbox_image"), FormatGuess("gamestate", "gamestate")),
-    (_key_patterns("shapes", "imagePath"), FormatGuess("LabelMe, a JSON file for each picture")),
     (
-        _key_patterns("file_attributes", "regions"),
+        _compile_key_patterns("imageMetadata", "calibration"),
+        FormatGuess("soccernet-v3d", "soccernet-v3d"),
+    ),
+    (_compile_key_patterns("imageMetadata"), FormatGuess("soccernet-v3", "soccernet-v3")),
+    (_compile_key_patterns("bbox_image"), FormatGuess("gamestate", "gamestate")),
+    (
+        _compile_key_patterns("shapes", "imagePath"),
+        FormatGuess("LabelMe, a JSON file for each picture"),
+    ),
+    (
+        _compile_key_patterns("file_attributes", "regions"),
         FormatGuess("a project of the VGG Image Annotator (VIA)"),
     ),
-    (_key_patterns("from_name", "to_name"), FormatGuess("Label Studio's own JSON")),
-    (_key_patterns("classTitle"), FormatGuess("Supervisely")),
-    (_key_patterns("dm_format_version"), FormatGuess("Datumaro")),
-    (_key_patterns("image", "annotations", "coordinates"), FormatGuess("Create ML")),
-    (_key_patterns("images", "annotations"), FormatGuess("coco", "coco")),
-    (_key_patterns("images", "categories"), FormatGuess("coco", "coco")),
-    (_key_patterns("images", "file_name"), FormatGuess("coco", "coco")),
+    (_compile_key_patterns("from_name", "to_name"), FormatGuess("Label Studio's own JSON")),
+    (_compile_key_patterns("classTitle"), FormatGuess("Supervisely")),
+    (_compile_key_patterns("dm_format_version"), FormatGuess("Datumaro")),
+    (_compile_key_patterns("image", "annotations", "coordinates"), FormatGuess("Create ML")),
+    (_compile_key_patterns("images", "annotations"), FormatGuess("coco", "coco")),
+    (_compile_key_patterns("images", "categories"), FormatGuess("coco", "coco")),
+    (_compile_key_patterns("images", "file_name"), FormatGuess("coco", "coco")),
     (
-        _key_patterns("image_id", "score"),
+        _compile_key_patterns("image_id", "score"),
         FormatGuess("COCO results of a detector", None, PREDICTED),
     ),
     (
-        _key_patterns("gameTime", "label"),
+        _compile_key_patterns("gameTime", "label"),
         FormatGuess("SoccerNet's action spotting", None, NO_PLACES),
     ),
-    (_key_patterns("pan_degrees"), FormatGuess("cameras", "cameras")),
+    (_compile_key_patterns("pan_degrees"), FormatGuess("cameras", "cameras")),
     ((re.compile(_MARKING),), FormatGuess("sn-calibration", "sn-calibration")),
 )
 _XML: _Kinds = (
@@ -225,8 +231,8 @@ def guess_from_content(path: Root, format_: str) -> FormatGuess | None:
         format_: The format that they were given for.
     """
     try:
-        with open_tree_while_read(path, ReaderReport()) as tree:
-            found = None if tree is None else _guess_of_tree(tree)
+        with open_tree_context(path, ReaderReport()) as tree:
+            found = None if tree is None else _guess_format_of_tree(tree)
     except (*BROKEN, ReviewError, ValueError):
         found = None
     if found is not None:
@@ -235,7 +241,7 @@ def guess_from_content(path: Root, format_: str) -> FormatGuess | None:
     return None if guess is None or guess == format_ else FormatGuess(guess, guess)
 
 
-def _guess_of_tree(tree: FileTree) -> FormatGuess | None:
+def _guess_format_of_tree(tree: FileTree) -> FormatGuess | None:
     """What most of the first files are."""
     names = tree.names()
     suffixes = Counter(PurePosixPath(name).suffix.lower() for name in names)
@@ -245,7 +251,7 @@ def _guess_of_tree(tree: FileTree) -> FormatGuess | None:
     seen = Counter(
         look
         for name in islice(heads, MAX_FILES)
-        if (look := _guess_of_file_start(tree, name)) is not None
+        if (look := _guess_format_from_file_start(tree, name)) is not None
     )
     if seen:
         return seen.most_common(1)[0][0]
@@ -256,7 +262,7 @@ def _guess_of_tree(tree: FileTree) -> FormatGuess | None:
     return None
 
 
-def _guess_of_file_start(tree: FileTree, name: str) -> FormatGuess | None:
+def _guess_format_from_file_start(tree: FileTree, name: str) -> FormatGuess | None:
     try:
         with tree.open(name) as file:
             head = file.read(HEAD_BYTES)

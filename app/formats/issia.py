@@ -47,7 +47,7 @@ def camera_number_of_view(group: Group, view: View) -> int:
     """
     found = _VIEW.fullmatch(view.key)
     if found is None:
-        raise _not_issia_error(group, view.key)
+        raise _make_not_issia_error(group, view.key)
     frame_number_of_group(group)
     return int(found[1])
 
@@ -59,11 +59,11 @@ def frame_number_of_group(group: Group) -> int:
         InputError: The group is from another kind of dataset.
     """
     if not _FRAME.fullmatch(group.key):
-        raise _not_issia_error(group, ", ".join(view.key for view in group.views))
+        raise _make_not_issia_error(group, ", ".join(view.key for view in group.views))
     return int(group.key)
 
 
-class IssiaNumberOwners:
+class IssiaNumberRegistry:
     """Keeps whose the numbers of frames and cameras are, of which ISSIA's files have one each."""
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ class IssiaNumberOwners:
         return number
 
 
-def _not_issia_error(group: Group, view: str) -> InputError:
+def _make_not_issia_error(group: Group, view: str) -> InputError:
     return InputError(
         f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",
         hint="Export it as soccernet-v3d or cameras instead.",

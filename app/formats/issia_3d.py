@@ -10,13 +10,20 @@ from pathlib import Path, PurePosixPath
 from app.errors import DatasetFormatError
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
-from app.formats.csv_text import CsvTable, Value, csv_cell, is_missing, list_text, read_rows
+from app.formats.csv_text import (
+    CsvTable,
+    Value,
+    format_csv_cell,
+    format_number_list,
+    is_missing,
+    read_rows,
+)
 from app.formats.export_record import ExportRecord
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.issia import (
     CALIBRATION,
     TABLE_3D,
-    IssiaNumberOwners,
+    IssiaNumberRegistry,
     camera_number_of_view,
     frame_number_of_group,
 )
@@ -27,7 +34,7 @@ from app.formats.issia_reader import (
     count_annotations,
 )
 from app.formats.report import ReaderReport
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.formats.view_files import SortedSpill, open_spill
 from app.formats.viper_reader import ViperTrack
 from app.geometry.camera import Camera
@@ -41,7 +48,7 @@ _AXIS = re.compile(r"([xy])_cam(\d{1,3})", re.ASCII)
 
 
 def open_issia_3d(
-    folder: Root, options: IssiaOptions, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip, or the table alone) as if it were ISSIA's own ground truth.
 
@@ -50,7 +57,7 @@ def open_issia_3d(
     the table. Numbers of frames are those of the videos: ``options.frame_offset`` is not used.
     """
     found = IssiaFolder()
-    with open_tree_while_read(folder, report, limits) as tree:
+    with open_tree_context(folder, report, limits) as tree:
         if tree is None:
             return found
         names = tree.names()
@@ -69,7 +76,7 @@ def open_issia_3d(
 
 
 def _read_table(
-    tree: FileTree, name: str, found: IssiaFolder, report: ReaderReport, limits: Limits
+    tree: FileTree, name: str, found: IssiaFolder, report: ReaderReport, limits: ImportLimits
 ) -> None:
     shown, seen = tree.shown(name), set[int]()
     try:
@@ -169,15 +176,18 @@ def write_issia_3d(
         InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "points": 0, "balls": 0}
-    cameras, known = dict[int, Camera](), IssiaNumberOwners()
+    cameras, known = dict[int, Camera](), IssiaNumberRegistry()
     with open_spill() as spill:
         for record in records:
-            annotating = _views_with_ball(record)
+            annotating = _find_views_with_ball(record)
             frame = known.claim_frame_number(record.group)
             _collect_cameras(record, cameras, known)
             if annotating:
                 verdict = (record.verdict_text,) if everything else ()
-                cells = [csv_cell(value) for value in (*_table_row(record, annotating), *verdict)]
+                cells = [
+                    format_csv_cell(value)
+                    for value in (*_make_table_row(record, annotating), *verdict)
+                ]
                 spill.add((frame, 0, "", 0), json_text(cells))
                 counts["groups"] += 1
                 counts["points"] += record.point is not None
@@ -194,7 +204,7 @@ def _write_table(path: Path, spill: SortedSpill, everything: bool) -> None:
             table.add_cells(json.loads(cells))
 
 
-def _views_with_ball(record: ExportRecord) -> dict[int, View]:
+def _find_views_with_ball(record: ExportRecord) -> dict[int, View]:
     """Views that annotate the ball, by camera number."""
     numbered = {camera_number_of_view(record.group, view): view for view in record.group.views}
     return {
@@ -205,7 +215,7 @@ def _views_with_ball(record: ExportRecord) -> dict[int, View]:
 
 
 def _collect_cameras(
-    record: ExportRecord, cameras: dict[int, Camera], known: IssiaNumberOwners
+    record: ExportRecord, cameras: dict[int, Camera], known: IssiaNumberRegistry
 ) -> None:
     for view in record.group.views:
         camera = record.camera(view)
@@ -213,7 +223,7 @@ def _collect_cameras(
             cameras.setdefault(known.claim_camera_number(record.group, view, camera), camera)
 
 
-def _table_row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
+def _make_table_row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
     # The published layout: a number for every camera that annotates, in a valid pair or not.
     solved = {camera: record.view_solution(view) for camera, view in annotating.items()}
     fits = {
@@ -222,22 +232,22 @@ def _table_row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Va
     }
     yield frame_number_of_group(record.group)
     for camera in CAMERAS:
-        yield from _ball_center(annotating.get(camera))
+        yield from _get_ball_center(annotating.get(camera))
     yield len(annotating)
-    yield list_text(record.point) if record.point else None
-    yield from (_fit_value(fits.get(camera), "error_px") for camera in CAMERAS)
-    yield list_text(list(annotating))
-    yield from (_fit_value(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)
-    yield from (_fit_value(fits.get(camera), "optimized_error_m") for camera in CAMERAS)
+    yield format_number_list(record.point) if record.point else None
+    yield from (_get_fit_value(fits.get(camera), "error_px") for camera in CAMERAS)
+    yield format_number_list(list(annotating))
+    yield from (_get_fit_value(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)
+    yield from (_get_fit_value(fits.get(camera), "optimized_error_m") for camera in CAMERAS)
 
 
-def _ball_center(view: View | None) -> tuple[float | None, float | None]:
+def _get_ball_center(view: View | None) -> tuple[float | None, float | None]:
     if view is None or view.ball is None or view.ball.center is None:
         return None, None
     return view.ball.center.x, view.ball.center.y
 
 
-def _fit_value(fit: BallFit | None, name: str) -> float | None:
+def _get_fit_value(fit: BallFit | None, name: str) -> float | None:
     value: float | None = getattr(fit, name) if fit is not None else None
     return value
 

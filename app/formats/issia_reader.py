@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.formats.cameras import read_camera_files
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.formats.issia import (
     CALIBRATION,
@@ -23,7 +23,7 @@ from app.formats.issia import (
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
-from app.formats.trees import FolderTree, open_tree_while_read
+from app.formats.trees import FolderTree, open_tree_context
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -65,7 +65,7 @@ class IssiaOptions:
     calibration: str | None = None
     size: ImageSize | None = None
 
-    def size_of(self, track: ViperTrack) -> ImageSize:
+    def get_image_size(self, track: ViperTrack) -> ImageSize:
         """Size of the images of a camera."""
         return self.size or track.size or DEFAULT_SIZE
 
@@ -98,7 +98,7 @@ class IssiaFolder:
         for frame in sorted(seen):
             cameras = seen[frame]
             views = tuple(self._make_view(camera, frame) for camera in cameras)
-            split = _split_of_cameras(cameras)
+            split = _choose_split_of_cameras(cameras)
             yield Group(str(frame), views, match=MATCH, split=split, label=f"Frame {frame}")
 
     def persons(self) -> Iterator[FramePersons]:
@@ -107,7 +107,7 @@ class IssiaFolder:
             track = self.tracks[camera]
             for frame in sorted(track.persons):
                 if frame not in track.balls:
-                    boxes = _person_boxes(track, frame)
+                    boxes = _make_person_boxes(track, frame)
                     yield FramePersons(frame, f"cam{camera}", boxes)
 
     def _make_view(self, camera: int, frame: int) -> View:
@@ -117,14 +117,14 @@ class IssiaFolder:
             for ball in track.balls[frame]
         )
         notes = track.ball_notes.get(frame)
-        extras = Extras(_person_boxes(track, frame), (), {"ball": notes} if notes else {})
+        extras = Extras(_make_person_boxes(track, frame), (), {"ball": notes} if notes else {})
         media = self.frames.get((camera, frame))
         if media is None and camera in self.videos:
             media = Media(self.videos[camera], frame=frame)
         return View(f"cam{camera}", self.stations[camera], balls, media, extras=extras)
 
 
-def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...]:
+def _make_person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...]:
     """Boxes in the shape of SoccerNet's, so that all datasets show them alike; by id."""
     persons = sorted(track.persons.get(frame, ()), key=lambda item: (item[0].zfill(12), item[1:]))
     return tuple(
@@ -137,14 +137,14 @@ def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...
     )
 
 
-def _split_of_cameras(cameras: list[int]) -> str:
+def _choose_split_of_cameras(cameras: list[int]) -> str:
     """The split of a frame; empty where cameras of both see it."""
     sides = {"test" if f"cam{camera}" in TEST_CAMERAS else "train" for camera in cameras}
     return sides.pop() if len(sides) == 1 else ""
 
 
 def open_issia(
-    folder: Root, options: IssiaOptions, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip) once, for its groups and its persons.
 
@@ -153,7 +153,7 @@ def open_issia(
     ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
     """
     found = IssiaFolder()
-    with open_tree_while_read(folder, report, limits) as tree:
+    with open_tree_context(folder, report, limits) as tree:
         if tree is None:
             return found
         names = tree.names()
@@ -169,12 +169,12 @@ def add_stations_and_media(
     names: list[str],
     options: IssiaOptions,
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
 ) -> None:
     """Give each camera that has a track its station and its media."""
     given = _read_given_cameras(tree, names, report)
     _find_media(tree, names, found)
-    sizes = {camera: options.size_of(track) for camera, track in found.tracks.items()}
+    sizes = {camera: options.get_image_size(track) for camera, track in found.tracks.items()}
     lines: dict[int, LineFile] = {}
     drawn = set[int]()
     for index, size in enumerate(dict.fromkeys(sizes.values())):
@@ -194,14 +194,14 @@ def add_stations_and_media(
     for camera in mirrored:
         found.tracks[camera] = mirror_people(found.tracks[camera], widths[camera])
     if mirrored:
-        report.remark(
+        report.add_remark(
             f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
             "right: ISSIA's files hold them mirrored, and the balls as the cameras see them."
         )
-    _report_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
+    _report_unused_cameras(found, {"camera": list(given), "line file": list(drawn)}, report)
 
 
-def _report_unused(
+def _report_unused_cameras(
     found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: ReaderReport
 ) -> None:
     """Say which numbers of cameras came without ground truth of that camera."""
@@ -209,7 +209,9 @@ def _report_unused(
         unused = sorted(set(numbers) - found.tracks.keys())
         if unused and found.tracks:
             names = ", ".join(f"cam{number}" for number in unused)
-            report.remark(f"{what} of {names} not used: there is no ground truth of that camera")
+            report.add_remark(
+                f"{what} of {names} not used: there is no ground truth of that camera"
+            )
 
 
 def parse_camera_number(name: str, *, strict: bool = False) -> int | None:
@@ -232,7 +234,7 @@ def _read_tracks(
     options: IssiaOptions,
     found: IssiaFolder,
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
 ) -> None:
     files = [name for name in names if _XGTF.search(name)]
     for name in (name for name in names if _XML.search(name)):
@@ -244,7 +246,7 @@ def _read_tracks(
         report.note(str(tree.path), None, None, "holds no XGTF file")
     for name in files:
         shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
-        for camera, track in _tracks_by_camera(
+        for camera, track in _assign_tracks_to_cameras(
             stem, read_viper(tree, name, report, limits), shown, report
         ):
             if camera is None:
@@ -258,12 +260,12 @@ def _read_tracks(
                 )
             else:
                 found.tracks[camera] = _shift_frames(track, options.offset(camera))
-                _compare_sizes(camera, track, shown, options, report)
+                _report_size_difference(camera, track, shown, options, report)
                 if not track.balls:
-                    report.remark(f"{shown} brings no ball for camera {camera}.")
+                    report.add_remark(f"{shown} brings no ball for camera {camera}.")
 
 
-def _tracks_by_camera(
+def _assign_tracks_to_cameras(
     stem: str, tracks: list[ViperTrack], shown: str, report: ReaderReport
 ) -> Iterator[tuple[int | None, ViperTrack]]:
     """Each source of a file with the number of its camera.
@@ -280,7 +282,7 @@ def _tracks_by_camera(
         return
     yield parse_camera_number(stem), tracks[0]
     for number, track in enumerate(tracks[1:], 2):
-        balls, persons = track.ball_points, track.person_boxes
+        balls, persons = track.ball_point_count, track.person_box_count
         report.note(
             shown,
             f"source {number} ({track.source})",
@@ -290,13 +292,13 @@ def _tracks_by_camera(
         )
 
 
-def _compare_sizes(
+def _report_size_difference(
     camera: int, track: ViperTrack, shown: str, options: IssiaOptions, report: ReaderReport
 ) -> None:
     """Say which size counts where file and options differ."""
-    size = options.size_of(track)
+    size = options.get_image_size(track)
     if track.size is not None and track.size != size:
-        report.remark(
+        report.add_remark(
             f"{shown}: the file says {track.size.width} x {track.size.height} for camera {camera}, "
             f"and {size.width} x {size.height} was asked for (--size), which is used."
         )
@@ -335,10 +337,10 @@ def _read_given_cameras(
 
 
 def _read_lines(
-    path: Root, size: ImageSize, report: ReaderReport, limits: Limits
+    path: Root, size: ImageSize, report: ReaderReport, limits: ImportLimits
 ) -> dict[int, LineFile]:
     side = ReaderReport()
-    return _line_files_by_camera(read_line_files(path, size, side, limits), side, report)
+    return _index_line_files_by_camera(read_line_files(path, size, side, limits), side, report)
 
 
 def _read_exported_lines(
@@ -346,10 +348,10 @@ def _read_exported_lines(
 ) -> dict[int, LineFile]:
     """Lines that an export of this format laid beside the ground truth."""
     own, side = [name for name in names if _OWN_LINES.fullmatch(name)], ReaderReport()
-    return _line_files_by_camera(read_line_files_of_tree(tree, own, size, side), side, report)
+    return _index_line_files_by_camera(read_line_files_of_tree(tree, own, size, side), side, report)
 
 
-def _line_files_by_camera(
+def _index_line_files_by_camera(
     files: Iterator[LineFile], side: ReaderReport, report: ReaderReport
 ) -> dict[int, LineFile]:
     lines: dict[int, LineFile] = {}
@@ -412,6 +414,6 @@ def count_annotations(found: IssiaFolder, report: ReaderReport) -> None:
     persons = {frame for track in found.tracks.values() for frame in track.persons}
     report.read += len(balls)
     report.imported += len(balls)
-    report.counts["ball points"] += sum(t.ball_points for t in found.tracks.values())
-    report.counts["persons"] += sum(t.person_boxes for t in found.tracks.values())
+    report.counts["ball points"] += sum(t.ball_point_count for t in found.tracks.values())
+    report.counts["persons"] += sum(t.person_box_count for t in found.tracks.values())
     report.counts["frames with persons only"] += len(persons - balls)

@@ -11,9 +11,9 @@ from xml.sax.saxutils import quoteattr
 
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
-from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, IssiaNumberOwners
+from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, IssiaNumberRegistry
 from app.formats.safe_path import resolve_inside
-from app.formats.sn_calibration_writer import line_file_text
+from app.formats.sn_calibration_writer import format_line_file
 from app.formats.view_files import Key, SortedSpill, open_spill
 from app.json_text import json_text
 from app.soccer.annotation import CORNERS
@@ -65,7 +65,7 @@ def write_issia(
         InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "annotated_balls": 0, "persons": 0, "cameras": 0}
-    stations, known = dict[int, Station](), IssiaNumberOwners()
+    stations, known = dict[int, Station](), IssiaNumberRegistry()
     with open_spill() as spill:
         for group in groups:
             counts["groups"] += 1
@@ -91,12 +91,12 @@ def _add_balls(
 ) -> None:
     for ball in view.balls:
         if ball.center is not None:
-            x, y = map(_quoted_whole_number, ball.center)
+            x, y = map(_format_quoted_number, ball.center)
             spill.add((camera, _BALL, "", frame), f"<data:point {_framespan(frame)} x={x} y={y}/>")
             counts["annotated_balls"] += 1
     notes = view.extras.metadata.get("ball")
     for name, value in (notes if isinstance(notes, dict) else {}).items():
-        body = f"<data:svalue {_framespan(frame)} value={_quoted_attribute(value)}/>"
+        body = f"<data:svalue {_framespan(frame)} value={_format_quoted_attribute(value)}/>"
         spill.add((camera, _NOTE, str(name), frame), body)
 
 
@@ -116,7 +116,7 @@ def _add_persons(
         except ValueError:
             # Kept as it came from a file that said something else.
             continue
-        numbers = map(_quoted_whole_number, (x, y, right - x, bottom - y))
+        numbers = map(_format_quoted_number, (x, y, right - x, bottom - y))
         place = " ".join(
             f"{name}={number}"
             for name, number in zip(("x", "y", "width", "height"), numbers, strict=True)
@@ -125,12 +125,13 @@ def _add_persons(
         # Numbers in their own order, so that people come back as they came.
         key = (camera, _PERSON, identity.zfill(_DIGITS), frame)
         spill.add(
-            key, f"{_quoted_attribute(identity)}{_BREAK}<data:bbox {_framespan(frame)} {place}/>"
+            key,
+            f"{_format_quoted_attribute(identity)}{_BREAK}<data:bbox {_framespan(frame)} {place}/>",
         )
         counts["persons"] += 1
 
 
-def _quoted_whole_number(value: float) -> str:
+def _format_quoted_number(value: float) -> str:
     """A quoted number; the ground truth has whole pixels."""
     number = float(value)
     return f'"{int(number) if number.is_integer() else repr(number)}"'
@@ -140,7 +141,7 @@ def _framespan(frame: int) -> str:
     return f'framespan="{frame}:{frame}"'
 
 
-def _quoted_attribute(value: Any) -> str:
+def _format_quoted_attribute(value: Any) -> str:
     return quoteattr(_NO_XML.sub("", str(value)).replace(_BREAK, " "))
 
 
@@ -171,7 +172,7 @@ def _write_persons(file: IO[str], items: Iterator[tuple[Key, str]]) -> None:
 
 
 def _write_attribute(file: IO[str], name: str, items: Iterator[tuple[Key, str]]) -> None:
-    file.write(f"        <attribute name={_quoted_attribute(name)}>\n")
+    file.write(f"        <attribute name={_format_quoted_attribute(name)}>\n")
     for _, body in items:
         file.write(f"          {body.rpartition(_BREAK)[2]}\n")
     file.write("        </attribute>\n")
@@ -190,5 +191,5 @@ def _write_cameras_and_lines(root: Path, stations: Mapping[int, Station]) -> Non
         if station.lines:
             path = resolve_inside(root, f"lines/cam{number}.json")
             path.parent.mkdir(exist_ok=True)
-            text = line_file_text(station.lines, station.size, pixels=True)
+            text = format_line_file(station.lines, station.size, pixels=True)
             path.write_text(text, encoding="utf-8")

@@ -12,9 +12,9 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 
 from app.errors import DatasetFormatError
-from app.formats.camera_matrix import holds_homography, holds_matrices
+from app.formats.camera_matrix import contains_homography, has_camera_matrices
 from app.formats.report import ReaderReport
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.pitch import find_marking_like
 from app.wording import plural
 
@@ -31,7 +31,7 @@ def describe_document(value: Any) -> str:
         >>> describe_document({"kp": {}, "lines": {}})
         'holds keypoints that a detector predicted (kp), not annotated lines'
     """
-    if holds_homography(value):
+    if contains_homography(value):
         return (
             "holds a homography: it maps the grass alone and is not a camera (no focal length, no height). "
             "Write K, R and t, or SoccerNet's camera JSON"
@@ -39,7 +39,7 @@ def describe_document(value: Any) -> str:
     if isinstance(value, list):
         return _describe_list(value)
     if not isinstance(value, dict):
-        return f"is {quoted(value, 40) if isinstance(value, str) else value}, not an object"
+        return f"is {quote_text(value, 40) if isinstance(value, str) else value}, not an object"
     return _describe_object(value)
 
 
@@ -47,7 +47,7 @@ def is_camera(value: Any) -> bool:
     """Whether a value looks like one camera, in any spelling that is read."""
     if not isinstance(value, dict):
         return False
-    return "pan_degrees" in value or "cam_params" in value or holds_matrices(value)
+    return "pan_degrees" in value or "cam_params" in value or has_camera_matrices(value)
 
 
 def is_gamestate(annotations: Any) -> bool:
@@ -90,7 +90,7 @@ def _describe_object(value: dict[str, Any]) -> str:
 
 
 def _list_keys(value: dict[str, Any]) -> str:
-    names = ", ".join(quoted(name, 30) for name in list(value)[:_KEYS])
+    names = ", ".join(quote_text(name, 30) for name in list(value)[:_KEYS])
     return f"{names} and {len(value) - _KEYS} more" if len(value) > _KEYS else names
 
 
@@ -302,7 +302,7 @@ def _replace_non_finite(value: Any, path: str, report: ReaderReport) -> Any:
         what = (
             "is NaN, which is not a number" if math.isnan(number) else "is too large for a number"
         )
-        _report_non_finite(report, path, *_record_and_field(place), what)
+        _report_non_finite(report, path, *_format_record_and_field(place), what)
     if len(found) > MAX_NAMED:
         fields = Counter(str(place[-1]) for place, _ in found[MAX_NAMED:] if place)
         shown = ", ".join(f"{name} ({count:,})" for name, count in fields.most_common(5))
@@ -316,7 +316,7 @@ def _report_non_finite(
 ) -> None:
     """Say what a file holds. Where it is of no use without that number, its reader leaves it out."""
     problem = DatasetFormatError(path, record, field, f"{what}; read as missing")
-    report.remark(problem.message)
+    report.add_remark(problem.message)
 
 
 def _copy_without_non_finite(
@@ -337,7 +337,7 @@ def _copy_without_non_finite(
     return None
 
 
-def _record_and_field(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
+def _format_record_and_field(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
     """Record and field of a place: ``("annotations", 3, "area")`` is annotations[3] and area."""
     parts = [f"[{name}]" if isinstance(name, int) else f".{name}"[:80] for name in place]
     head = 2 if len(parts) > 2 else 0

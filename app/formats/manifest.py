@@ -12,7 +12,7 @@ from typing import Any
 
 from app.formats.view_files import FilesToPack
 from app.json_text import json_text
-from app.progress import ReportProgress, told
+from app.progress import ReportProgress, report_each_item
 
 MANIFEST = "manifest.json"
 SOFTWARE = "touchline"
@@ -96,7 +96,9 @@ def _list_files_with_digests(
     root: Path, progress: ReportProgress | None
 ) -> Iterator[dict[str, Any]]:
     files = FilesToPack(root)
-    for name, file in told(files, len(files), progress, "Reading the files' checksums."):
+    for name, file in report_each_item(
+        files, len(files), progress, "Reading the files' checksums."
+    ):
         if name == MANIFEST:
             continue
         if isinstance(file, bytes):

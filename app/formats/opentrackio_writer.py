@@ -88,7 +88,7 @@ def camera_to_opentrackio(
                 "x": pitch_x * (x0 + 0.5 - size.width / 2),
                 "y": pitch_y * (y0 + 0.5 - size.height / 2),
             },
-            "distortion": [_opentrackio_distortion(camera.distortion, focal)],
+            "distortion": [_convert_to_opentrackio_distortion(camera.distortion, focal)],
         },
     }
     if status is not None:
@@ -137,7 +137,7 @@ def estimate_frame_rate(times: Mapping[int, float]) -> Fraction | None:
     return Fraction(rate).limit_denominator(1001) or None
 
 
-def _opentrackio_distortion(coefficients: FloatArray, focal: float) -> dict[str, Any]:
+def _convert_to_opentrackio_distortion(coefficients: FloatArray, focal: float) -> dict[str, Any]:
     """OpenCV's radial coefficients on the sensor in millimetres, numerator and denominator in turn."""
     k1, k2, _, _, k3, k4, k5, k6 = coefficients[:8].tolist()
     two, four, six = focal**2, focal**4, focal**6

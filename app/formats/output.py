@@ -18,7 +18,7 @@ from app.formats.file_tree import Root
 from app.formats.manifest import MANIFEST, SOFTWARE
 from app.formats.view_files import FilesToPack
 from app.object_store.path import StoredPath
-from app.progress import ReportProgress, told
+from app.progress import ReportProgress, report_each_item
 from app.zip_file import open_zip
 
 MAX_MANIFEST = 1 << 30
@@ -77,15 +77,15 @@ def _require_free_output(out: Path) -> None:
         if out.is_dir():
             raise InputError(f"{out} is a folder, not a zip file")
         if os.path.lexists(out) and not _is_earlier_zip(out):
-            raise occupied_output_error(f"{out} already exists and is not an earlier export")
+            raise make_occupied_output_error(f"{out} already exists and is not an earlier export")
         return
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
     if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
-        raise occupied_output_error(f"{out} holds other files and is not an earlier export")
+        raise make_occupied_output_error(f"{out} holds other files and is not an earlier export")
 
 
-def occupied_output_error(sentence: str) -> InputError:
+def make_occupied_output_error(sentence: str) -> InputError:
     """The refusal of a place that holds something else."""
     return InputError(sentence, hint="Name another place; an earlier export would be replaced.")
 
@@ -140,7 +140,7 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: ReportProgress
 def write_zip(root: Path, file: object, progress: ReportProgress | None = None) -> None:
     """All files of an export below ``root`` into a zip: sorted names, dated 1980-01-01."""
     files = FilesToPack(root)
-    write_files_to_zip(told(files, len(files), progress, "Packing the files."), file)
+    write_files_to_zip(report_each_item(files, len(files), progress, "Packing the files."), file)
 
 
 def write_files_to_zip(
@@ -259,7 +259,7 @@ def require_absent_in_store(out: StoredPath) -> None:
     require_free_in_store(out)
     with suppress(NotFoundError):
         out.store.head(out.key)
-        raise occupied_output_error(f"{out} already exists")
+        raise make_occupied_output_error(f"{out} already exists")
 
 
 def require_free_in_store(out: StoredPath) -> None:
@@ -280,7 +280,7 @@ def require_free_in_store(out: StoredPath) -> None:
         _is_earlier_zip_in_store(out) if _is_zip_in_store(out) else _is_earlier_export_in_store(out)
     )
     if not is_ours:
-        raise occupied_output_error(f"{out} already exists and is not an earlier export")
+        raise make_occupied_output_error(f"{out} already exists and is not an earlier export")
 
 
 def _is_zip_in_store(out: StoredPath) -> bool:
@@ -324,7 +324,7 @@ def _publish_to_store(staging: Path, out: StoredPath, progress: ReportProgress |
         store.delete(manifest)
     files = sorted(path for path in staging.rglob("*") if path.is_file())
     files.sort(key=lambda path: path == staging / MANIFEST)
-    for path in told(files, len(files), progress, "Sending the files to the store."):
+    for path in report_each_item(files, len(files), progress, "Sending the files to the store."):
         key = (out / path.relative_to(staging).as_posix()).key
         with store.writing(key, _content_type(path)) as target, path.open("rb") as source:
             shutil.copyfileobj(source, target, _CHUNK)

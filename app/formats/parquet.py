@@ -14,16 +14,16 @@ from typing import Any
 from app.errors import DatasetFormatError, InputError
 from app.formats.camera_json import covariance_to_json
 from app.formats.export_record import ExportRecord, choose_ball_box, find_export_frame_name
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, read_limited_chunks
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, read_limited_chunks
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_reader import read_json
 from app.formats.manifest import read_software_version
 from app.formats.report import ReaderReport
-from app.formats.trees import FolderTree, open_tree_while_read
+from app.formats.trees import FolderTree, open_tree_context
 from app.formats.view_state import (
+    GroupAssembler,
     PlacedView,
     StateReader,
-    ViewGroups,
     extras_from_json,
     view_to_json,
 )
@@ -123,7 +123,7 @@ def write_parquet(
                 row = ViewRow(record, view, position, boxes, everything, provenance or {})
                 waiting.append(replace_non_finite({name: get(row) for name, _, get in COLUMNS}))
                 counts["views"] += 1
-                counts["boxes"] += _exported_box(row) is not None
+                counts["boxes"] += _choose_exported_box(row) is not None
                 counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
@@ -143,11 +143,11 @@ def json_text(value: Any) -> str | None:
     return None if value is None else finite_text(value)
 
 
-def _camera_column(get: Callable[[Camera], Any]) -> Getter:
+def _make_camera_getter(get: Callable[[Camera], Any]) -> Getter:
     return lambda row: None if row.camera is None else get(row.camera)
 
 
-def _camera_covariance(row: ViewRow) -> list[float] | None:
+def _get_camera_covariance(row: ViewRow) -> list[float] | None:
     known = row.record.covariance(row.view)
     if row.camera is None or known is None:
         return None
@@ -155,103 +155,105 @@ def _camera_covariance(row: ViewRow) -> list[float] | None:
     return [number for each in rows for number in each]
 
 
-def _ball_fit_column(name: str) -> Getter:
+def _make_ball_fit_getter(name: str) -> Getter:
     return lambda row: None if row.fit is None else getattr(row.fit, name)
 
 
-def _view_solution_column(get: Callable[[ViewSolution], Any]) -> Getter:
+def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
     return lambda row: None if row.view_solution is None else get(row.view_solution)
 
 
-def _ball_coordinate_column(number: int) -> Getter:
-    def get(row: ViewRow) -> float | None:
+def _make_ball_coordinate_getter(number: int) -> Getter:
+    def get_jac(row: ViewRow) -> float | None:
         point = row.record.point
         return None if point is None or row.fit is None else float(point[number])
 
-    return get
+    return get_jac
 
 
-def _ball_column(name: str) -> Getter:
-    def get(row: ViewRow) -> Any:
+def _make_ball_getter(name: str) -> Getter:
+    def get_jac(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.fit is None else getattr(ball, name)
 
-    return get
+    return get_jac
 
 
-def _solution_column(get: Callable[[Solution], Any]) -> Getter:
+def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
     """Of the solution, in rows that have a 3D ball."""
 
-    def value(row: ViewRow) -> Any:
+    def get_solution_value(row: ViewRow) -> Any:
         solution = row.record.solution
-        return None if solution is None or _ball_column("point")(row) is None else get(solution)
+        return (
+            None if solution is None or _make_ball_getter("point")(row) is None else get(solution)
+        )
 
-    return value
+    return get_solution_value
 
 
-def _sigma_of_ball(ball: Ball3D | BestBall | None) -> float | None:
+def _get_ball_sigma(ball: Ball3D | BestBall | None) -> float | None:
     return None if ball is None else ball.sigma_m
 
 
-def _p_value_of_solution(solution: Solution) -> float | None:
+def _get_p_value_of_solution(solution: Solution) -> float | None:
     return None if solution.chi_square is None else solution.chi_square.p_value
 
 
-def _box_column(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
-    def get(row: ViewRow) -> float | None:
+def _make_box_getter(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
+    def get_jac(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
 
-    return get
+    return get_jac
 
 
-def _annotated_box(row: ViewRow) -> Box | None:
+def _get_annotated_box(row: ViewRow) -> Box | None:
     return row.view.ball.box if row.view.ball else None
 
 
-def _exported_box(row: ViewRow) -> Box | None:
+def _choose_exported_box(row: ViewRow) -> Box | None:
     return choose_ball_box(row.record, row.view, row.boxes) if row.view.ball else None
 
 
-def _center_coordinate_column(axis: int) -> Getter:
-    def get(row: ViewRow) -> float | None:
+def _make_center_coordinate_getter(axis: int) -> Getter:
+    def get_jac(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
 
-    return get
+    return get_jac
 
 
-def _jac_column(index: int) -> Getter:
-    def get(row: ViewRow) -> float | None:
+def _make_jac_getter(index: int) -> Getter:
+    def get_jac(row: ViewRow) -> float | None:
         jac = row.view_solution.calibration.jac if row.view_solution else None
         return None if jac is None else float(jac[index])
 
-    return get
+    return get_jac
 
 
-def _failing_gate(row: ViewRow) -> str | None:
+def _find_first_failing_gate(row: ViewRow) -> str | None:
     gate = row.record.solution.first_failing if row.record.solution else None
     return None if gate is None else gate.name
 
 
-def _reprojected_pixels(row: ViewRow) -> Any:
+def _get_reprojected_ball_pixels(row: ViewRow) -> Any:
     point = row.fit.reprojected if row.fit else None
     return None if point is None else [float(point.x), float(point.y)]
 
 
-def _annotated_value_column(name: str) -> Getter:
+def _make_annotated_value_getter(name: str) -> Getter:
     return lambda row: row.annotated[name]
 
 
-def _left_out_column(name: str) -> Getter:
+def _make_left_out_getter(name: str) -> Getter:
     return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
 
 
-def _annotated_json_column(name: str) -> Getter:
+def _make_annotated_json_getter(name: str) -> Getter:
     return lambda row: json_text(row.annotated[name])
 
 
-def _optional_annotated_column(name: str) -> Getter:
+def _make_optional_annotated_getter(name: str) -> Getter:
     return lambda row: json_text(row.annotated[name]) if name in row.annotated else None
 
 
@@ -274,67 +276,81 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
-    ("included", FLAG, _annotated_value_column("included")),
-    ("left_out_reason", TEXT, _left_out_column("reason")),
-    ("left_out_note", TEXT, _left_out_column("note")),
-    ("station", TEXT, _annotated_value_column("station")),
-    ("shared", FLAG, _annotated_value_column("shared")),
-    ("flipped", FLAG, _annotated_value_column("flipped")),
-    ("calibration", TEXT, _annotated_value_column("calibration")),
-    ("calibrated_by", TEXT, _view_solution_column(lambda solved: solved.calibration.source)),
-    ("pan_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[0])),
-    ("tilt_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[1])),
-    ("roll_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[2])),
-    ("x_focal_length", NUMBER, _camera_column(lambda camera: float(camera.focal_length[0]))),
-    ("y_focal_length", NUMBER, _camera_column(lambda camera: float(camera.focal_length[1]))),
-    ("principal_point", LIST, _camera_column(lambda camera: [*map(float, camera.principal_point)])),
-    ("skew", NUMBER, _camera_column(lambda camera: float(camera.skew))),
-    ("position_meters", LIST, _camera_column(lambda camera: camera.position.tolist())),
-    ("rotation_matrix", LIST, _camera_column(lambda camera: camera.rotation.ravel().tolist())),
-    ("distortion", LIST, _camera_column(lambda camera: camera.distortion.tolist())),
-    ("lens", TEXT, _camera_column(lambda camera: camera.lens)),
-    ("camera_covariance", LIST, _camera_covariance),
-    ("jac_0.5", NUMBER, _jac_column(0)),
-    ("jac_1", NUMBER, _jac_column(1)),
-    ("jac_2", NUMBER, _jac_column(2)),
-    ("line_error_px", NUMBER, _view_solution_column(lambda solved: solved.calibration.error_px)),
-    ("agreement", NUMBER, _view_solution_column(lambda solved: solved.calibration.agreement)),
-    ("ball_x", NUMBER, _center_coordinate_column(0)),
-    ("ball_y", NUMBER, _center_coordinate_column(1)),
-    *((f"annotated_{side}", NUMBER, _box_column(_annotated_box, side)) for side in _SIDES),
-    *((f"box_{side}", NUMBER, _box_column(_exported_box, side)) for side in _SIDES),
-    ("ball_3d_x", NUMBER, _ball_coordinate_column(0)),
-    ("ball_3d_y", NUMBER, _ball_coordinate_column(1)),
-    ("ball_3d_z", NUMBER, _ball_coordinate_column(2)),
-    ("sigma_m", NUMBER, _ball_column("sigma_m")),
-    ("parallax_degrees", NUMBER, _ball_column("parallax_degrees")),
-    ("point", TEXT, _solution_column(lambda solution: solution.point)),
+    ("included", FLAG, _make_annotated_value_getter("included")),
+    ("left_out_reason", TEXT, _make_left_out_getter("reason")),
+    ("left_out_note", TEXT, _make_left_out_getter("note")),
+    ("station", TEXT, _make_annotated_value_getter("station")),
+    ("shared", FLAG, _make_annotated_value_getter("shared")),
+    ("flipped", FLAG, _make_annotated_value_getter("flipped")),
+    ("calibration", TEXT, _make_annotated_value_getter("calibration")),
+    ("calibrated_by", TEXT, _make_view_solution_getter(lambda solved: solved.calibration.source)),
+    ("pan_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[0])),
+    ("tilt_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[1])),
+    ("roll_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[2])),
+    ("x_focal_length", NUMBER, _make_camera_getter(lambda camera: float(camera.focal_length[0]))),
+    ("y_focal_length", NUMBER, _make_camera_getter(lambda camera: float(camera.focal_length[1]))),
+    (
+        "principal_point",
+        LIST,
+        _make_camera_getter(lambda camera: [*map(float, camera.principal_point)]),
+    ),
+    ("skew", NUMBER, _make_camera_getter(lambda camera: float(camera.skew))),
+    ("position_meters", LIST, _make_camera_getter(lambda camera: camera.position.tolist())),
+    ("rotation_matrix", LIST, _make_camera_getter(lambda camera: camera.rotation.ravel().tolist())),
+    ("distortion", LIST, _make_camera_getter(lambda camera: camera.distortion.tolist())),
+    ("lens", TEXT, _make_camera_getter(lambda camera: camera.lens)),
+    ("camera_covariance", LIST, _get_camera_covariance),
+    ("jac_0.5", NUMBER, _make_jac_getter(0)),
+    ("jac_1", NUMBER, _make_jac_getter(1)),
+    ("jac_2", NUMBER, _make_jac_getter(2)),
+    (
+        "line_error_px",
+        NUMBER,
+        _make_view_solution_getter(lambda solved: solved.calibration.error_px),
+    ),
+    ("agreement", NUMBER, _make_view_solution_getter(lambda solved: solved.calibration.agreement)),
+    ("ball_x", NUMBER, _make_center_coordinate_getter(0)),
+    ("ball_y", NUMBER, _make_center_coordinate_getter(1)),
+    *((f"annotated_{side}", NUMBER, _make_box_getter(_get_annotated_box, side)) for side in _SIDES),
+    *((f"box_{side}", NUMBER, _make_box_getter(_choose_exported_box, side)) for side in _SIDES),
+    ("ball_3d_x", NUMBER, _make_ball_coordinate_getter(0)),
+    ("ball_3d_y", NUMBER, _make_ball_coordinate_getter(1)),
+    ("ball_3d_z", NUMBER, _make_ball_coordinate_getter(2)),
+    ("sigma_m", NUMBER, _make_ball_getter("sigma_m")),
+    ("parallax_degrees", NUMBER, _make_ball_getter("parallax_degrees")),
+    ("point", TEXT, _make_solution_getter(lambda solution: solution.point)),
     (
         "mean_sigma_m",
         NUMBER,
-        _solution_column(lambda solution: _sigma_of_ball(solution.mean_ball or solution.ball)),
+        _make_solution_getter(
+            lambda solution: _get_ball_sigma(solution.mean_ball or solution.ball)
+        ),
     ),
-    ("best_sigma_m", NUMBER, _solution_column(lambda solution: _sigma_of_ball(solution.best_ball))),
-    ("p_value", NUMBER, _solution_column(_p_value_of_solution)),
-    ("covariance", LIST, lambda row: _to_float_list(_ball_column("covariance")(row))),
-    ("reprojected", LIST, _reprojected_pixels),
-    ("error_px", NUMBER, _ball_fit_column("error_px")),
-    ("error_percent", NUMBER, _ball_fit_column("error_percent")),
-    ("optimized_diameter_px", NUMBER, _ball_fit_column("optimized_diameter_px")),
-    ("optimized_error_m", NUMBER, _ball_fit_column("optimized_error_m")),
-    ("size_ratio", NUMBER, _ball_fit_column("size_ratio")),
-    ("depth_m", NUMBER, _ball_fit_column("depth_m")),
-    ("in_valid_pair", FLAG, _view_solution_column(lambda solved: solved.included)),
-    ("view_failed", TEXT, _view_solution_column(lambda solved: solved.failed)),
-    ("group_failed", TEXT, _failing_gate),
+    (
+        "best_sigma_m",
+        NUMBER,
+        _make_solution_getter(lambda solution: _get_ball_sigma(solution.best_ball)),
+    ),
+    ("p_value", NUMBER, _make_solution_getter(_get_p_value_of_solution)),
+    ("covariance", LIST, lambda row: _to_float_list(_make_ball_getter("covariance")(row))),
+    ("reprojected", LIST, _get_reprojected_ball_pixels),
+    ("error_px", NUMBER, _make_ball_fit_getter("error_px")),
+    ("error_percent", NUMBER, _make_ball_fit_getter("error_percent")),
+    ("optimized_diameter_px", NUMBER, _make_ball_fit_getter("optimized_diameter_px")),
+    ("optimized_error_m", NUMBER, _make_ball_fit_getter("optimized_error_m")),
+    ("size_ratio", NUMBER, _make_ball_fit_getter("size_ratio")),
+    ("depth_m", NUMBER, _make_ball_fit_getter("depth_m")),
+    ("in_valid_pair", FLAG, _make_view_solution_getter(lambda solved: solved.included)),
+    ("view_failed", TEXT, _make_view_solution_getter(lambda solved: solved.failed)),
+    ("group_failed", TEXT, _find_first_failing_gate),
     ("verdict", TEXT, lambda row: row.record.verdict),
     ("reason", TEXT, lambda row: row.record.reason),
-    ("lines", TEXT, _annotated_json_column("lines")),
-    ("balls", TEXT, _annotated_json_column("balls")),
-    ("given", TEXT, _annotated_json_column("given")),
+    ("lines", TEXT, _make_annotated_json_getter("lines")),
+    ("balls", TEXT, _make_annotated_json_getter("balls")),
+    ("given", TEXT, _make_annotated_json_getter("given")),
     ("given_covariance", LIST, lambda row: row.annotated.get("given_covariance")),
-    ("picture", TEXT, _optional_annotated_column("picture")),
-    ("proposed", TEXT, _optional_annotated_column("proposed")),
+    ("picture", TEXT, _make_optional_annotated_getter("picture")),
+    ("proposed", TEXT, _make_optional_annotated_getter("proposed")),
     ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver_version(row)),
@@ -376,7 +392,7 @@ _BATCH = 512
 
 
 def read_parquet(
-    root: Root, report: ReaderReport, *, limits: Limits = DEFAULT_LIMITS
+    root: Root, report: ReaderReport, *, limits: ImportLimits = DEFAULT_LIMITS
 ) -> Iterator[Group]:
     """The groups of every Parquet file below ``root`` that has the columns of our exports.
 
@@ -385,22 +401,22 @@ def read_parquet(
     Raises:
         InputError: pyarrow is not installed.
     """
-    with open_tree_while_read(root, report, limits) as tree:
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
         tables = [name for name in names if name.lower().endswith(".parquet")]
         if not tables:
             report.note(str(root), None, None, "holds no Parquet file")
-        groups = ViewGroups(report)
+        groups = GroupAssembler(report)
         for name in tables:
             for view in _read_views(tree, name, names, report, limits):
                 yield from groups.add(view, tree.shown(name))
-        yield from groups.incomplete_groups()
+        yield from groups.release_incomplete_groups()
 
 
 def _read_views(
-    tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: Limits
+    tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: ImportLimits
 ) -> Iterator[PlacedView]:
     shown, present, number = tree.shown(name), set(names), 0
     try:
@@ -408,20 +424,20 @@ def _read_views(
             number += 1
             report.read += 1
             try:
-                placed = _view_of_row(row, shown, f"row {number}")
+                placed = _parse_view_row(row, shown, f"row {number}")
             except DatasetFormatError as error:
                 report.skip(error)
                 continue
-            media = _media_of_row(tree, str(row.get("file_name") or ""), present)
+            media = _find_row_media(tree, str(row.get("file_name") or ""), present)
             yield replace(placed, view=replace(placed.view, media=media))
     except DatasetFormatError as error:
         report.skip(error)
 
 
-def _read_rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[str, Any]]:
+def _read_rows(tree: FileTree, name: str, limits: ImportLimits) -> Iterator[Mapping[str, Any]]:
     pyarrow, parquet = import_pyarrow()
     shown = tree.shown(name)
-    with _file_on_disk(tree, name, limits) as path:
+    with _open_as_file_on_disk(tree, name, limits) as path:
         try:
             with parquet.ParquetFile(path) as file:
                 columns = file.schema_arrow.names
@@ -438,7 +454,7 @@ def _read_rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[st
 
 
 @contextmanager
-def _file_on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
+def _open_as_file_on_disk(tree: FileTree, name: str, limits: ImportLimits) -> Iterator[Path]:
     """A file that can be read from its end; a member of a zip is unpacked for that."""
     if isinstance(tree, FolderTree):
         with tree.open(name) as source:
@@ -456,7 +472,7 @@ def _file_on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
         yield Path(file.name)
 
 
-def _view_of_row(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
+def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
     parsed = {
         name: None
         if not isinstance(row.get(name), str)
@@ -473,7 +489,7 @@ def _view_of_row(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
     return PlacedView(state.head(), state.count("position"), view)
 
 
-def _media_of_row(tree: FileTree, name: str, present: set[str]) -> Media | None:
+def _find_row_media(tree: FileTree, name: str, present: set[str]) -> Media | None:
     if name not in present or PurePosixPath(name).suffix.lower() not in IMAGE_SUFFIXES:
         return None
     return tree.media(name)

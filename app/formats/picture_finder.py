@@ -43,7 +43,7 @@ _SPLIT = re.compile(r"(train|val|test|challenge)(?:ing|id|idation)?(?:[-_ ]?(?:s
 _WORDS = re.compile(r"[^a-z0-9]+")
 
 
-def split_of_word(name: str) -> str:
+def parse_split_name(name: str) -> str:
     """The split that a name is; empty where it is none.
 
     Example:
@@ -54,14 +54,14 @@ def split_of_word(name: str) -> str:
     return "" if found is None else {"val": "valid"}.get(found[1], found[1])
 
 
-def split_within_word(name: str) -> str:
+def find_split_in_word(name: str) -> str:
     """The split that one word of a name says; empty where none does, or two contradict.
 
     Example:
         >>> split_within_word("instances_train2017"), split_within_word("train_or_test"), split_within_word("_annotations.coco")
         ('train', '', '')
     """
-    found = {split for word in _WORDS.split(name.lower()) if (split := split_of_word(word))}
+    found = {split for word in _WORDS.split(name.lower()) if (split := parse_split_name(word))}
     return found.pop() if len(found) == 1 else ""
 
 
@@ -97,7 +97,7 @@ class LabelLocation:
         """The folder that has labels and pictures."""
         place = PurePosixPath(self.folder)
         inside = place.name.lower() in LABEL_FOLDERS
-        return _path_text(place.parent if inside else place)
+        return _format_path(place.parent if inside else place)
 
     def folders(self) -> Iterable[str]:
         """Folders in which tools put the pictures of such a file, the likeliest first."""
@@ -120,7 +120,7 @@ class LabelLocation:
         for part in PurePosixPath(place).parts[:-1]:
             if part.lower() in own:
                 continue
-            split = split_of_word(part)
+            split = parse_split_name(part)
             if part.lower() in self.strange or (self.split and split and split != self.split):
                 return False
         return True
@@ -206,7 +206,7 @@ class PictureFinder:
         ranks: dict[tuple[int, bool, bool], list[str]] = {}
         for place in fitting:
             rank = (
-                _count_common_parts(parts, place, fold),
+                _count_common_trailing_parts(parts, place, fold),
                 bool(home.folder) and _is_below_folder(place, home.folder),
                 bool(home.root) and _is_below_folder(place, home.root),
             )
@@ -240,7 +240,7 @@ def assign_pictures(found: Mapping[Name, PictureSearchResult]) -> dict[Name, Pic
     return own
 
 
-def _count_common_parts(parts: Name, place: str, fold: bool) -> int:
+def _count_common_trailing_parts(parts: Name, place: str, fold: bool) -> int:
     others = unicodedata.normalize("NFC", place).split("/")
     count = 0
     for one, other in zip(reversed(parts), reversed(others), strict=False):
@@ -258,5 +258,5 @@ def _join_path(*parts: str) -> str:
     return "/".join(part for part in parts if part)
 
 
-def _path_text(place: PurePosixPath) -> str:
+def _format_path(place: PurePosixPath) -> str:
     return "" if str(place) == "." else str(place)

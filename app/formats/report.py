@@ -46,11 +46,11 @@ class ReaderReport:
         """The same from its parts."""
         self.skip(DatasetFormatError(path, record, where, problem))
 
-    def remark(self, sentence: str) -> None:
+    def add_remark(self, sentence: str) -> None:
         """Say once what was decided, or what there is besides."""
         if sentence not in self.remarks and len(self.remarks) < MAX_REMARKS:
             self.remarks.append(sentence)
 
-    def refusal(self, nothing: str) -> ReviewError:
+    def make_refusal_error(self, nothing: str) -> ReviewError:
         """Why nothing was read: the first problem, else ``nothing``, a sentence."""
         return self.problems[0] if self.problems else InputError(nothing)

@@ -11,7 +11,7 @@ from typing import IO
 from urllib.parse import unquote
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.json_text import quoted
+from app.json_text import quote_text
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 _CONTROL = re.compile(r"[\\\x00-\x1f\x7f]")
@@ -28,12 +28,12 @@ def require_safe_path(path: str) -> str:
             backslash or control character; also when only its decoded or normalised spelling is so.
     """
     for spelling in _decoded_spellings(path):
-        problem = _path_problem(spelling)
+        problem = _find_path_problem(spelling)
         if problem:
-            raise UnsafePathError(f"the path {quoted(path, 200)} {problem}")
+            raise UnsafePathError(f"the path {quote_text(path, 200)} {problem}")
     if any(len(part.encode()) > MAX_PART for part in path.split("/")):
         raise UnsafePathError(
-            f"the path {quoted(path, 200)} has a part of more than {MAX_PART} bytes"
+            f"the path {quote_text(path, 200)} has a part of more than {MAX_PART} bytes"
         )
     return path
 
@@ -52,7 +52,7 @@ def resolve_inside(root: Path, path: str) -> Path:
     real_root = Path(os.path.realpath(root))
     real = Path(os.path.realpath(real_root / path))
     if real != real_root and real_root not in real.parents:
-        raise UnsafePathError(f"the path {quoted(path, 200)} leads out of its folder")
+        raise UnsafePathError(f"the path {quote_text(path, 200)} leads out of its folder")
     return real
 
 
@@ -67,7 +67,7 @@ def _decoded_spellings(path: str) -> list[str]:
     return spellings
 
 
-def _path_problem(path: str) -> str | None:
+def _find_path_problem(path: str) -> str | None:
     if not path:
         return "is empty"
     if _CONTROL.search(path):

@@ -17,8 +17,8 @@ from app.formats.file_tree import FileTree
 from app.formats.frame_names import (
     IMAGE_SUFFIXES,
     UNASSIGNED,
-    frame_name_claims,
     frame_path_by_match,
+    map_frame_names_to_owners,
     view_file_path,
 )
 from app.formats.json_reader import describe_document, read_json, read_json_lines
@@ -61,7 +61,7 @@ class LineFile:
     place: str = ""
 
 
-def split_folder_name(split: str, size: ImageSize) -> str:
+def make_split_folder_name(split: str, size: ImageSize) -> str:
     """Folder of the frames of one split and one size: the evaluator takes one size at a time.
 
     Example:
@@ -71,8 +71,8 @@ def split_folder_name(split: str, size: ImageSize) -> str:
     return f"{split or UNASSIGNED}-{size.width}x{size.height}"
 
 
-def split_and_size(folder: str) -> tuple[str, ImageSize] | None:
-    """Back from ``split_folder_name``; None for any other folder."""
+def parse_split_folder_name(folder: str) -> tuple[str, ImageSize] | None:
+    """Back from ``make_split_folder_name``; None for any other folder."""
     found = _FOLDER.fullmatch(folder)
     if found is None or min(int(found[2]), int(found[3])) < 2:
         return None
@@ -98,18 +98,18 @@ def flat_frame_name(place: str, split: str) -> str:
     return f"{digest}_{stem}"
 
 
-def line_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def map_line_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``).
 
     The place of a frame is a name, too: what is read again has it for a key. A static camera has
     one file of lines for all its views.
     """
     place = view_file_path(group, view)
-    name = f"{split_folder_name(split, view.size)}/{flat_frame_name(place, split)}"
+    name = f"{make_split_folder_name(split, view.size)}/{flat_frame_name(place, split)}"
     if not view.station.shared:
         return dict.fromkeys((place.encode().hex(), name), (group.key, view.key))
     own = dict.fromkeys((place.encode().hex(), name), view.station.key)
-    return {**own, **frame_name_claims(group, view, split)}
+    return {**own, **map_frame_names_to_owners(group, view, split)}
 
 
 def line_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
@@ -121,7 +121,7 @@ def line_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
     if view.station.shared:
         return frame_path_by_match(group, view, split, suffix)
     name = flat_frame_name(view_file_path(group, view), split)
-    return f"{LINES}/{split_folder_name(split, view.size)}/{name}{suffix}"
+    return f"{LINES}/{make_split_folder_name(split, view.size)}/{name}{suffix}"
 
 
 MEANT = (
@@ -182,7 +182,7 @@ def read_lines_of_images(value: Any, path: str, report: ReaderReport) -> list[Li
     if isinstance(value, dict):
         items = [(str(name), item) for name, item in value.items()]
     elif isinstance(value, list):
-        items = [(_line_name(item) or "", item) for item in value]
+        items = [(_find_image_name(item) or "", item) for item in value]
     else:
         items = []
     found, problems = [], []
@@ -213,9 +213,9 @@ def _read_document(value: Any) -> LineDocument | None:
         return LineDocument(value)
     for name in _WITHIN:
         inner = value.get(name)
-        lines = _lines_of_list(inner) if isinstance(inner, list) else inner
+        lines = _parse_line_list(inner) if isinstance(inner, list) else inner
         if isinstance(lines, dict) and any(map(_is_line_name, lines)):
-            named = _line_name(value)
+            named = _find_image_name(value)
             return LineDocument(
                 lines, None if named is None else _image_stem(named), parse_image_size(value)
             )
@@ -226,7 +226,7 @@ def _is_line_name(name: str) -> bool:
     return find_marking_like(name) is not None or name.replace("_", " ").strip() in WITHOUT_GEOMETRY
 
 
-def _lines_of_list(items: list[Any]) -> dict[str, Any] | None:
+def _parse_line_list(items: list[Any]) -> dict[str, Any] | None:
     """Lines of a list of objects with a class and points, by name; None where it is another list."""
     found: dict[str, Any] = {}
     for item in items:
@@ -241,7 +241,7 @@ def _lines_of_list(items: list[Any]) -> dict[str, Any] | None:
     return found
 
 
-def _line_name(value: Any) -> str | None:
+def _find_image_name(value: Any) -> str | None:
     if not isinstance(value, dict):
         return None
     found = (value.get(name) for name in _NAMES)
@@ -309,7 +309,7 @@ def find_original_frame_path(record: Mapping[str, Any]) -> str | None:
         return None
 
 
-def match_of_record(record: Mapping[str, Any]) -> str:
+def build_match_key_of_record(record: Mapping[str, Any]) -> str:
     """``<league>/<season>/<match>`` of a record, or as much of it as is there."""
     parts = [record.get(name) for name in _PARTS]
     for text in ("/".join(map(str, parts)) if all(parts) else None, *map(record.get, _PATHS)):
@@ -321,7 +321,7 @@ def match_of_record(record: Mapping[str, Any]) -> str:
     return ""
 
 
-def match_info_of_view(group: Group, view: View) -> Mapping[str, Any]:
+def find_match_info_of_view(group: Group, view: View) -> Mapping[str, Any]:
     """The record of a view: what its source said, else what its dataset knows."""
     kept = view.extras.metadata.get(MATCH_INFO_METADATA)
     if isinstance(kept, dict):

@@ -11,7 +11,7 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import (
@@ -20,14 +20,14 @@ from app.formats.sn_calibration import (
     MATCH_INFO_PLACE,
     LineDocument,
     LineFile,
+    build_match_key_of_record,
     find_original_frame_path,
-    match_of_record,
+    parse_split_folder_name,
     read_line_documents,
     read_match_info,
-    split_and_size,
 )
 from app.formats.soccernet_v3 import SPLITS
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
@@ -42,7 +42,7 @@ def read_line_files(
     path: Root,
     size: ImageSize,
     report: ReaderReport,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
     *,
     by_folder: bool = False,
 ) -> Iterator[LineFile]:
@@ -61,12 +61,16 @@ def read_line_files(
         by_folder: Whether a folder that is called as in our exports (``test-1280x720``), or a file
             itself, says the size of its images; else all lines are in pixels of ``size``.
     """
-    with open_tree_while_read(path, report, limits) as tree:
+    with open_tree_context(path, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
-        places = _original_frame_paths(read_match_info(tree, names, ReaderReport()))
-        sizes = _sizes_by_folder(map(_path_without_suffix, names), path.stem) if by_folder else {}
+        places = _map_original_frame_paths(read_match_info(tree, names, ReaderReport()))
+        sizes = (
+            _parse_sizes_from_folders(map(_strip_path_suffix, names), path.stem)
+            if by_folder
+            else {}
+        )
         ours = OwnExportInfo(places, sizes, own_sizes=by_folder)
         yield from read_line_files_of_tree(tree, names, size, report, ours)
 
@@ -93,8 +97,8 @@ def read_line_files_of_tree(
     ours: OwnExportInfo = _NOTHING,
 ) -> Iterator[LineFile]:
     """The line files among some files of a tree, with the images that lie beside them."""
-    beside = _images_by_stem(names)
-    wholes = {name: _path_without_suffix(name) for name in names if _is_line_file(name)}
+    beside = _index_images_by_stem(names)
+    wholes = {name: _strip_path_suffix(name) for name in names if _is_line_file(name)}
     places = {name: ours.places.get(whole, whole) for name, whole in wholes.items()}
     # Names of an export are in no order of a match's frames.
     ordered = sorted(places, key=places.__getitem__) if ours.places else list(places)
@@ -128,18 +132,20 @@ def read_line_files_of_tree(
             yield LineFile(named, made, lines, others, media, where)
 
 
-def _path_without_suffix(name: str) -> str:
+def _strip_path_suffix(name: str) -> str:
     return str(PurePosixPath(name).with_suffix(""))
 
 
-def _original_frame_paths(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+def _map_original_frame_paths(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     return {
         whole: place for whole, info in infos.items() if (place := find_original_frame_path(info))
     }
 
 
-def _sizes_by_folder(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
-    by_folder = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
+def _parse_sizes_from_folders(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
+    by_folder = {
+        whole: parse_split_folder_name(PurePosixPath(whole).parent.name or top) for whole in places
+    }
     return {whole: found[1] for whole, found in by_folder.items() if found}
 
 
@@ -159,7 +165,7 @@ def _is_line_file(name: str) -> bool:
     return last not in _OTHER_FILES and not last.startswith(_OTHER_PREFIXES)
 
 
-def _images_by_stem(names: Iterable[str]) -> dict[str, str]:
+def _index_images_by_stem(names: Iterable[str]) -> dict[str, str]:
     places = (PurePosixPath(name) for name in names)
     return {
         str(place.with_suffix("")): str(place)
@@ -198,7 +204,7 @@ def lines_from_json(
     for name, numbered in points.items():
         line = [point for _, point in numbered]
         if not in_pixels:
-            line = _points_near_image(numbered, path, name, report)
+            line = _select_points_near_image(numbered, path, name, report)
         to_pixel = partial(_rescale_pixel, drawn or size, size) if in_pixels else size.unit_to_pixel
         pixels = [to_pixel(*point) for point in line]
         marking = _read_marking_name(name, path, report)
@@ -226,7 +232,7 @@ def _is_far_outside(point: tuple[float, float]) -> bool:
     return max(map(abs, point)) > LARGEST_UNIT
 
 
-def _points_near_image(
+def _select_points_near_image(
     line: _Numbered, path: str, name: str, report: ReaderReport
 ) -> list[tuple[float, float]]:
     """The points of a line of a normalised file that can be normalised; others are reported."""
@@ -291,7 +297,7 @@ def read_sn_calibration(
     report: ReaderReport,
     *,
     calibration: str = "given",
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
 ) -> Iterator[Group]:
     """Each frame as a group of one view, keyed by its stem.
 
@@ -306,13 +312,13 @@ def read_sn_calibration(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    with open_tree_while_read(path, report, limits) as tree:
+    with open_tree_context(path, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
         infos = read_match_info(tree, names, report)
-        places = _original_frame_paths(infos)
-        ours = OwnExportInfo(places, _sizes_by_folder(places), own_sizes=True)
+        places = _map_original_frame_paths(infos)
+        ours = OwnExportInfo(places, _parse_sizes_from_folders(places), own_sizes=True)
         unused = dict.fromkeys(infos)
         for file in read_line_files_of_tree(tree, names, size, report, ours):
             unused.pop(file.place, None)
@@ -320,7 +326,7 @@ def read_sn_calibration(
         if unused:
             count = plural(len(unused), "image")
             shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
-            report.remark(f"{count} of match_info.json without a file of lines: {shown}")
+            report.add_remark(f"{count} of match_info.json without a file of lines: {shown}")
 
 
 def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
@@ -328,15 +334,15 @@ def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> 
     station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
     extras = Extras(lines=file.others, metadata={MATCH_INFO_METADATA: info} if info else {})
     view = View(file.stem, station, media=file.media, extras=extras)
-    match, folders = match_of_record(info), PurePosixPath(file.place).parts[:-1]
-    splits = (_split_of_folder(folder) for folder in reversed(folders))
+    match, folders = build_match_key_of_record(info), PurePosixPath(file.place).parts[:-1]
+    splits = (_parse_split_of_folder(folder) for folder in reversed(folders))
     split = next((split for split in splits if split), "")
     name = PurePosixPath(file.stem).name
     label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
     return Group(file.stem, (view,), match=match, split=split, label=label)
 
 
-def _split_of_folder(folder: str) -> str:
+def _parse_split_of_folder(folder: str) -> str:
     """The split that a folder says, or nothing."""
-    named = split_and_size(folder)
+    named = parse_split_folder_name(folder)
     return named[0] if named else folder if folder in SPLITS else ""

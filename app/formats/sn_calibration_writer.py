@@ -8,10 +8,10 @@ from typing import Any
 
 from app.errors import InputError
 from app.formats import fields
-from app.formats.cameras import camera_file_name, camera_file_text, find_camera_owner
+from app.formats.cameras import camera_file_name, find_camera_owner, format_camera_file
 from app.formats.export_record import ExportRecord
 from app.formats.fields import find_exact_inverse
-from app.formats.frame_names import fold_file_name, view_file_path
+from app.formats.frame_names import normalize_file_name, view_file_path
 from app.formats.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
@@ -19,12 +19,12 @@ from app.formats.sn_calibration import (
     MATCH_INFO_PLACE,
     LineFile,
     MatchInfoWriter,
+    find_match_info_of_view,
     flat_frame_name,
-    match_info_of_view,
-    split_folder_name,
+    make_split_folder_name,
 )
 from app.formats.soccernet_v3 import soccernet_marking_name
-from app.formats.view_files import PutText, write_file_below, write_to_disk
+from app.formats.view_files import PutText, make_disk_writer, write_file_below
 from app.json_text import json_text
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -43,7 +43,7 @@ def lines_to_json(
     it would be taken for one. Not every pixel has a normalised number that gives it back to the
     last bit; numbers that came normalised have one.
     """
-    flat = [_flat_coordinates(line) for line in others]
+    flat = [_parse_flat_coordinates(line) for line in others]
     points = {soccernet_marking_name(marking): list(line) for marking, line in lines.items()}
     for line, numbers in zip(others, flat, strict=True):
         extra = [ImagePoint(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
@@ -59,8 +59,8 @@ def lines_to_json(
             {
                 "x": unit
                 if (unit := x / across) * across == x
-                else _normalized_coordinate(x, across),
-                "y": unit if (unit := y / down) * down == y else _normalized_coordinate(y, down),
+                else _normalize_coordinate(x, across),
+                "y": unit if (unit := y / down) * down == y else _normalize_coordinate(y, down),
             }
             for x, y in line
         ]
@@ -68,12 +68,12 @@ def lines_to_json(
     }
 
 
-def _normalized_coordinate(pixel: float, extent: int) -> float:
+def _normalize_coordinate(pixel: float, extent: int) -> float:
     """The normalised number that is read as this pixel, where the nearest one is not."""
     return find_exact_inverse(pixel / extent, pixel, lambda unit: unit * extent)
 
 
-def line_file_text(
+def format_line_file(
     lines: Lines,
     size: ImageSize,
     others: Sequence[Mapping[str, Any]] = (),
@@ -84,7 +84,7 @@ def line_file_text(
     return json_text(lines_to_json(lines, size, others, pixels=pixels), ascii_=True) + "\n"
 
 
-def _flat_coordinates(line: Mapping[str, Any]) -> list[float]:
+def _parse_flat_coordinates(line: Mapping[str, Any]) -> list[float]:
     """Coordinates of a line that is no marking; none where they are not all numbers."""
     points = line.get("points")
     try:
@@ -105,7 +105,7 @@ def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:
     """
     return [
         write_file_below(
-            root, f"{file.stem}.json", line_file_text(file.lines, file.size, file.others)
+            root, f"{file.stem}.json", format_line_file(file.lines, file.size, file.others)
         )
         for file in files
     ]
@@ -133,8 +133,8 @@ def write_sn_calibration(
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
-    names, with_camera = _FrameNames(), set[str]()
-    put = put or write_to_disk(root)
+    names, with_camera = _FrameNameAssigner(), set[str]()
+    put = put or make_disk_writer(root)
     with MatchInfoWriter(root) as info:
         for record in records:
             counts["groups"] += 1
@@ -144,21 +144,24 @@ def write_sn_calibration(
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
                 owner = find_camera_owner(record.group, view)
-                name = names.name_frame(place, record.split(view), view.size, owner)
+                name = names.assign_frame_name(place, record.split(view), view.size, owner)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
-                    put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
-                    origin = {**match_info_of_view(record.group, view), MATCH_INFO_PLACE: place}
+                    put(f"{LINES}/{name}.json", format_line_file(lines, view.size, others))
+                    origin = {
+                        **find_match_info_of_view(record.group, view),
+                        MATCH_INFO_PLACE: place,
+                    }
                     info.add(f"{LINES}/{name}.jpg", origin)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
-                    text = camera_file_text(camera, record.covariance(view), view.size)
+                    text = format_camera_file(camera, record.covariance(view), view.size)
                     put(camera_file_name(f"{CAMERAS}/{name}"), text)
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 
 
-class _FrameNames:
+class _FrameNameAssigner:
     """Folder and name of each frame, by its place."""
 
     def __init__(self) -> None:
@@ -166,7 +169,9 @@ class _FrameNames:
         self._place_of: dict[str, str] = {}
         self._owners: dict[str, tuple[str, ...]] = {}
 
-    def name_frame(self, place: str, split: str, size: ImageSize, owner: tuple[str, ...]) -> str:
+    def assign_frame_name(
+        self, place: str, split: str, size: ImageSize, owner: tuple[str, ...]
+    ) -> str:
         """The name of a frame; that of a static camera stays what it was at first.
 
         Raises:
@@ -181,8 +186,8 @@ class _FrameNames:
             )
         if place in self.of_place:
             return self.of_place[place]
-        name = f"{split_folder_name(split, size)}/{flat_frame_name(place, split)}"
-        other = self._place_of.setdefault(fold_file_name(name), place)
+        name = f"{make_split_folder_name(split, size)}/{flat_frame_name(place, split)}"
+        other = self._place_of.setdefault(normalize_file_name(name), place)
         if other != place:
             raise InputError(
                 f"the frames {other} and {place} would both be called {name}",

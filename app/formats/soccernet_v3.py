@@ -12,7 +12,7 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
-from app.formats.ball_names import is_ball
+from app.formats.ball_names import is_ball_name
 from app.formats.fields import find_exact_inverse
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import IMAGE_SUFFIXES
@@ -75,7 +75,7 @@ FOLDERS = ("", "v3_frames/", "Frames-v3/", "frames/")
 """Where the frames lie below the match or inside the archive, by precedence."""
 
 
-class MatchFrames:
+class MatchFrameFinder:
     """Finds the frame of an image name.
 
     Args:
@@ -87,7 +87,7 @@ class MatchFrames:
 
     def __init__(self, tree: FileTree, match: str, names: Collection[str], report: ReaderReport):
         self._tree, self._match = tree, match
-        self._loose = {name for name in names if _is_image(name)}
+        self._loose = {name for name in names if _is_image_name(name)}
         self._members: dict[str, str] = {}
         if ARCHIVE in names:
             self._open_archive(report)
@@ -99,7 +99,7 @@ class MatchFrames:
             problem = f"{error.problem} Its match is imported without these frames."
             report.note(error.path, error.record, error.field, problem)
             return
-        images = filter(_is_image, archive.names())
+        images = filter(_is_image_name, archive.names())
         self._members = {name: archive.stored_name(name) for name in images}
         archive.close()
 
@@ -119,7 +119,7 @@ class MatchFrames:
         return None
 
 
-def _is_image(name: str) -> bool:
+def _is_image_name(name: str) -> bool:
     return PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES
 
 
@@ -244,7 +244,7 @@ def _add_box(item: Any, where: str, builder: _RecordBuilder) -> None:
     name = item.get("class")
     if name is not None and not isinstance(name, str):
         builder.report_problem(f"{where}.class", "is neither text nor null")
-    if not isinstance(name, str) or not is_ball(name):
+    if not isinstance(name, str) or not is_ball_name(name):
         builder.boxes.append(item)
         return
     try:
@@ -307,7 +307,7 @@ def _pair_coordinates(value: Any) -> list[ImagePoint]:
 def record_to_json(view: View, split: str = "") -> dict[str, Any]:
     """The record of a view: what the source said, with the present lines and balls."""
     kept = view.extras.metadata
-    metadata = _image_metadata(kept)
+    metadata = _extract_image_metadata(kept)
     for name, side in (("width", view.size.width), ("height", view.size.height)):
         # The source's own spelling of the same number ("1280") stays.
         metadata[name] = metadata[name] if _is_same_length(metadata.get(name), side) else side
@@ -325,7 +325,7 @@ def record_to_json(view: View, split: str = "") -> dict[str, Any]:
     }
 
 
-def _image_metadata(kept: Mapping[str, Any]) -> dict[str, Any]:
+def _extract_image_metadata(kept: Mapping[str, Any]) -> dict[str, Any]:
     """The source's imageMetadata; groups of other origin keep its fields without the envelope."""
     if IMAGE in kept:
         return dict(kept[IMAGE])
@@ -343,7 +343,7 @@ def _balls_to_json(view: View) -> list[dict[str, Any]]:
     rest = view.extras.metadata.get(BALLS) or []
     written = []
     for index, ball in enumerate(view.balls):
-        points = _ball_corners(ball)
+        points = _ball_to_corners_json(ball)
         if points is None:
             continue
         value: dict[str, Any] = {"class": BALL, "ID": None}
@@ -353,7 +353,7 @@ def _balls_to_json(view: View) -> list[dict[str, Any]]:
     return written
 
 
-def _ball_corners(ball: BallAnnotation) -> dict[str, float] | None:
+def _ball_to_corners_json(ball: BallAnnotation) -> dict[str, float] | None:
     """Corners of the box; a centre alone is a box without area; None out of view."""
     if ball.out_of_view or ball.center is None:
         return None

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
@@ -22,17 +22,17 @@ from app.formats.soccernet_v3 import (
     REST,
     SPLITS,
     ImageRecord,
-    MatchFrames,
+    MatchFrameFinder,
     group_label,
     record_from_json,
 )
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.soccer.group import Group, Station, View
 from app.wording import plural
 
 
 def read_soccernet_v3(
-    root: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+    root: Root, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> Iterator[Group]:
     """The groups of every match below ``root``: each action with its linked replays.
 
@@ -44,7 +44,7 @@ def read_soccernet_v3(
         report: Takes what had to be left out.
         limits: Caps on what is read.
     """
-    with open_tree_while_read(root, report, limits) as tree:
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -64,7 +64,7 @@ class MatchReader:
         tree: FileTree,
         names: list[str],
         report: ReaderReport,
-        limits: Limits,
+        limits: ImportLimits,
         file: str = LABELS,
     ):
         self.tree, self.names, self.report, self.limits = tree, names, report, limits
@@ -76,7 +76,7 @@ class MatchReader:
         path = self.tree.shown(folder + self.file)
         try:
             labels = self._read_labels(folder, path)
-            match = _match_key(self.tree.path, folder, labels.get(GAME))
+            match = _build_match_key(self.tree.path, folder, labels.get(GAME))
             if match in self.seen:
                 problem = f"is a second file of match {match}; {self.seen[match]} is used"
                 raise DatasetFormatError(path, None, None, problem)
@@ -85,8 +85,8 @@ class MatchReader:
             return
         self.seen[match] = path
         inside = list_files_in_folder(self.names, folder)
-        frames = MatchFrames(self.tree, folder, inside, self.report)
-        yield from _MatchLabels(match, labels, path, frames, self.report).groups()
+        frames = MatchFrameFinder(self.tree, folder, inside, self.report)
+        yield from _MatchLabelsReader(match, labels, path, frames, self.report).groups()
 
     def _read_labels(self, folder: str, path: str) -> dict[str, Any]:
         content = self.tree.read_bytes(folder + self.file)
@@ -97,38 +97,43 @@ class MatchReader:
         return labels
 
 
-def _match_key(root: Root, folder: str, game: Any) -> str:
+def _build_match_key(root: Root, folder: str, game: Any) -> str:
     """``<league>/<season>/<match>`` from the folders, or as far as they go from the metadata."""
     parts = PurePosixPath(folder).parts
     if len(parts) >= MATCH_DEPTH:
         return "/".join(parts[-MATCH_DEPTH:])
     local = game.get("UrlLocal") if isinstance(game, dict) else None
-    if isinstance(local, str) and len(_safe_path_parts(local)) == MATCH_DEPTH:
-        return "/".join(_safe_path_parts(local))
+    if isinstance(local, str) and len(_split_safe_path(local)) == MATCH_DEPTH:
+        return "/".join(_split_safe_path(local))
     whole = (*root.resolve().parts[1:], *parts) if root.is_dir() else parts
     return "/".join(whole[-MATCH_DEPTH:]) or root.stem
 
 
-def _safe_path_parts(local: str) -> tuple[str, ...]:
+def _split_safe_path(local: str) -> tuple[str, ...]:
     try:
         return PurePosixPath(require_safe_path(local.strip().strip("/"))).parts
     except UnsafePathError:
         return ()
 
 
-class _MatchLabels:
+class _MatchLabelsReader:
     """One Labels-v3.json on its way to groups."""
 
     def __init__(
-        self, key: str, labels: dict[str, Any], path: str, frames: MatchFrames, report: ReaderReport
+        self,
+        key: str,
+        labels: dict[str, Any],
+        path: str,
+        frames: MatchFrameFinder,
+        report: ReaderReport,
     ):
         self.key, self.path, self.frames, self.report = key, path, frames, report
-        self.actions = self._image_records(labels, "actions")
-        self.replays = self._image_records(labels, "replays")
-        self.game = self._game_fields(labels)
+        self.actions = self._read_image_records(labels, "actions")
+        self.replays = self._read_image_records(labels, "replays")
+        self.game = self._read_game_fields(labels)
         self.missing: list[str] = []
 
-    def _image_records(self, labels: dict[str, Any], name: str) -> dict[str, Any]:
+    def _read_image_records(self, labels: dict[str, Any], name: str) -> dict[str, Any]:
         """The records by image name; what is no such mapping is reported and empty."""
         value = labels.get(name, {} if name == "replays" else None)
         if not isinstance(value, dict):
@@ -144,7 +149,7 @@ class _MatchLabels:
                 )
         return sound
 
-    def _game_fields(self, labels: dict[str, Any]) -> dict[str, Any]:
+    def _read_game_fields(self, labels: dict[str, Any]) -> dict[str, Any]:
         """What else the file says about the game; the lists are made anew when it is written."""
         game = labels.get(GAME)
         rest = {k: v for k, v in labels.items() if k not in (GAME, "actions", "replays")}
@@ -168,14 +173,14 @@ class _MatchLabels:
             if group is not None:
                 self.report.imported += 1
                 yield group
-        self._note_missing_frames()
+        self._report_missing_frames()
 
     def _replays_by_action(self) -> dict[str, list[str]]:
         """Replays of each action, in the file's order; each replay once."""
         links: dict[str, list[str]] = {action: [] for action in self.actions}
         owner: dict[str, str] = {}
         for action, record in self.actions.items():
-            for replay in self._linked_replays(action, record):
+            for replay in self._find_linked_replays(action, record):
                 if replay not in self.replays:
                     self.report_problem(
                         action, "linked_replays", f"names {replay}, which is not there"
@@ -191,7 +196,7 @@ class _MatchLabels:
                 self._link_unlisted_replay(replay, record, links)
         return links
 
-    def _linked_replays(self, action: str, record: Any) -> list[str]:
+    def _find_linked_replays(self, action: str, record: Any) -> list[str]:
         value = record.get("linked_replays") if isinstance(record, dict) else None
         if value is None:
             return []
@@ -244,7 +249,7 @@ class _MatchLabels:
             self.missing.append(image)
         return View(image, station, record.balls, media, extras=record.extras)
 
-    def _note_missing_frames(self) -> None:
+    def _report_missing_frames(self) -> None:
         """One sentence a match; labels without any frames are a legitimate dataset."""
         if self.missing and self.frames.has_frames:
             shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")

@@ -14,9 +14,9 @@ from typing import Any, TextIO
 
 from app.errors import InputError
 from app.formats.camera_json import camera_to_json
-from app.formats.csv_text import CsvTable, Value, list_text
+from app.formats.csv_text import CsvTable, Value, format_number_list
 from app.formats.export_record import ExportRecord, choose_ball_box
-from app.formats.frame_names import fold_file_name, frame_path_by_match
+from app.formats.frame_names import frame_path_by_match, normalize_file_name
 from app.formats.safe_path import resolve_inside
 from app.formats.soccernet_v3 import (
     GAME,
@@ -37,7 +37,7 @@ from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
 
 
-def split_key(group: Group) -> tuple[str, str, str]:
+def parse_league_season_match(group: Group) -> tuple[str, str, str]:
     """League, season and match of a SoccerNet group.
 
     Raises:
@@ -56,7 +56,7 @@ def split_key(group: Group) -> tuple[str, str, str]:
 
 def labels_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
     """Where the frame of a view lies in an export: beside the labels of the group's match."""
-    beside = replace(group, match="/".join(split_key(group)))
+    beside = replace(group, match="/".join(parse_league_season_match(group)))
     return frame_path_by_match(
         beside, replace(view, station=replace(view.station, shared=False)), split, suffix
     )
@@ -79,7 +79,7 @@ def write_soccernet_v3(root: Path, groups: Iterable[Group]) -> list[Path]:
         UnsafePathError: A key would leave ``root``.
     """
     writer = LabelsWriter(root, LABELS)
-    for match, run in groupby(groups, key=lambda group: "/".join(split_key(group))):
+    for match, run in groupby(groups, key=lambda group: "/".join(parse_league_season_match(group))):
         members = list(run)
         writer.reserve_images(match, members)
         writer.write(match, labels_to_json(match, members))
@@ -101,7 +101,7 @@ class LabelsWriter:
         Raises:
             InputError: An image of another group, or another match, has the same name.
         """
-        other = self._matches.setdefault(fold_file_name(match), match)
+        other = self._matches.setdefault(normalize_file_name(match), match)
         if other != match:
             raise InputError(f"the matches {other} and {match} differ in case only; rename one")
         for group in groups:
@@ -211,13 +211,15 @@ def write_soccernet_v3d(
         }
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
         table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
-        for match, run in groupby(records, key=lambda record: split_key(record.group)):
+        for match, run in groupby(
+            records, key=lambda record: parse_league_season_match(record.group)
+        ):
             members = list(run)
             for record in members:
                 _add_rows(table, lists, record, everything, counts)
             name = "/".join(match)
             labels.reserve_images(name, (record.group for record in members))
-            labels.write(name, _match_labels(name, members, everything, boxes))
+            labels.write(name, _build_match_labels(name, members, everything, boxes))
     return counts
 
 
@@ -229,30 +231,30 @@ def _add_rows(
     counts: dict[str, int],
 ) -> None:
     counts["groups"] += 1
-    match = split_key(record.group)[2]
+    match = parse_league_season_match(record.group)[2]
     for view in record.group.views:
         fit = record.ball_fit(view, everything)
         verdict = (record.verdict_text,) if everything else ()
-        table.add((*_row_values(record, view, fit), *verdict))
+        table.add((*_list_row_values(record, view, fit), *verdict))
         counts["views"] += 1
         counts["balls"] += record.has_ball_3d(view)
         if record.split(view) in lists:
             lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
 
 
-def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
+def _list_row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
     numbers = parse_image_numbers(view.key)
     assert numbers is not None, "split_key has checked it"
     action, replay = numbers
     camera = record.camera(view)
     box = view.ball.box if view.ball else None
-    yield from split_key(record.group)
+    yield from parse_league_season_match(record.group)
     yield from (action, replay is None, None if replay is None else float(replay))
     yield from (view.size.width, view.size.height, view.ball is not None)
     yield format_box(box) if box else None
     yield repr(replace_non_finite(camera_to_json(camera))) if camera else None
-    yield from _jac_of_view(record, view) or (None,) * len(JAC_NAMES)
-    yield f"[array({list_text(record.point)})]" if fit and record.point else None
+    yield from _get_view_jac(record, view) or (None,) * len(JAC_NAMES)
+    yield f"[array({format_number_list(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
     yield fit.optimized_diameter_px if fit else None
     yield record.split(view) or None
@@ -260,15 +262,15 @@ def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterat
 
 def format_box(box: Box) -> str:
     """``[x, y, w, h]`` with every digit."""
-    return list_text((box.x, box.y, box.width, box.height))
+    return format_number_list((box.x, box.y, box.width, box.height))
 
 
-def _jac_of_view(record: ExportRecord, view: View) -> tuple[float, ...] | None:
+def _get_view_jac(record: ExportRecord, view: View) -> tuple[float, ...] | None:
     solved = record.view_solution(view)
     return solved.calibration.jac if solved else None
 
 
-def _match_labels(
+def _build_match_labels(
     match: str, records: list[ExportRecord], everything: bool, boxes: str
 ) -> dict[str, Any]:
     labels = labels_to_json(match, [_with_exported_boxes(record, boxes) for record in records])
@@ -276,7 +278,7 @@ def _match_labels(
         main, *replays = record.group.views
         for view in record.group.views:
             images = labels["actions"] if view is main else labels["replays"]
-            images[view.key][IMAGE] |= _computed_fields(record, view, everything)
+            images[view.key][IMAGE] |= _collect_computed_fields(record, view, everything)
         calibrated = [view.key for view in replays if record.is_calibrated(view)]
         labels["actions"][main.key][IMAGE]["calibrated_replays"] = calibrated
     labels[GAME]["reconstructions"] = [
@@ -302,12 +304,12 @@ def _with_exported_boxes(record: ExportRecord, kind: str) -> Group:
     return group
 
 
-def _computed_fields(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
+def _collect_computed_fields(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
     """What stands beside the source's own metadata of an image."""
     values: dict[str, Any] = {}
     camera, jac, fit = (
         record.camera(view),
-        _jac_of_view(record, view),
+        _get_view_jac(record, view),
         record.ball_fit(view, everything),
     )
     if camera is not None:

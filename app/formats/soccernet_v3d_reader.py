@@ -11,16 +11,16 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.formats import fields
 from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, list_files_in_folder
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
 from app.formats.json_reader import parse_literal
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
-from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrames, group_label
+from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrameFinder, group_label
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3_reader import MatchReader
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.geometry.camera import Camera
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Station, View
@@ -64,7 +64,7 @@ class TableRow:
 
 
 @dataclass(frozen=True)
-class SnTable:
+class SoccerNetV3DTable:
     """The rows of a table by match, action image and image; and the split lists.
 
     ``folder`` is where the table lies in its tree, ``""`` or with a slash at its end.
@@ -97,15 +97,15 @@ class SnTable:
 
 
 def read_snv3d_table(
-    tree: FileTree, names: list[str], report: ReaderReport, limits: Limits
-) -> SnTable:
+    tree: FileTree, names: list[str], report: ReaderReport, limits: ImportLimits
+) -> SoccerNetV3DTable:
     """The table of a tree and its split lists; empty where there is none.
 
     A row that is wrong is reported with its line and left out, an unreadable cell alone is.
     """
     tables = [name for name in names if PurePosixPath(name).name == TABLE]
     if not tables:
-        return SnTable("", {}, {})
+        return SoccerNetV3DTable("", {}, {})
     for name in tables[1:]:
         report.note(tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used")
     folder = tables[0][: -len(TABLE)]
@@ -114,7 +114,7 @@ def read_snv3d_table(
         _read_table(tree, tables[0], rows, report, limits)
     except DatasetFormatError as error:
         report.skip(error)
-    return SnTable(folder, rows, _read_split_lists(tree, names, folder, report))
+    return SoccerNetV3DTable(folder, rows, _read_split_lists(tree, names, folder, report))
 
 
 def _read_table(
@@ -122,12 +122,12 @@ def _read_table(
     name: str,
     rows: dict[str, dict[str, dict[str, TableRow]]],
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
 ) -> None:
     shown = tree.shown(name)
     for line, cells in read_rows(tree.read_bytes(name), shown, REQUIRED, limits):
         try:
-            row = _RowCells(cells, shown, f"line {line}", report).to_table_row()
+            row = _TableRowParser(cells, shown, f"line {line}", report).to_table_row()
         except DatasetFormatError as error:
             report.skip(error)
             continue
@@ -137,7 +137,7 @@ def _read_table(
         views.setdefault(row.image, row)
 
 
-class _RowCells:
+class _TableRowParser:
     """The cells of one row."""
 
     def __init__(self, cells: Mapping[str, str], path: str, line: str, report: ReaderReport):
@@ -145,58 +145,58 @@ class _RowCells:
 
     def to_table_row(self) -> TableRow:
         """The row; raises DatasetFormatError where it does not say which image it is of."""
-        action, replay = self._whole_number("main_action"), None
-        if not self._truth_value("action"):
-            replay = self._whole_number("replay")
+        action, replay = self._read_whole_number("main_action"), None
+        if not self._read_truth_value("action"):
+            replay = self._read_whole_number("replay")
         return TableRow(
-            match="/".join(map(self._folder_name, ("league", "season", "match"))),
+            match="/".join(map(self._read_folder_name, ("league", "season", "match"))),
             action=action,
             replay=replay,
-            size=ImageSize(self._side_length("img_w"), self._side_length("img_h")),
-            ball=self._ball_annotation(),
-            camera=self._given_camera(),
-            split=self._optional_text("set"),
+            size=ImageSize(self._read_side_length("img_w"), self._read_side_length("img_h")),
+            ball=self._read_ball_annotation(),
+            camera=self._read_given_camera(),
+            split=self._read_optional_text("set"),
         )
 
-    def _optional_text(self, name: str) -> str:
+    def _read_optional_text(self, name: str) -> str:
         text = self._cells.get(name)
         return "" if text is None or is_missing(text) else text.strip()
 
-    def _cell_error(self, name: str, problem: str) -> DatasetFormatError:
+    def _make_cell_error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self._path, self._line, name, problem)
 
-    def _folder_name(self, name: str) -> str:
+    def _read_folder_name(self, name: str) -> str:
         text = self._cells.get(name, "")
         try:
             if "/" in require_safe_path(text) or text.strip() in ("", "."):
-                raise self._cell_error(name, "is not the name of a folder")
+                raise self._make_cell_error(name, "is not the name of a folder")
         except UnsafePathError as error:
-            raise self._cell_error(name, error.message) from error
+            raise self._make_cell_error(name, error.message) from error
         return text
 
-    def _whole_number(self, name: str) -> int:
+    def _read_whole_number(self, name: str) -> int:
         try:
             number = fields.parse_whole_number(self._cells.get(name, ""))
         except ValueError as error:
-            raise self._cell_error(name, str(error)) from error
+            raise self._make_cell_error(name, str(error)) from error
         if number < 0:
-            raise self._cell_error(name, "is negative")
+            raise self._make_cell_error(name, "is negative")
         return number
 
-    def _side_length(self, name: str) -> int:
-        side = self._whole_number(name)
+    def _read_side_length(self, name: str) -> int:
+        side = self._read_whole_number(name)
         if not 2 <= side <= MAX_SIDE:
-            raise self._cell_error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
+            raise self._make_cell_error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
         return side
 
-    def _truth_value(self, name: str) -> bool:
+    def _read_truth_value(self, name: str) -> bool:
         text = self._cells.get(name, "").strip().lower()
         if text not in (*_TRUE, *_FALSE):
-            raise self._cell_error(name, f"is {quoted(text, 20)}, neither True nor False")
+            raise self._make_cell_error(name, f"is {quote_text(text, 20)}, neither True nor False")
         return text in _TRUE
 
-    def _ball_annotation(self) -> BallAnnotation | None:
-        text = self._optional_text("ball_bbox")
+    def _read_ball_annotation(self) -> BallAnnotation | None:
+        text = self._read_optional_text("ball_bbox")
         if not text:
             return None
         try:
@@ -204,12 +204,12 @@ class _RowCells:
             if width <= 0 or height <= 0:
                 raise ValueError("is a box whose width or height is not positive")
         except ValueError as error:
-            self._report.skip(self._cell_error("ball_bbox", f"{error}; left out"))
+            self._report.skip(self._make_cell_error("ball_bbox", f"{error}; left out"))
             return None
         return BallAnnotation(box=Box(x, y, width, height))
 
-    def _given_camera(self) -> Camera | None:
-        text = self._optional_text("calibration")
+    def _read_given_camera(self) -> Camera | None:
+        text = self._read_optional_text("calibration")
         if not text:
             return None
         try:
@@ -217,7 +217,7 @@ class _RowCells:
             return camera_from_json(value, self._path, self._line)
         except DatasetFormatError as error:
             where = f"calibration, {error.field}" if error.field else "calibration"
-            self._report.skip(self._cell_error(where, f"{error.problem}; left out"))
+            self._report.skip(self._make_cell_error(where, f"{error.problem}; left out"))
             return None
 
 
@@ -277,7 +277,7 @@ def read_soccernet_v3d(
     report: ReaderReport,
     *,
     calibration: str = "given",
-    limits: Limits = DEFAULT_LIMITS,
+    limits: ImportLimits = DEFAULT_LIMITS,
 ) -> Iterator[Group]:
     """The groups of every match below ``root``, with the released cameras as given ones.
 
@@ -287,7 +287,7 @@ def read_soccernet_v3d(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    with open_tree_while_read(root, report, limits) as tree:
+    with open_tree_context(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
@@ -300,17 +300,17 @@ def read_soccernet_v3d(
         for folder in folders:
             for group in matches.read_match(folder):
                 yield reader.add_table_to_group(group, tree.shown(folder + LABELS))
-        yield from reader.groups_in_table_only(tree, names, limits)
+        yield from reader.read_table_only_groups(tree, names, limits)
         if unused := table.unused_split_entries():
             count = plural(len(unused), "action")
             shown = ", ".join(unused[:5]) + (", ..." if len(unused) > 5 else "")
-            report.remark(f"{count} of the split lists did not come: {shown}")
+            report.add_remark(f"{count} of the split lists did not come: {shown}")
 
 
 class _DatasetReader:
     """Brings labels and table together."""
 
-    def __init__(self, table: SnTable, calibration: str, report: ReaderReport):
+    def __init__(self, table: SoccerNetV3DTable, calibration: str, report: ReaderReport):
         self._table, self._calibration, self._report = table, calibration, report
         self._seen: set[tuple[str, str]] = set()
 
@@ -337,7 +337,7 @@ class _DatasetReader:
         if GAME in metadata:
             kept = {k: v for k, v in metadata[GAME].items() if k != "reconstructions"}
             metadata[GAME] = kept
-        given = self._released_camera(image, view.key, path) or (row.camera if row else None)
+        given = self._read_released_camera(image, view.key, path) or (row.camera if row else None)
         station = replace(view.station, given=given, calibration=self._calibration)
         balls = view.balls
         # The labels may hold the optimised box; the table always has the annotated one.
@@ -347,7 +347,7 @@ class _DatasetReader:
         extras = replace(view.extras, metadata=metadata)
         return replace(view, station=station, balls=balls, extras=extras)
 
-    def _released_camera(self, image: Mapping[str, Any], record: str, path: str) -> Any:
+    def _read_released_camera(self, image: Mapping[str, Any], record: str, path: str) -> Any:
         if image.get("calibration") is None:
             return None
         try:
@@ -357,8 +357,8 @@ class _DatasetReader:
             self._report.note(path, record, where, f"{error.problem}; left out")
             return None
 
-    def groups_in_table_only(
-        self, tree: FileTree, names: list[str], limits: Limits
+    def read_table_only_groups(
+        self, tree: FileTree, names: list[str], limits: ImportLimits
     ) -> Iterator[Group]:
         """The groups that stand in the table alone: balls and cameras, no lines."""
         for match, actions in self._table.rows.items():
@@ -367,16 +367,16 @@ class _DatasetReader:
                 continue
             folder = f"{self._table.folder}{match}/"
             inside = list_files_in_folder(names, folder)
-            frames = MatchFrames(tree, folder, inside, self._report)
+            frames = MatchFrameFinder(tree, folder, inside, self._report)
             for main in new:
                 self._report.read += 1
-                group = self._group_of_rows(match, main, actions[main], frames)
+                group = self._make_group_from_rows(match, main, actions[main], frames)
                 if group is not None:
                     self._report.imported += 1
                     yield group
 
-    def _group_of_rows(
-        self, match: str, main: str, rows: Mapping[str, TableRow], frames: MatchFrames
+    def _make_group_from_rows(
+        self, match: str, main: str, rows: Mapping[str, TableRow], frames: MatchFrameFinder
     ) -> Group | None:
         if main not in rows:
             problem = "has rows of replays and none of the main picture; the group is left out"

@@ -29,7 +29,7 @@ _TO_PITCH = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Their pitch frame to ours: x along the length, z down."""
 
 
-def is_synloc(value: Any) -> bool:
+def is_synloc_image_record(value: Any) -> bool:
     """Whether a value is an image record with a camera."""
     return isinstance(value, dict) and MATRIX in value and POLYNOMIAL in value
 
@@ -37,7 +37,7 @@ def is_synloc(value: Any) -> bool:
 def index_image_records(value: Mapping[str, Any]) -> dict[str, Any] | None:
     """The records of a COCO file by stem; None where it has no cameras."""
     images = value.get("images")
-    if not isinstance(images, list) or not any(map(is_synloc, images)):
+    if not isinstance(images, list) or not any(map(is_synloc_image_record, images)):
         return None
     return {
         PurePosixPath(str(item.get("file_name", place))).stem: item
@@ -59,10 +59,12 @@ def camera_from_synloc(value: Mapping[str, Any], path: str, record: str | None) 
     """
     name = MATRIX
     try:
-        matrix = np.array([fields.parse_numbers(row, 4) for row in _three_rows(value.get(MATRIX))])
-        rotation, position = _rotation_and_position(matrix)
+        matrix = np.array(
+            [fields.parse_numbers(row, 4) for row in _require_three_rows(value.get(MATRIX))]
+        )
+        rotation, position = _decompose_pose_matrix(matrix)
         name = POLYNOMIAL
-        terms = _polynomial_terms(value.get(POLYNOMIAL))
+        terms = _parse_polynomial_terms(value.get(POLYNOMIAL))
         name = "width"
         width = _read_side_length(value.get(name))
         name = "height"
@@ -82,14 +84,14 @@ def camera_from_synloc(value: Mapping[str, Any], path: str, record: str | None) 
         raise DatasetFormatError(path, record, POLYNOMIAL, error.message) from error
 
 
-def _three_rows(value: Any) -> list[Any]:
+def _require_three_rows(value: Any) -> list[Any]:
     rows = fields.require_list(value)
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")
     return rows
 
 
-def _rotation_and_position(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _decompose_pose_matrix(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotation, pitch to camera, and position in our pitch frame of ``s [R | -R C]``."""
     scale = np.cbrt(np.linalg.det(matrix[:, :3]))
     if not np.isfinite(scale) or scale == 0:
@@ -103,7 +105,7 @@ def _rotation_and_position(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rotation @ _TO_PITCH.T, _TO_PITCH @ position
 
 
-def _polynomial_terms(value: Any) -> FloatArray:
+def _parse_polynomial_terms(value: Any) -> FloatArray:
     """The polynomial's terms, the constant one first."""
     listed = fields.require_list(value)
     if not 2 <= len(listed) <= TERMS:

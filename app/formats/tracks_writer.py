@@ -15,7 +15,7 @@ import numpy as np
 
 from app.errors import InputError
 from app.formats.camera_matrix import cameras_to_arrays
-from app.formats.csv_text import csv_line
+from app.formats.csv_text import format_csv_line
 from app.formats.parquet import import_pyarrow
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
@@ -36,7 +36,7 @@ class TrackedEvent(Protocol):
     Attributes:
         frame: Of the stretch, the nearest.
         time_s: Seconds.
-        kind: ``kick``, ``bounce`` or ``out``.
+        kind: ``kick``, ``apply_bounce`` or ``out``.
         position: Pitch frame, metres, shape (3,).
         sigma_s: Standard deviation of its time, seconds.
     """
@@ -157,11 +157,11 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
         InputError: Two tracks would have one folder.
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0, "events": 0}
-    for folder, record in track_folders(root, records):
+    for folder, record in create_track_folders(root, records):
         track = record.track
-        lines = [csv_line(COLUMNS), *map(csv_line, _track_rows(record))]
+        lines = [format_csv_line(COLUMNS), *map(format_csv_line, _track_rows(record))]
         (folder / BALL).write_text("".join(lines), encoding="utf-8")
-        lines = [csv_line(EVENT_COLUMNS), *map(csv_line, _event_rows(record))]
+        lines = [format_csv_line(EVENT_COLUMNS), *map(format_csv_line, _event_rows(record))]
         (folder / EVENTS).write_text("".join(lines), encoding="utf-8")
         if find_spec("pyarrow") is not None:
             _write_parquet(folder / "ball.parquet", record)
@@ -184,7 +184,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
         Counts: ``tracks``, ``frames``, ``balls`` and ``cameras`` (views that have one).
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0, "cameras": 0}
-    for folder, record in track_folders(root, records):
+    for folder, record in create_track_folders(root, records):
         track = record.track
         rows = {int(frame): row for row, frame in enumerate(track.frames)}
         arrays: dict[str, Any] = {
@@ -209,12 +209,14 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     return counts
 
 
-def folder_name(key: str) -> str:
+def make_track_folder_name(key: str) -> str:
     """What the folder of a stretch is called where an export has several."""
     return _UNSAFE.sub("_", key).strip(" .") or "track"
 
 
-def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[Path, TrackRecord]]:
+def create_track_folders(
+    root: Path, records: Iterable[TrackRecord]
+) -> Iterator[tuple[Path, TrackRecord]]:
     """Where each track goes: a single one to ``root``."""
     whole = list(records)
     taken: dict[str, str] = {}
@@ -222,7 +224,7 @@ def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[
         if len(whole) == 1:
             yield root, record
             continue
-        name = folder_name(record.key)
+        name = make_track_folder_name(record.key)
         other = taken.setdefault(name.casefold(), record.key)
         if other != record.key:
             raise InputError(
@@ -250,7 +252,7 @@ def _event_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
 
 def _write_parquet(path: Path, record: TrackRecord) -> None:
     _, parquet = import_pyarrow()
-    table = _frames_table(record).replace_schema_metadata({"verdict": record.verdict})
+    table = _make_frames_table(record).replace_schema_metadata({"verdict": record.verdict})
     parquet.write_table(table, path, compression="zstd")
 
 
@@ -269,7 +271,7 @@ def write_track_tables(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     tables = []
     rows: list[dict[str, Any]] = []
     for record in whole:
-        frames = _frames_table(record)
+        frames = _make_frames_table(record)
         stretch = pyarrow.array([record.key] * frames.num_rows, text)
         tables.append(frames.add_column(0, "stretch", stretch))
         rows += [
@@ -284,7 +286,7 @@ def write_track_tables(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     return {"tracks": len(whole), "events": len(rows)}
 
 
-def _frames_table(record: TrackRecord) -> Any:
+def _make_frames_table(record: TrackRecord) -> Any:
     """A row a frame, as an Arrow table."""
     pyarrow, _ = import_pyarrow()
     track = record.track
@@ -293,12 +295,12 @@ def _frames_table(record: TrackRecord) -> Any:
         jumps[jump.frame - track.frames[0]] = jump.metres
     numbers, whole, text = pyarrow.float64(), pyarrow.int32(), pyarrow.string()
 
-    def nullable_numbers(values: FloatArray) -> Any:
+    def make_nullable_number_array(values: FloatArray) -> Any:
         return pyarrow.array(
             [None if value != value else value for value in values.tolist()], numbers
         )
 
-    def nullable_lists(values: FloatArray, length: int) -> Any:
+    def make_nullable_list_array(values: FloatArray, length: int) -> Any:
         flat = values.reshape(len(values), length)
         known = np.asarray(np.isfinite(flat).all(axis=1))
         rows = [row if there else None for row, there in zip(flat.tolist(), known, strict=True)]
@@ -309,18 +311,18 @@ def _frames_table(record: TrackRecord) -> Any:
             "frame": pyarrow.array(track.frames.tolist(), whole),
             "time_s": pyarrow.array(track.times.tolist(), numbers),
             **{
-                name: nullable_numbers(track.position[:, axis])
+                name: make_nullable_number_array(track.position[:, axis])
                 for axis, name in enumerate(("x_m", "y_m", "z_m"))
             },
-            "sigma_m": nullable_numbers(position_sigma(track.covariance)),
+            "sigma_m": make_nullable_number_array(position_sigma(track.covariance)),
             **{
-                name: nullable_numbers(track.velocity[:, axis])
+                name: make_nullable_number_array(track.velocity[:, axis])
                 for axis, name in enumerate(("vx_m_s", "vy_m_s", "vz_m_s"))
             },
-            "covariance": nullable_lists(track.covariance, 36),
+            "covariance": make_nullable_list_array(track.covariance, 36),
             "state": pyarrow.array(list(track.state), text),
             "mode": pyarrow.array([mode or None for mode in track.mode], text),
-            "jump_m": nullable_numbers(jumps),
+            "jump_m": make_nullable_number_array(jumps),
             "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),
         }
     )
@@ -346,7 +348,7 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     Source: TRACAB's file specification as kloppy reads it (``TracabDatParser``).
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0}
-    for folder, record in track_folders(root, records):
+    for folder, record in create_track_folders(root, records):
         track, lines = record.track, []
         speed = np.linalg.norm(track.velocity, axis=1)
         for row in np.flatnonzero(record.has_position).tolist():
@@ -354,7 +356,7 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
             alive = "Dead" if track.mode[row] == "out" else "Alive"
             lines.append(f"{track.frames[row]}::{x},{y},{z},{speed[row]:.2f},H,{alive};:\n")
         (folder / DATA).write_text("".join(lines), encoding="ascii")
-        (folder / METADATA).write_text(_tracab_metadata(record), encoding="utf-8")
+        (folder / METADATA).write_text(_format_tracab_metadata(record), encoding="utf-8")
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
         counts["balls"] += len(lines)
@@ -375,8 +377,8 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     Source: Common Data Format 0.3.2 (arXiv 2505.15820), tracking.
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0}
-    for folder, record in track_folders(root, records):
-        lines = [f"{json_text(line)}\n" for line in _cdf_lines(record)]
+    for folder, record in create_track_folders(root, records):
+        lines = [f"{json_text(line)}\n" for line in _make_cdf_frames(record)]
         (folder / CDF).write_text("".join(lines), encoding="utf-8")
         counts["tracks"] += 1
         counts["frames"] += len(record.track.frames)
@@ -384,7 +386,7 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     return counts
 
 
-def _tracab_metadata(record: TrackRecord) -> str:
+def _format_tracab_metadata(record: TrackRecord) -> str:
     pitch, frames = record.pitch, record.track.frames
     return (
         '<?xml version="1.0" encoding="utf-8"?>\n'
@@ -400,7 +402,7 @@ def _tracab_metadata(record: TrackRecord) -> str:
     )
 
 
-def _cdf_lines(record: TrackRecord) -> Iterator[dict[str, Any]]:
+def _make_cdf_frames(record: TrackRecord) -> Iterator[dict[str, Any]]:
     track = record.track
     nobody = {side: {"id": side, "players": list[Any]()} for side in ("home", "away")}
     there = record.has_position & (np.abs(np.nan_to_num(track.position[:, :2])) <= CDF_LIMITS).all(

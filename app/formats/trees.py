@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import IO
 
 from app.errors import DatasetFormatError, TooLargeError, UnsafePathError
-from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root, read_limited
+from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, ImportLimits, Root, read_limited
 from app.formats.report import ReaderReport
 from app.formats.safe_path import is_hidden, open_regular_file, require_safe_path, resolve_inside
 from app.object_store.path import StoredPath
 from app.object_store.store import StoredObject
 from app.soccer.group import Media
-from app.zip_file import UNREADABLE, FilePart, count_truncated, open_nested, open_zip
+from app.zip_file import UNREADABLE, FilePart, count_unlisted_members, open_nested, open_zip
 
 _RATIO_FLOOR = 1024 * 1024
 _UTF_8 = 0x800
@@ -38,7 +38,7 @@ class ZipTree:
         self,
         path: Root,
         report: ReaderReport,
-        limits: Limits,
+        limits: ImportLimits,
         archive: zipfile.ZipFile | None = None,
     ):
         self.path = path
@@ -46,7 +46,7 @@ class ZipTree:
         self._archive = _open_zip(path) if archive is None else archive
         self._count = self._total = 0
         try:
-            self._members = self._checked_members(report)
+            self._members = self._select_safe_members(report)
         except DatasetFormatError:
             self._archive.close()
             raise
@@ -107,30 +107,30 @@ class ZipTree:
 
     def media(self, name: str) -> Media:
         """Where a member can be read later."""
-        return self._media_of_member(self.stored_name(name))
+        return self._locate_member_media(self.stored_name(name))
 
     def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file that is a member can be read later."""
-        return self._media_of_member(f"{self.stored_name(name)}/{member}")
+        return self._locate_member_media(f"{self.stored_name(name)}/{member}")
 
     def stored_name(self, name: str) -> str:
         """The name of a member as the zip file itself spells it, by which it is opened later."""
         found = self._members.get(name)
         return name if found is None else found.filename
 
-    def _media_of_member(self, member: str) -> Media:
+    def _locate_member_media(self, member: str) -> Media:
         if isinstance(self.path, StoredPath):
-            return Media(self.path.sealed(), member)
+            return Media(self.path.make_sealed_address(), member)
         return Media(str(self.path), member)
 
     def close(self) -> None:
         """Close the zip file."""
         self._archive.close()
 
-    def _checked_members(self, report: ReaderReport) -> dict[str, zipfile.ZipInfo]:
+    def _select_safe_members(self, report: ReaderReport) -> dict[str, zipfile.ZipInfo]:
         members = self._archive.infolist()
-        self._check_totals(members)
-        if lost := count_truncated(self._archive):
+        self._check_total_size_and_count(members)
+        if lost := count_unlisted_members(self._archive):
             damage = (
                 f"has a damaged list of members: it should have {len(members) + lost:,} and has"
                 f" {len(members):,}; copy it again, or read the folder that it was made of"
@@ -144,7 +144,7 @@ class ZipTree:
             # A name that begins with NUL is empty, which ``is_dir`` does not survive.
             if name.endswith("/") or any(map(is_hidden, name.split("/"))):
                 continue
-            problem = self._member_problem(member, name, folded)
+            problem = self._find_member_problem(member, name, folded)
             if problem is None:
                 checked[name] = member
             else:
@@ -153,7 +153,7 @@ class ZipTree:
                 report.note(str(self.path), shown[:200], None, problem)
         return checked
 
-    def _check_totals(self, members: list[zipfile.ZipInfo]) -> None:
+    def _check_total_size_and_count(self, members: list[zipfile.ZipInfo]) -> None:
         limits, shown = self._limits, str(self.path)
         if len(members) > limits.members:
             problem = f"has {len(members):,} members, and the limit is {limits.members:,}: split it"
@@ -166,7 +166,7 @@ class ZipTree:
             raise DatasetFormatError(shown, None, None, problem)
         self._count, self._total = len(members), total
 
-    def _member_problem(
+    def _find_member_problem(
         self, member: zipfile.ZipInfo, name: str, folded: Counter[str]
     ) -> str | None:
         kind = stat.S_IFMT(member.external_attr >> 16)
@@ -212,7 +212,7 @@ def _open_zip(path: Root) -> zipfile.ZipFile:
 class FolderTree:
     """The files below a folder."""
 
-    def __init__(self, path: Path, report: ReaderReport, limits: Limits):
+    def __init__(self, path: Path, report: ReaderReport, limits: ImportLimits):
         self.path: Path = path
         self._report = report
         self._limits = limits
@@ -295,7 +295,7 @@ class FolderTree:
 class SingleFileTree(FolderTree):
     """One file as if it were alone in its folder."""
 
-    def __init__(self, path: Path, report: ReaderReport, limits: Limits):
+    def __init__(self, path: Path, report: ReaderReport, limits: ImportLimits):
         super().__init__(path.parent, report, limits)
         self._name = path.name
 
@@ -315,7 +315,7 @@ class StoreTree:
         NotFoundError, StorageError: The store cannot be asked.
     """
 
-    def __init__(self, path: StoredPath, report: ReaderReport, limits: Limits):
+    def __init__(self, path: StoredPath, report: ReaderReport, limits: ImportLimits):
         self.path = path if path.is_dir() else path.parent
         self._limits = limits
         self._found: dict[str, StoredObject] = {}
@@ -341,7 +341,7 @@ class StoreTree:
 
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one object."""
-        stored, limit = self._stored_object(name), self._limits.file_bytes
+        stored, limit = self._find_stored_object(name), self._limits.file_bytes
         try:
             return self.path.store.read_whole(stored.key, limit, stored.etag)[0]
         except TooLargeError as error:
@@ -350,7 +350,7 @@ class StoreTree:
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
-        path = self.path.of(self._stored_object(name))
+        path = self.path.of(self._find_stored_object(name))
         return io.BufferedReader(FilePart(path.reads(STREAM).pread, 0, path.size))
 
     def shown(self, name: str) -> str:
@@ -359,27 +359,29 @@ class StoreTree:
 
     def media(self, name: str) -> Media:
         """Where an object can be read later, as long as it is this one."""
-        return Media(self.path.of(self._stored_object(name)).sealed())
+        return Media(self.path.of(self._find_stored_object(name)).make_sealed_address())
 
     def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file in the store can be read later."""
-        return Media(self.path.of(self._stored_object(name)).sealed(), member)
+        return Media(self.path.of(self._find_stored_object(name)).make_sealed_address(), member)
 
     def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file in the store, of which no more than its list is fetched."""
-        return ZipTree(self.path.of(self._stored_object(name)), report, self._limits)
+        return ZipTree(self.path.of(self._find_stored_object(name)), report, self._limits)
 
     def close(self) -> None:
         """Nothing to release."""
 
-    def _stored_object(self, name: str) -> StoredObject:
+    def _find_stored_object(self, name: str) -> StoredObject:
         stored = self._found.get(name)
         if stored is None:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the store")
         return stored
 
 
-def open_tree(path: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS) -> FileTree | None:
+def open_tree(
+    path: Root, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
+) -> FileTree | None:
     """The folder, zip or single file at ``path``; None (and one problem) when it is unreadable.
 
     Members of an archive that are unsafe are left out, with a problem each.
@@ -406,8 +408,8 @@ def open_tree(path: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS)
 
 
 @contextmanager
-def open_tree_while_read(
-    path: Root, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+def open_tree_context(
+    path: Root, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> Iterator[FileTree | None]:
     """``open_tree`` for as long as somebody reads from it."""
     tree = open_tree(path, report, limits)
@@ -415,7 +417,9 @@ def open_tree_while_read(
         yield tree
 
 
-def _open_store_tree(path: StoredPath, report: ReaderReport, limits: Limits) -> FileTree | None:
+def _open_store_tree(
+    path: StoredPath, report: ReaderReport, limits: ImportLimits
+) -> FileTree | None:
     if path.is_dir() or path.suffix.lower() != ".zip":
         return StoreTree(path, report, limits)
     try:

@@ -83,7 +83,7 @@ Gathered: TypeAlias = tuple[str, Path | bytes]
 """A file's relative path; where it lies, or its content."""
 
 
-def write_to_disk(root: Path) -> PutText:
+def make_disk_writer(root: Path) -> PutText:
     """Writes each file at once below a folder.
 
     Raises (the result):
@@ -108,7 +108,7 @@ def write_file_below(root: Path, path: str, text: str) -> Path:
     return target
 
 
-class ViewFiles:
+class ViewFileBuffer:
     """Files of a zip, in a database beside its other files; use as a context.
 
     A file that is put again is the newer one, as on a disk.
@@ -124,7 +124,7 @@ class ViewFiles:
             self._connection.execute("CREATE TABLE file (path TEXT PRIMARY KEY, body BLOB)")
             self._connection.execute("BEGIN")
 
-    def __enter__(self) -> ViewFiles:
+    def __enter__(self) -> ViewFileBuffer:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
@@ -162,7 +162,7 @@ class FilesToPack:
         self._held = root / HELD
         paths = (path for path in root.rglob("*") if path != self._held and path.is_file())
         names: dict[str, Path | bytes] = {path.relative_to(root).as_posix(): path for path in paths}
-        self._on_disk = sorted(names.items(), key=_path_of_file)
+        self._on_disk = sorted(names.items(), key=_get_file_path)
 
     def __len__(self) -> int:
         waiting = self._run_query("SELECT count(*) FROM file")
@@ -171,7 +171,7 @@ class FilesToPack:
 
     def __iter__(self) -> Iterator[Gathered]:
         waiting = self._run_query("SELECT path, body FROM file ORDER BY path")
-        return merge(self._on_disk, waiting, key=_path_of_file)
+        return merge(self._on_disk, waiting, key=_get_file_path)
 
     def _run_query(self, question: str) -> Iterator[Any]:
         if self._held.exists():
@@ -179,5 +179,5 @@ class FilesToPack:
                 yield from connection.execute(question)
 
 
-def _path_of_file(item: Gathered) -> str:
+def _get_file_path(item: Gathered) -> str:
     return item[0]

@@ -16,17 +16,17 @@ from app.formats.camera_json import camera_from_json, camera_to_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import BALLS, GAME, IMAGE, RECORD, REST
-from app.geometry.camera import camera_covariance
+from app.geometry.camera import validate_camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.codec import (
     ball_to_json,
     covariance_to_json,
-    left_out_to_json,
     lines_to_json,
     picture_to_json,
+    view_exclusion_to_json,
 )
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
-from app.soccer.group import CALIBRATIONS, Group, LeftOut, Station, View, make_left_out
+from app.soccer.group import CALIBRATIONS, Group, Station, View, ViewExclusion, make_view_exclusion
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.wording import plural
@@ -54,7 +54,7 @@ class GroupHead:
         return Group(self.key, views, self.match, self.pitch, self.split, self.label)
 
 
-def head_to_json(group: Group) -> dict[str, Any]:
+def group_head_to_json(group: Group) -> dict[str, Any]:
     """What a group is without its views."""
     return {
         "group": group.key,
@@ -73,7 +73,7 @@ def view_to_json(view: View) -> dict[str, Any]:
     return {
         "view": view.key,
         "included": view.included,
-        **({} if why is None else {"left_out": left_out_to_json(why)}),
+        **({} if why is None else {"left_out": view_exclusion_to_json(why)}),
         "station": station.key,
         "shared": station.shared,
         "flipped": station.flipped,
@@ -138,7 +138,7 @@ class StateReader:
         return ImageSize(*sides)
 
     def head(self) -> GroupHead:
-        """Back from ``head_to_json``."""
+        """Back from ``group_head_to_json``."""
         try:
             length, width = fields.parse_numbers(self.value.get("pitch") or [105.0, 68.0], 2)
             pitch = Pitch(length, width)
@@ -199,7 +199,7 @@ class StateReader:
                     "is the covariance of a given camera, but the view has none: add `given`, or"
                     " leave the covariance out"
                 )
-            return camera_covariance(fields.parse_numbers(found, 64))
+            return validate_camera_covariance(fields.parse_numbers(found, 64))
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error
 
@@ -217,7 +217,7 @@ class StateReader:
         except (ValueError, InputError) as error:
             raise self.error("picture", str(error)) from error
 
-    def left_out(self) -> LeftOut | None:
+    def left_out(self) -> ViewExclusion | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
         found = self.value.get("left_out")
         if found is None:
@@ -227,7 +227,7 @@ class StateReader:
             reason, note = value.get("reason"), value.get("note")
             if not isinstance(reason, str) or not isinstance(note, str | None):
                 raise ValueError("needs a reason, and a note that is a text or null")
-            return make_left_out(reason, note)
+            return make_view_exclusion(reason, note)
         except (ValueError, InputError) as error:
             raise self.error("left_out", str(error)) from error
 
@@ -300,7 +300,7 @@ def extras_from_json(value: Any) -> Extras:
     if not isinstance(value, dict):
         return Extras()
     boxes, lines = (
-        tuple(item for item in _objects_of_list(value.get(name)) if isinstance(item, dict))
+        tuple(item for item in _list_or_empty(value.get(name)) if isinstance(item, dict))
         for name in ("boxes", "lines")
     )
     return Extras(boxes, lines, _read_metadata(value.get("metadata")))
@@ -318,7 +318,7 @@ def _read_metadata(value: Any) -> dict[str, Any]:
     return fit
 
 
-def _objects_of_list(value: Any) -> list[Any]:
+def _list_or_empty(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
@@ -331,7 +331,7 @@ class PlacedView:
     view: View
 
 
-class ViewGroups:
+class GroupAssembler:
     """Puts together views whose group has one key.
 
     A group is ready when it has as many views as it says; views of static cameras may lie in
@@ -357,7 +357,7 @@ class ViewGroups:
             self._done.add(key)
             yield self._make_group(self._waiting.pop(key))
 
-    def incomplete_groups(self) -> Iterator[Group]:
+    def release_incomplete_groups(self) -> Iterator[Group]:
         """Groups that have fewer views than they say, as they are, which is said."""
         lacking = [
             f"{key} ({len(items)} of {items[0].head.views})"
@@ -367,7 +367,7 @@ class ViewGroups:
         if lacking:
             count = plural(len(lacking), "group has", "groups have")
             shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
-            self._report.remark(f"{count} fewer views than when it was written: {shown}")
+            self._report.add_remark(f"{count} fewer views than when it was written: {shown}")
         for key in list(self._waiting):
             yield self._make_group(self._waiting.pop(key))
 

@@ -17,10 +17,10 @@ from defusedxml.ElementTree import iterparse
 
 from app.errors import DatasetFormatError
 from app.formats import fields
-from app.formats.ball_names import is_ball
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
+from app.formats.ball_names import is_ball_name
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits
 from app.formats.report import ReaderReport
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.wording import plural
 
@@ -44,7 +44,7 @@ _MAX_SIDE = 65_535
 _MAX_KINDS = 100
 """Kinds of entries left out that are named each for itself."""
 _HEAD = 64 * 1024
-_is_ball = lru_cache(maxsize=100)(is_ball)
+_is_ball = lru_cache(maxsize=100)(is_ball_name)
 _BROKEN = (EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, OSError)
 
 
@@ -67,12 +67,12 @@ class ViperTrack:
     size: ImageSize | None = None
 
     @property
-    def ball_points(self) -> int:
+    def ball_point_count(self) -> int:
         """Number of annotated balls."""
         return sum(map(len, self.balls.values()))
 
     @property
-    def person_boxes(self) -> int:
+    def person_box_count(self) -> int:
         """Number of boxes of people."""
         return sum(map(len, self.persons.values()))
 
@@ -89,7 +89,7 @@ def is_viper(tree: FileTree, name: str) -> bool:
 
 
 def read_viper(
-    tree: FileTree, name: str, report: ReaderReport, limits: Limits = DEFAULT_LIMITS
+    tree: FileTree, name: str, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
 ) -> list[ViperTrack]:
     """The annotations of one XGTF file, plain or ``.gz``: one track for each source, at least one.
 
@@ -111,11 +111,11 @@ def read_viper(
         report.note(shown, None, None, "holds a DTD or an entity, which is refused")
     except ParseError as error:
         place = f"line {error.position[0]}"
-        report.note(shown, None, place, f"is not sound XML from here on; {reader.describe_kept}")
+        report.note(shown, None, place, f"is not sound XML from here on; {reader.kept_summary}")
     except (LookupError, ValueError) as error:
         report.note(shown, None, None, f"is in an encoding that cannot be read ({error})")
     except _BROKEN:
-        report.note(shown, None, None, f"is damaged or cut off; {reader.describe_kept}")
+        report.note(shown, None, None, f"is damaged or cut off; {reader.kept_summary}")
     return reader.finish_tracks()
 
 
@@ -153,10 +153,10 @@ class _ViperFileReader:
         self._left_out: Counter[tuple[str, str]] = Counter()
 
     @property
-    def describe_kept(self) -> str:
+    def kept_summary(self) -> str:
         """What is kept of a file that goes no further, in words."""
-        balls = sum(track.ball_points for track in self.tracks)
-        persons = sum(track.person_boxes for track in self.tracks)
+        balls = sum(track.ball_point_count for track in self.tracks)
+        persons = sum(track.person_box_count for track in self.tracks)
         return f"{balls} ball points and {persons} persons before it are kept"
 
     def read_elements(self, stream: _LimitedStream) -> None:
@@ -206,13 +206,13 @@ class _ViperFileReader:
         span = item.get("framespan", owner.get("framespan"))
         try:
             if ball and shape in ("point", "bbox", "circle"):
-                self._add_ball(_parse_ball(item, shape), self._parse_counted_frames(span))
+                self._add_ball(_parse_ball(item, shape), self._parse_and_count_frames(span))
             elif ball and "value" in item.attrib:
-                for frame in self._parse_counted_frames(span):
+                for frame in self._parse_and_count_frames(span):
                     notes = self.tracks[-1].ball_notes.setdefault(frame, {})
                     notes[name[:80]] = item.get("value", "")[:200]
-            elif _lowercase_letters(kind) in _PERSONS and shape == "bbox":
-                box, frames = _parse_box(item), self._parse_counted_frames(span)
+            elif _keep_lowercase_letters(kind) in _PERSONS and shape == "bbox":
+                box, frames = _parse_box(item), self._parse_and_count_frames(span)
                 for frame in frames:
                     self.tracks[-1].persons.setdefault(frame, []).append((identity, *box))
             else:
@@ -227,7 +227,7 @@ class _ViperFileReader:
             key = ("of other names", "")
         self._left_out[key] += 1
 
-    def _parse_counted_frames(self, span: str | None) -> list[int]:
+    def _parse_and_count_frames(self, span: str | None) -> list[int]:
         """Frames of a framespan, counted against the limit of a file."""
         frames = _parse_framespan(span)
         self._entries += len(frames)
@@ -255,7 +255,7 @@ class _ViperFileReader:
             side = 0
         if not 1 <= side <= _MAX_SIDE:
             self._report.note(
-                self._shown, name, "value", f"{quoted(text, 40)} is not a size; left out"
+                self._shown, name, "value", f"{quote_text(text, 40)} is not a size; left out"
             )
             return
         size = self.tracks[-1].size or ImageSize(0, 0)
@@ -269,7 +269,7 @@ def _local_name(element: Element) -> str:
 
 
 @lru_cache(maxsize=100)
-def _lowercase_letters(name: str) -> str:
+def _keep_lowercase_letters(name: str) -> str:
     return re.sub(r"[^a-z]", "", name.lower())
 
 
@@ -329,7 +329,7 @@ def _parse_framespan(span: Any) -> list[int]:
     for part in re.split(r"[\s,]+", span.strip()):
         found = _SPAN.fullmatch(part)
         if found is None:
-            raise ValueError(f"the framespan {quoted(part, 40)} is not first:last")
+            raise ValueError(f"the framespan {quote_text(part, 40)} is not first:last")
         first, last = int(found[1]), int(found[2])
         if last < first:
             raise ValueError(f"the framespan {part} ends before it begins")

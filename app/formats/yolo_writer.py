@@ -13,10 +13,10 @@ from typing import IO, Any
 
 from app.formats.csv_text import CsvTable
 from app.formats.export_record import ExportRecord, choose_ball_box
-from app.formats.frame_names import expected_frame_suffix, frame_path_in_split, split_folder
-from app.formats.view_files import PutText, write_to_disk
+from app.formats.frame_names import folder_name_of_split, frame_path_in_split, guess_frame_suffix
+from app.formats.view_files import PutText, make_disk_writer
 from app.json_text import json_text
-from app.soccer.frames import Box, ImageSize, box_to_corner
+from app.soccer.frames import Box, ImageSize, box_to_corner_origin
 from app.soccer.group import View
 from app.wording import plural
 
@@ -28,7 +28,7 @@ ENOUGH_MATCHES = 5
 _PART = "train.part"
 
 
-class ImageLists:
+class ImageListWriter:
     """Writes the lists image by image.
 
     The lists name images, wherever they lie: what is held out stays in ``images/train``.
@@ -46,7 +46,7 @@ class ImageLists:
         self._groups = 0
         self._newest: tuple[str, str] | None = None
 
-    def __enter__(self) -> ImageLists:
+    def __enter__(self) -> ImageListWriter:
         with ExitStack() as stack:
             self._others = {
                 name: stack.enter_context(_create_text_file(self._root / f"{name}.txt"))
@@ -74,7 +74,7 @@ class ImageLists:
         self._waiting.write(json_text([match, self._groups, image]) + "\n")
 
     def _write_lists(self) -> None:
-        held_out = self._validation_rule()
+        held_out = self._make_validation_rule()
         part = self._root / _PART
         with (
             part.open(encoding="utf-8") as waiting,
@@ -87,7 +87,7 @@ class ImageLists:
         for name in set(LISTS) - self.used - {"train"}:
             (self._root / f"{name}.txt").unlink()
 
-    def _validation_rule(self) -> Callable[[str, int], bool]:
+    def _make_validation_rule(self) -> Callable[[str, int], bool]:
         """Which training images validate, by their match and the number of their group."""
         if "val" in self.used:
             self.sentence = "val.txt holds the validation split."
@@ -172,16 +172,16 @@ def write_yolo(
     """
     names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
     counts = dict.fromkeys(names, 0)
-    put = put or write_to_disk(root)
+    put = put or make_disk_writer(root)
     with ExitStack() as stack:
-        lists = stack.enter_context(ImageLists(root))
+        lists = stack.enter_context(ImageListWriter(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
         table = CsvTable(file, _COLUMNS)
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
                 image = _write_label_file(put, record, view, table, boxes, counts)
-                split, group = split_folder(record.split(view)), record.group
+                split, group = folder_name_of_split(record.split(view)), record.group
                 lists.add(split, group.match, group.key, image)
     _write_data_yaml(root, lists, counts)
     return counts
@@ -198,11 +198,11 @@ def _write_label_file(
     """Write the label file of a view; returns the name of its image."""
     group, present, split = record.group, view.key in record.frames, record.split(view)
     image = record.frames.get(view.key) or frame_path_in_split(
-        group, view, split, expected_frame_suffix(view)
+        group, view, split, guess_frame_suffix(view)
     )
     label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
     box = choose_ball_box(record, view, boxes) if view.ball else None
-    line = None if box is None else format_yolo_label(box_to_corner(box), view.size)
+    line = None if box is None else format_yolo_label(box_to_corner_origin(box), view.size)
     put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
@@ -237,7 +237,7 @@ def format_yolo_label(box: Box, size: ImageSize) -> str | None:
     return "0 " + " ".join(f"{number:.9g}" for number in numbers)
 
 
-def _write_data_yaml(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
+def _write_data_yaml(root: Path, lists: ImageListWriter, counts: dict[str, int]) -> None:
     missing = counts["images_missing"]
     sentence = (
         f"{plural(missing, 'image is', 'images are')} not in this export: put each where {TABLE} names it."

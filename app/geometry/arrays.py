@@ -47,7 +47,7 @@ def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -
     return array
 
 
-def row_by_row(covariance: FloatArray) -> tuple[float, ...]:
+def flatten_covariance(covariance: FloatArray) -> tuple[float, ...]:
     """A covariance, shape (N, N), as N * N plain numbers, row by row.
 
     Both halves are made equal where rounding parted them.

@@ -57,7 +57,7 @@ class Rays:
         """The rays of some points, shape (points,), in the same order."""
         return self._select_rays(kept, kept[self.point])
 
-    def of_cameras(self, *cameras: int) -> tuple[Rays, IntArray]:
+    def select_common_points(self, *cameras: int) -> tuple[Rays, IntArray]:
         """The rays of points that all of some cameras see, from these alone, and the points' rows."""
         seen = np.zeros((self.points, len(self.half_diagonals)), dtype=np.bool_)
         seen[self.point, self.camera] = True
@@ -115,7 +115,7 @@ def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> Lineari
     return LinearizedRays(residuals, slopes, -slopes[:, :, X : Z + 1])
 
 
-def nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
+def triangulate_nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
     """The points nearest to their rays in space, pitch frame, metres, shape (F, 3).
 
     The least squares of the distances to rays from C along d: the sum of (I - d d') X equals that
@@ -138,7 +138,7 @@ def nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
     return np.asarray(points, dtype=np.float64)
 
 
-def best_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
+def optimize_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
     """The points of least soft-L1 cost for these cameras, metres, shape (F, 3).
 
     Args:
@@ -146,16 +146,16 @@ def best_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
         rays: What was seen.
         scale: Of the loss, in sigmas; infinite for plain least squares.
     """
-    points = nearest_points(parameters, rays)
+    points = triangulate_nearest_points(parameters, rays)
     for _ in range(_POINT_STEPS):
         at = linearize(parameters, points, rays)
-        weights = soft_weights(at.residuals, scale)
+        weights = soft_l1_weights(at.residuals, scale)
         information, gradient = _point_equations(at, weights, rays)
         points = points - np.asarray(np.linalg.solve(information, gradient[..., None]))[..., 0]
     return points
 
 
-def soft_weights(residuals: FloatArray, scale: float) -> FloatArray:
+def soft_l1_weights(residuals: FloatArray, scale: float) -> FloatArray:
     """Weight of each ray under the soft-L1 loss, ``1 / sqrt(1 + (d / scale)^2)``, shape (N,)."""
     weights: FloatArray = 1 / np.sqrt(1 + (residuals**2).sum(axis=1) / scale**2)
     return weights
@@ -174,9 +174,9 @@ def bundle_equations(
     Returns:
         The cost, and shapes (8 K,) and (8 K, 8 K).
     """
-    points = best_points(parameters, rays, scale)
+    points = optimize_points(parameters, rays, scale)
     at = linearize(parameters, points, rays)
-    weights = soft_weights(at.residuals, scale)
+    weights = soft_l1_weights(at.residuals, scale)
     cameras = len(parameters)
     gradient = np.zeros((cameras, PARAMETERS))
     information = np.zeros((cameras, PARAMETERS, cameras, PARAMETERS))
@@ -211,19 +211,21 @@ def _point_equations(
     return information + _TINY * np.eye(3), gradient
 
 
-def ray_gaps(parameters: FloatArray, rays: Rays) -> tuple[FloatArray, FloatArray, FloatArray]:
+def ray_pair_distances_px(
+    parameters: FloatArray, rays: Rays
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """How far the two rays of each point pass each other in the pictures, in pixels.
 
     Args:
         parameters: Of the cameras, shape (K, 8).
-        rays: Two for each point, as ``of_cameras`` gives them.
+        rays: Two for each point, as ``select_common_points`` gives them.
 
     Returns:
         The gap, both reprojection errors of the best point added, shape (F,); the same with a
         sign, in standard deviations, shape (F,); and the direction of the four pixel coordinates
         along which no point can explain anything, in sigmas, shape (F, 4).
     """
-    points = best_points(parameters, rays, np.inf)
+    points = optimize_points(parameters, rays, np.inf)
     at = linearize(parameters, points, rays)
     order = np.argsort(rays.point, kind="stable").reshape(-1, 2)
     apart = np.hypot(*at.residuals.T) * rays.sigma

@@ -28,7 +28,7 @@ def rotation_from_pan_tilt_roll(pan: float, tilt: float, roll: float) -> FloatAr
         >>> rotation_from_pan_tilt_roll(0.0, np.pi / 2, 0.0)[2].round(12) + 0.0
         array([ 0., -1.,  0.])
     """
-    return (_about_z(pan) @ _about_x(tilt) @ _about_z(roll)).T
+    return (_rotation_about_z(pan) @ _rotation_about_x(tilt) @ _rotation_about_z(roll)).T
 
 
 def pan_tilt_roll_from_rotation(rotation: FloatArray) -> tuple[float, float, float]:
@@ -55,12 +55,12 @@ def pan_tilt_roll_from_rotation(rotation: FloatArray) -> tuple[float, float, flo
     return pan, tilt, roll
 
 
-def _about_z(angle: float) -> FloatArray:
+def _rotation_about_z(angle: float) -> FloatArray:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _about_x(angle: float) -> FloatArray:
+def _rotation_about_x(angle: float) -> FloatArray:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
 
@@ -99,7 +99,7 @@ MIN_DEPTH = 1e-3
 """Metres in front of the camera below which nothing is visible."""
 
 
-def _no_distortion() -> FloatArray:
+def _make_zero_distortion() -> FloatArray:
     return np.zeros(COEFFICIENTS)
 
 
@@ -123,7 +123,7 @@ class Camera:
     focal_length: tuple[float, float]
     principal_point: tuple[float, float]
     skew: float = 0.0
-    distortion: FloatArray = field(default_factory=_no_distortion)
+    distortion: FloatArray = field(default_factory=_make_zero_distortion)
     lens: str = BROWN_CONRADY
 
     def __post_init__(self) -> None:
@@ -174,7 +174,7 @@ class Camera:
         return self.lens != BROWN_CONRADY
 
     @cached_property
-    def distorts(self) -> bool:
+    def has_distortion(self) -> bool:
         """Whether the lens distorts at all."""
         return self.is_wide or bool(self.distortion.any())
 
@@ -187,7 +187,7 @@ class Camera:
         return matrix
 
     @cached_property
-    def _coefficients(self) -> list[float]:
+    def _distortion_coefficients(self) -> list[float]:
         """Of the distortion, as plain numbers: the way of one point costs less so."""
         return [*map(float, self.distortion)]
 
@@ -232,11 +232,11 @@ class Camera:
         visible = depth > MIN_DEPTH
         safe = np.where(visible, depth, 1.0)
         ideal = in_camera[:, :2] / safe[:, None]
-        if self.distorts:
+        if self.has_distortion:
             if not folded:
                 visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold_radius
             ideal = self.model.distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
-        pixels = self._unit_to_pixel(ideal)
+        pixels = self._normalised_to_pixel(ideal)
         pixels[~visible] = np.nan
         return pixels
 
@@ -246,10 +246,10 @@ class Camera:
         if not depth > MIN_DEPTH:
             return np.nan, np.nan
         x, y = x / depth, y / depth
-        if self.distorts:
+        if self.has_distortion:
             if not (folded or np.hypot(x, y) <= self._fold_radius):
                 return np.nan, np.nan
-            x, y = self.model.distort_point(x, y, self._coefficients)
+            x, y = self.model.distort_point(x, y, self._distortion_coefficients)
         (ax, ay), (x0, y0) = self.focal_length, self.principal_point
         return ax * x + self.skew * y + x0, ay * y + y0
 
@@ -261,7 +261,7 @@ class Camera:
         """
         x, y, z = self.rotation @ (require_shape(point, (3,), "point") - self.position)
         ideal = np.array([[1.0, 0.0, -x / z], [0.0, 1.0, -y / z]]) / z @ self.rotation
-        if self.distorts:
+        if self.has_distortion:
             place = np.array([[x / z, y / z]])
             ideal = self.model.jacobian(place, self.distortion)[0] @ ideal
         slope: FloatArray = self.K[:2, :2] @ ideal
@@ -270,9 +270,9 @@ class Camera:
     def undistort(self, pixels: FloatArray) -> FloatArray:
         """Pixels of the ideal pinhole for pixels of the image, both shape (N, 2)."""
         pixels = require_shape(pixels, (None, 2), "pixels")
-        if not self.distorts:
+        if not self.has_distortion:
             return pixels.copy()
-        return self._unit_to_pixel(self.pixel_to_ideal(pixels))
+        return self._normalised_to_pixel(self.pixel_to_ideal(pixels))
 
     def undistort_jacobian(self, pixel: FloatArray) -> FloatArray:
         """Derivative of ``undistort`` by the pixel: what noise there becomes here, shape (2, 2).
@@ -280,7 +280,7 @@ class Camera:
         Args:
             pixel: As the image shows it, shape (2,); NaN comes back where it has no ray.
         """
-        if not self.distorts:
+        if not self.has_distortion:
             return np.eye(2)
         ideal = self.pixel_to_ideal(require_shape(pixel, (2,), "pixel")[None])
         if np.isnan(ideal).any():
@@ -302,7 +302,7 @@ class Camera:
         ideal = self.pixel_to_ideal(pixels)
         return np.column_stack([ideal, np.ones(len(ideal))]) @ self.rotation
 
-    def on_ground(self, pixels: FloatArray) -> FloatArray:
+    def project_to_ground(self, pixels: FloatArray) -> FloatArray:
         """Where on the grass (z = 0) pixels look, pitch frame, metres, shape (N, 2).
 
         Args:
@@ -332,7 +332,7 @@ class Camera:
             skew=self.skew * factor_x,
         )
 
-    def _unit_to_pixel(self, ideal: FloatArray) -> FloatArray:
+    def _normalised_to_pixel(self, ideal: FloatArray) -> FloatArray:
         x = self.focal_length[0] * ideal[:, 0] + self.skew * ideal[:, 1] + self.principal_point[0]
         y = self.focal_length[1] * ideal[:, 1] + self.principal_point[1]
         return np.column_stack([x, y])
@@ -342,7 +342,7 @@ _CORRELATION_ROUNDING = 1e-6
 """How far correlations of a covariance may be from what they have to be."""
 
 
-def camera_covariance(values: Iterable[float]) -> tuple[float, ...]:
+def validate_camera_covariance(values: Iterable[float]) -> tuple[float, ...]:
     """The covariance of a camera's parameters (``geometry.resection``), row by row, shape (64,).
 
     Raises:

@@ -35,7 +35,7 @@ def accumulate_equations(
     """
     offsets = np.empty((len(pixels), 2))
     jacobians = np.empty((len(pixels), 2, 8))
-    arcs, ideal = arc_points(kinds, shapes), np.empty((2, len(pixels)))
+    arcs, ideal = sample_arc_points(kinds, shapes), np.empty((2, len(pixels)))
     samples, place = np.empty((5, ARC_SAMPLES + 1)), np.empty(6)
     for b in range(len(parameters)):
         camera = unpack_camera(parameters[b], half_diagonal)
@@ -80,7 +80,7 @@ def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offse
     an end). Shapes (N, 2) and (N, 2, 8).
     """
     residual_rows_of_camera(
-        unpack_camera(parameters, half_diagonal), kinds, shapes, arc_points(kinds, shapes), pixels, curve,
+        unpack_camera(parameters, half_diagonal), kinds, shapes, sample_arc_points(kinds, shapes), pixels, curve,
         np.empty((2, len(pixels))), np.empty((5, ARC_SAMPLES + 1)), np.empty(6),
         offsets, jacobians,
     )  # fmt: skip
@@ -92,7 +92,7 @@ def residual_rows_of_camera(
 ):
     """``residual_rows`` of a camera: pixels (N, 2) with their curve (N,).
 
-    ``arcs`` are ``arc_points``. Room: ideal (2, N), samples (5, ARC_SAMPLES + 1), place (6,).
+    ``arcs`` are ``sample_arc_points``. Room: ideal (2, N), samples (5, ARC_SAMPLES + 1), place (6,).
     Written: offsets (N, 2), pixels, and jacobians (N, 2, 8).
     """
     ideal_pixels(camera, pixels, ideal)
@@ -108,13 +108,13 @@ def residual_rows_of_camera(
             if kinds[m] == SEGMENT:
                 visible, ends = project_segment(camera, shapes, m)
             else:
-                visible = sample_arc(camera, arcs, m, samples)
+                visible = project_arc(camera, arcs, m, samples)
         inside = False
         if visible:
             if kinds[m] == SEGMENT:
-                inside = nearest_on_segment(shapes, m, ends, ideal[0, n], ideal[1, n], place)
+                inside = find_nearest_on_segment(shapes, m, ends, ideal[0, n], ideal[1, n], place)
             else:
-                inside = nearest_on_arc(camera, shapes, m, samples, shares, x, y, place)
+                inside = find_nearest_on_arc(camera, shapes, m, samples, shares, x, y, place)
         if visible and curve_depth(camera, place) > 0.5 * NEAR:
             write_residual_row(camera, place, inside, x, y, offsets, jacobians, n)
         else:
@@ -125,7 +125,7 @@ def residual_rows_of_camera(
 
 
 @compiled
-def arc_points(kinds, shapes):
+def sample_arc_points(kinds, shapes):
     """Points along each arc, metres, shape (M, ARC_SAMPLES + 1, 2); no camera moves them."""
     points = np.zeros((len(kinds), ARC_SAMPLES + 1, 2))
     for m in range(len(kinds)):
@@ -263,7 +263,7 @@ def project_segment(camera, shapes, m):
 
 
 @compiled
-def nearest_on_segment(shapes, m, ends, qx, qy, place):
+def find_nearest_on_segment(shapes, m, ends, qx, qy, place):
     """Writes the place of the segment nearest to an ideal pixel and the segment's direction.
 
     Straight lines stay straight before distortion, so the nearest place is sought there; the
@@ -293,7 +293,7 @@ def nearest_on_segment(shapes, m, ends, qx, qy, place):
 
 
 @compiled
-def sample_arc(camera, arcs, m, samples):
+def project_arc(camera, arcs, m, samples):
     """Writes the image of points along the arc (NaN behind), and of each chord between them its
     direction and squared length, shape (5, ARC_SAMPLES + 1); False where none is in front."""
     focal, kappa = camera[12], camera[13]
@@ -314,7 +314,7 @@ def sample_arc(camera, arcs, m, samples):
 
 
 @compiled
-def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
+def find_nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
     """Writes the place of the arc nearest to the pixel and its tangent, starting at a chord."""
     x0, y0, radius, start, stop = (
         shapes[m, 0],

@@ -43,7 +43,7 @@ class RadiusProfile:
 
     Attributes:
         terms: Of the polynomial, the constant one first.
-        inner: Angle within which the radius is ``slope`` times the angle instead. A polynomial that
+        inner: Angle within which the radius is ``compute_slope`` times the angle instead. A polynomial that
             was fitted to a lens leaves a constant behind, which would tear the picture
             open at the axis.
         slope: Of the radius there.
@@ -103,7 +103,7 @@ def kannala_brandt(coefficients: Sequence[float]) -> RadiusProfile:
         DegenerateGeometryError: The picture folds next to the axis.
     """
     k1, k2, k3, k4 = coefficients
-    return _profile_of_terms((0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4))
+    return _make_profile((0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4))
 
 
 def arctan_polynomial(coefficients: Sequence[float]) -> RadiusProfile:
@@ -112,12 +112,12 @@ def arctan_polynomial(coefficients: Sequence[float]) -> RadiusProfile:
     Raises:
         DegenerateGeometryError: The radius does not grow from (nearly) zero at the axis.
     """
-    return _profile_of_terms(tuple(coefficients))
+    return _make_profile(tuple(coefficients))
 
 
 # A group is solved again on every edit, with the same few lenses.
 @lru_cache(maxsize=1024)
-def _profile_of_terms(terms: tuple[float, ...]) -> RadiusProfile:
+def _make_profile(terms: tuple[float, ...]) -> RadiusProfile:
     constant, linear = terms[0], terms[1]
     if not (linear > 0 and abs(constant) <= MAX_CONSTANT * linear):
         raise DegenerateGeometryError(
@@ -125,7 +125,7 @@ def _profile_of_terms(terms: tuple[float, ...]) -> RadiusProfile:
             hint="Give the constant term first, and the radius in units of the focal length.",
         )
     inner = _INNER * abs(constant) / linear
-    widest = _widest_angle(terms, inner)
+    widest = _find_widest_angle(terms, inner)
     if widest < NARROWEST:
         raise DegenerateGeometryError(
             "the picture of the lens folds next to the axis",
@@ -136,7 +136,7 @@ def _profile_of_terms(terms: tuple[float, ...]) -> RadiusProfile:
     return RadiusProfile(terms, inner, slope, widest, edge)
 
 
-def _widest_angle(terms: tuple[float, ...], inner: float) -> float:
+def _find_widest_angle(terms: tuple[float, ...], inner: float) -> float:
     """Where the radius stops growing, found in small steps and halved; at most ``WIDEST``."""
     growth = _polynomial_derivative(terms)
     angles = np.append(np.arange(inner, WIDEST, _GRID), WIDEST)

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
-from app.geometry.resection_kernels import solve_damped
+from app.geometry.resection_kernels import solve_damped_step
 
 NormalEquations = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """Maps parameters (B, n) to cost (B,), gradient (B, n) and J^T W J (B, n, n)."""
@@ -28,7 +28,7 @@ _FIRST_DAMPING, _DAMPING_RANGE = 1e-3, (1e-9, 1e9)
 
 
 @dataclass(frozen=True)
-class Fit:
+class LeastSquaresResult:
     """Where each start ended.
 
     Attributes:
@@ -48,7 +48,9 @@ class Fit:
     reasons: tuple[str, ...]
 
 
-def levenberg_marquardt(normal_equations: NormalEquations, start: FloatArray, steps: int) -> Fit:
+def levenberg_marquardt(
+    normal_equations: NormalEquations, start: FloatArray, steps: int
+) -> LeastSquaresResult:
     """Minimise a sum of squares from each row of ``start``.
 
     Each round damps the normal equations, proposes a step for every start that still moves,
@@ -85,10 +87,10 @@ def levenberg_marquardt(normal_equations: NormalEquations, start: FloatArray, st
         moving = np.flatnonzero(reasons == OUT_OF_STEPS)
         if len(moving) == 0:
             break
-    return Fit(parameters, cost, information, accepted, rejected, tuple(reasons))
+    return LeastSquaresResult(parameters, cost, information, accepted, rejected, tuple(reasons))
 
 
-def require_determined(information: FloatArray) -> None:
+def require_determined_parameters(information: FloatArray) -> None:
     """Refuse a minimum at which the residuals do not determine every parameter.
 
     Args:
@@ -116,7 +118,7 @@ def covariance(information: FloatArray) -> FloatArray:
     Raises:
         DegenerateGeometryError: Some combination of parameters is not determined.
     """
-    require_determined(information)
+    require_determined_parameters(information)
     scale = np.sqrt(np.diag(information))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     inverse = vectors / values @ vectors.T
@@ -126,5 +128,5 @@ def covariance(information: FloatArray) -> FloatArray:
 def _damped_step(gradient: FloatArray, information: FloatArray, damping: FloatArray) -> FloatArray:
     """Solve (J^T W J + damping diag) step = -gradient for each start."""
     step = np.empty_like(gradient)
-    solve_damped(gradient, information, damping, step)
+    solve_damped_step(gradient, information, damping, step)
     return step

@@ -37,15 +37,15 @@ def distort(points: FloatArray, coefficients: FloatArray) -> FloatArray:
     if len(points) == 1 and coefficients.ndim == 1:
         x, y = points[0].tolist()
         return np.array([distort_point(x, y, coefficients.tolist())])
-    return np.column_stack(distorted(points[:, 0], points[:, 1], coefficients))
+    return np.column_stack(distort_coordinates(points[:, 0], points[:, 1], coefficients))
 
 
 def distort_point(x: float, y: float, coefficients: Sequence[float]) -> tuple[float, float]:
     """``distort`` of one point, the same bits without the cost of arrays."""
     try:
-        return distorted(x, y, coefficients)
+        return distort_coordinates(x, y, coefficients)
     except ZeroDivisionError:
-        u, v = distorted(np.float64(x), np.float64(y), coefficients)
+        u, v = distort_coordinates(np.float64(x), np.float64(y), coefficients)
         return float(u), float(v)
 
 
@@ -75,7 +75,7 @@ def undistort(points: FloatArray, coefficients: FloatArray) -> FloatArray:
     if not np.any(coefficients):
         return points.copy()
     ideal = np.empty_like(points)
-    undistort_all(points, coefficients, fold_radius(coefficients), ideal)
+    undistort_points(points, coefficients, fold_radius(coefficients), ideal)
     return ideal
 
 
@@ -136,7 +136,7 @@ on no step is of use."""
 compiled = njit(cache=True, error_model="numpy", nogil=True)
 
 
-def distorted(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any]:
+def distort_coordinates(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any]:
     """``distort`` of numbers or of arrays; kernels compile it, too."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = coefficients
     r2 = x * x + y * y
@@ -151,7 +151,7 @@ def distorted(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any]:
 def distortion_derivatives(
     x: Any, y: Any, coefficients: Iterable[float]
 ) -> tuple[Any, Any, Any, Any]:
-    """``distort_jacobian``, of u by x and y, then of v; of numbers or of arrays, as ``distorted``."""
+    """``distort_jacobian``, of u by x and y, then of v; of numbers or of arrays, as ``distort_coordinates``."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = coefficients
     r2 = x * x + y * y
     r4 = r2 * r2
@@ -170,7 +170,7 @@ def distortion_derivatives(
     )
 
 
-distorted_fast = compiled(distorted)
+distorted_fast = compiled(distort_coordinates)
 slopes_fast = compiled(distortion_derivatives)
 
 
@@ -178,7 +178,7 @@ slopes_fast = compiled(distortion_derivatives)
 
 
 @compiled
-def lens_coefficients(numbers):
+def read_lens_coefficients(numbers):
     """The twelve coefficients at the beginning of an array, as the functions above take them."""
     k1, k2, p1, p2, k3, k4 = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]
     k5, k6, s1, s2, s3, s4 = (
@@ -193,9 +193,9 @@ def lens_coefficients(numbers):
 
 
 @compiled
-def undistort_all(points, coefficients, fold, ideal):
+def undistort_points(points, coefficients, fold, ideal):
     """Writes what is distorted to each point, by Newton's method; NaN where nothing within the fold is."""
-    lens = lens_coefficients(coefficients)
+    lens = read_lens_coefficients(coefficients)
     for row in range(len(points)):
         x, y = points[row, 0], points[row, 1]
         for _ in range(_STEPS):
@@ -244,7 +244,7 @@ class LensModel:
     profile: fisheye.ProfileOf | None = None
 
 
-def _fisheye_model(count: int, profile: fisheye.ProfileOf) -> LensModel:
+def _make_fisheye_model(count: int, profile: fisheye.ProfileOf) -> LensModel:
     """A lens of ``geometry.fisheye``."""
     return LensModel(
         count=count,
@@ -301,6 +301,6 @@ LENSES: dict[str, LensModel] = {
         fold_radius=fold_radius,
         check=_accept_any_coefficients,
     ),
-    FISHEYE: _fisheye_model(fisheye.KANNALA_BRANDT, fisheye.kannala_brandt),
-    ARCTAN_POLYNOMIAL: _fisheye_model(fisheye.ARCTAN_POLYNOMIAL, fisheye.arctan_polynomial),
+    FISHEYE: _make_fisheye_model(fisheye.KANNALA_BRANDT, fisheye.kannala_brandt),
+    ARCTAN_POLYNOMIAL: _make_fisheye_model(fisheye.ARCTAN_POLYNOMIAL, fisheye.arctan_polynomial),
 }

@@ -18,7 +18,7 @@ from app.geometry.lens import (
     BROWN_CONRADY,
     compiled,
     distorted_fast,
-    lens_coefficients,
+    read_lens_coefficients,
     slopes_fast,
 )
 
@@ -93,7 +93,7 @@ class LikelyPoints:
     distances: FloatArray
 
 
-def likely_points(
+def find_most_likely_points(
     cameras: CameraTable,
     pixels: FloatArray,
     chosen: IntArray,
@@ -127,7 +127,7 @@ def likely_points(
 
 
 def _lens_kind(camera: Camera) -> int:
-    return _WIDE if camera.is_wide else _BENT if camera.distorts else _STRAIGHT
+    return _WIDE if camera.is_wide else _BENT if camera.has_distortion else _STRAIGHT
 
 
 def _lens_numbers(camera: Camera) -> list[float]:
@@ -246,7 +246,7 @@ def _project(R, C, K, kind, fold, lens, view, point, pixel, slope):
         if not math.hypot(x, y) <= fold[view]:
             return False
         if kind[view] == _BENT:
-            numbers = lens_coefficients(lens[view])
+            numbers = read_lens_coefficients(lens[view])
             u, v = distorted_fast(x, y, numbers)
             ux, uy, vx, vy = slopes_fast(x, y, numbers)
         else:

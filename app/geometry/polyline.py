@@ -9,7 +9,7 @@ from numba import njit
 from app.geometry.arrays import FloatArray, require_shape
 
 
-def inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
+def is_inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
     """Whether 0 <= x < width and 0 <= y < height, shape (N,); NaN is not inside."""
     x, y = points.T
     inside: npt.NDArray[np.bool_] = (x >= 0) & (x < width) & (y >= 0) & (y < height)
@@ -60,7 +60,9 @@ def distance_to_polyline(points: FloatArray, polyline: FloatArray) -> tuple[Floa
         nearest = np.repeat(polyline, len(points), axis=0)
         return np.hypot(*(points - nearest).T), nearest
     apart, nearest = np.empty(len(points)), np.empty((len(points), 2))
-    nearest_places(np.ascontiguousarray(points), np.ascontiguousarray(polyline), apart, nearest)
+    find_nearest_places(
+        np.ascontiguousarray(points), np.ascontiguousarray(polyline), apart, nearest
+    )
     return apart, nearest
 
 
@@ -69,7 +71,7 @@ compiled = njit(cache=True, error_model="numpy", nogil=True)
 
 
 @compiled
-def nearest_places(points, polyline, apart, nearest):
+def find_nearest_places(points, polyline, apart, nearest):
     """Distances, shape (N,), and nearest places, shape (N, 2), written to the last two; M >= 2."""
     for n in range(len(points)):
         x, y = points[n, 0], points[n, 1]
@@ -99,7 +101,7 @@ def clip_polyline_into(points, width, height, room):
         inside = is_inside(points[n, 0], points[n, 1], width, height)
         if before >= 0 and inside != was_inside:
             within, outside = (points[n], points[before]) if inside else (points[before], points[n])
-            count += cross_border(within, outside, width, height, room[count])
+            count += find_border_crossing(within, outside, width, height, room[count])
         if inside:
             room[count] = points[n]
             count += 1
@@ -114,7 +116,7 @@ def is_inside(x, y, width, height):
 
 
 @compiled
-def cross_border(within, outside, width, height, place):
+def find_border_crossing(within, outside, width, height, place):
     """1 and the crossing of the border next to ``within`` in ``place``; 0 where there is none."""
     least, found = np.inf, 0
     step_x, step_y = outside[0] - within[0], outside[1] - within[1]

@@ -28,7 +28,7 @@ from app.geometry.curve_residuals import (
     derivative_rows_of_points,
     residual_rows,
 )
-from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, Fit
+from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, LeastSquaresResult
 from app.geometry.resection_kernels import minimize_curve_costs
 
 PARAMETERS = 8
@@ -71,7 +71,7 @@ class CurvePoints:
 
 
 @dataclass(frozen=True)
-class Prior:
+class GaussianPrior:
     """Gaussian prior: ``(parameters - mean) / sigma``; an infinite sigma is no prior.
 
     Attributes:
@@ -119,7 +119,7 @@ def normal_equations(
     parameters: FloatArray,
     curves: Curves,
     curve_points: CurvePoints,
-    prior: Prior,
+    prior: GaussianPrior,
     scale_px: float,
     half_diagonal: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -156,18 +156,18 @@ def normal_equations(
     return cost, gradient, information
 
 
-def fit_curves(
+def fit_camera_to_curves(
     start: FloatArray,
     curves: Curves,
     curve_points: CurvePoints,
-    prior: Prior,
+    prior: GaussianPrior,
     scale_px: float,
     half_diagonal: float,
     steps: int,
     *,
     tolerance: float,
     damping: float,
-) -> Fit:
+) -> LeastSquaresResult:
     """``levenberg_marquardt`` on ``normal_equations`` with its rounds compiled, bit for bit.
 
     Args:
@@ -201,7 +201,7 @@ def fit_curves(
         reasons,
     )
     names = tuple(NAMES[reason] for reason in reasons.tolist())
-    return Fit(parameters, cost, information, accepted, rejected, names)
+    return LeastSquaresResult(parameters, cost, information, accepted, rejected, names)
 
 
 def curve_distances(

@@ -14,7 +14,7 @@ from app.geometry.curve_residuals import SEGMENT, accumulate_equations, compiled
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def solve_damped(gradient, information, damping, step):
+def solve_damped_step(gradient, information, damping, step):
     """Writes the step of each start, by Cholesky decomposition.
 
     Args:
@@ -82,7 +82,7 @@ def minimize_curve_costs(
         for i in range(left):
             b = moving[i]
             slope[i], bend[i], damped[i] = gradient[b], information[b], damping_of[b]
-        solve_damped(slope[:left], bend[:left], damped[:left], step[:left])
+        solve_damped_step(slope[:left], bend[:left], damped[:left], step[:left])
         for i in range(left):
             trial[i] = parameters[moving[i]] + step[i]
         accumulate_equations(
@@ -122,7 +122,7 @@ LEAST_WIDTH = 1e-3
 
 
 @compiled
-def aim_starts(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
+def aim_starting_cameras(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
     """Writes one start for each stand: level, aimed and zoomed so that the seen curves lie where they are.
 
     Each curve counts as its middle, the less the longer it is: of a long one perhaps a corner is seen.
@@ -138,7 +138,7 @@ def aim_starts(stands, kinds, shapes, pixels, curve, least_spread_px, focals, st
         starts: Result: parameters of ``resection``, shape (S, 8).
     """
     total, (column, row), (x, y, z) = 0.0, (0.0, 0.0), (0.0, 0.0, 0.0)
-    weight, seen, middles = _seen_curves(kinds, shapes, pixels, curve)
+    weight, seen, middles = _summarize_seen_curves(kinds, shapes, pixels, curve)
     for m in range(len(kinds)):
         total += weight[m]
     for m in range(len(kinds)):
@@ -159,7 +159,7 @@ def aim_starts(stands, kinds, shapes, pixels, curve, least_spread_px, focals, st
         length = np.sqrt(fx * fx + fy * fy + fz * fz)
         fx, fy, fz = fx / length, fy / length, fz / length
         pan, tilt = np.arctan2(fx, -fy), np.arccos(fz)
-        wide = _seen_width(stand, (fx, fy, fz), pan, tilt, middles, weight)
+        wide = _rms_width_from_position(stand, (fx, fy, fz), pan, tilt, middles, weight)
         focal = min(max(spread_px / max(wide, LEAST_WIDTH), focals[0]), focals[1])
         # Turn so that the aim appears where the annotation has it, not in the middle.
         starts[s, 0] = pan - np.arctan(column / focal)
@@ -171,7 +171,7 @@ def aim_starts(stands, kinds, shapes, pixels, curve, least_spread_px, focals, st
 
 
 @compiled
-def _seen_curves(kinds, shapes, pixels, curve):
+def _summarize_seen_curves(kinds, shapes, pixels, curve):
     """Of each curve its weight (zero where it is not seen), the mean of its points and its middle."""
     count = len(kinds)
     points, weight = np.zeros(count), np.zeros(count)
@@ -185,12 +185,12 @@ def _seen_curves(kinds, shapes, pixels, curve):
         if points[m] == 0:
             continue
         seen[m] /= points[m]
-        weight[m] = 1 / max(_curve_middle(kinds[m], shapes[m], middles[m]), SHORT_M)
+        weight[m] = 1 / max(_compute_curve_middle(kinds[m], shapes[m], middles[m]), SHORT_M)
     return weight, seen, middles
 
 
 @compiled
-def _curve_middle(kind, shape, middle):
+def _compute_curve_middle(kind, shape, middle):
     """Writes the middle of a curve; returns how long it is, an arc as long as it is wide."""
     if kind == SEGMENT:
         for k in range(3):
@@ -206,7 +206,7 @@ def _curve_middle(kind, shape, middle):
 
 
 @compiled
-def _seen_width(stand, forward, pan, tilt, middles, weight):
+def _rms_width_from_position(stand, forward, pan, tilt, middles, weight):
     """How wide a stand sees the middles that are in front of it: weighted root mean square of their
     normalised image coordinates."""
     rx, ry = np.cos(pan), np.sin(pan)
@@ -223,7 +223,7 @@ def _seen_width(stand, forward, pan, tilt, middles, weight):
 
 
 @compiled
-def keep_farthest_points(pixels, curve, limits, keep):
+def select_farthest_points(pixels, curve, limits, keep):
     """Writes which points are kept: of a curve the one farthest from the middle of its points, and
     after it each that is farthest from those before it.
 

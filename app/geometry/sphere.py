@@ -88,7 +88,7 @@ def optimal_diameter(
     # With skew, "vertical in the image" leans in normalised coordinates.
     upright = np.array([-camera.skew / camera.focal_length[0], 1.0])
     half = diameter_m / depth / 2 * upright / np.linalg.norm(upright)
-    ends = _unit_to_pixel(
+    ends = _normalised_to_pixel(
         camera, camera.model.distort(np.vstack([ideal + half, ideal - half]), camera.distortion)
     )
     return float(np.hypot(*(ends[0] - ends[1]))), off_ray
@@ -134,7 +134,7 @@ def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
     in_camera = camera.pitch_to_camera(require_shape(center, (3,), "center")[None])[0]
     if in_camera[2] <= radius:
         raise DegenerateGeometryError("the ball does not lie wholly in front of the camera")
-    if camera.distorts:
+    if camera.has_distortion:
         outline = camera.project(
             _outline_points(in_camera, radius) @ camera.rotation + camera.position
         )
@@ -163,5 +163,5 @@ def _outline_points(center: FloatArray, radius: float) -> FloatArray:
     return outline
 
 
-def _unit_to_pixel(camera: Camera, points: FloatArray) -> FloatArray:
+def _normalised_to_pixel(camera: Camera, points: FloatArray) -> FloatArray:
     return points @ camera.K[:2, :2].T + camera.K[:2, 2]

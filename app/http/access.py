@@ -28,7 +28,7 @@ from app.http.permissions import (
     OwnedMention,
     RequestSubject,
     find_missing_error,
-    is_hidden,
+    is_any_mention_hidden,
     needs_database,
     require_allowed,
 )
@@ -70,7 +70,7 @@ def get_current_visibility_without_hidden(scope: Mapping[str, Any]) -> Visibilit
     return EVERYTHING if login is None else login.whole_visibility
 
 
-class Access:
+class AccessControl:
     """Finds out who asks, by session or token, and whether they may. A token counts before a cookie.
 
     Args:
@@ -92,7 +92,7 @@ class Access:
         """
         if read_bearer_token(scope) is None and not self._team.cookies.session(scope):
             raise _not_logged_in_error()
-        login = self._login_at_once(scope)
+        login = self._find_login_without_waiting(scope)
         if login is None:
             login = await run_sync(self._find_login, scope, limiter=self._threads)
         scope[ASKS] = login.actor
@@ -127,19 +127,19 @@ class Access:
         """Whether anything is there that is not for whoever asks."""
         if all(item.ownership is not None for item in owned):
             return False
-        return await run_sync(is_hidden, self._store, owned, limiter=self._threads)
+        return await run_sync(is_any_mention_hidden, self._store, owned, limiter=self._threads)
 
     def admit(self, scope: Scope, login: Login) -> None:
         """Let a request be its sender's from here on."""
         scope[LOGIN] = login
         READER.set(login.reader)
-        self._note_use(login)
+        self._record_use_later(login)
 
-    def end_when_not_allowed(
+    def end_stream_when_not_allowed(
         self, response: Response, subject: RequestSubject, login: Login
     ) -> Response:
         """An answer without an end, which ends when its reader is logged out, or has other rights."""
-        return _WhileAllowed(response, self, subject, login.roles)
+        return _PermissionBoundStream(response, self, subject, login.roles)
 
     async def is_still_allowed(
         self, scope: Scope, subject: RequestSubject, roles: DatasetRoles
@@ -155,7 +155,7 @@ class Access:
             return True
         return login.roles == roles
 
-    def _login_at_once(self, scope: Scope) -> Login | None:
+    def _find_login_without_waiting(self, scope: Scope) -> Login | None:
         """Whose session it is, where that can be said without waiting; else a thread says it.
 
         On a busy machine the way to a thread and back takes longer than the answer.
@@ -169,16 +169,16 @@ class Access:
     def _find_login(self, scope: Scope) -> Login:
         bearer = read_bearer_token(scope)
         if bearer is not None:
-            return self._team.login_with(bearer, Request(scope))
+            return self._team.find_login_by_token(bearer, Request(scope))
         login = self._team.logins.find(self._team.cookies.session(scope) or "")
         if login is None:
             raise _not_logged_in_error()
         return login
 
-    def _note_use(self, login: Login) -> None:
+    def _record_use_later(self, login: Login) -> None:
         """Write down that a session or token is used, seldom and while nobody waits for it."""
         key = (login.token is not None, login.id)
-        if key in self._touching or not self._store_of_login(login).is_use_unlogged(login):
+        if key in self._touching or not self._get_login_store(login).should_log_use(login):
             return
         task = asyncio.ensure_future(self._save_use(login))
         self._touching[key] = task
@@ -186,20 +186,20 @@ class Access:
 
     async def _save_use(self, login: Login) -> None:
         try:
-            await run_sync(self._store_of_login(login).touch, login, limiter=self._threads)
+            await run_sync(self._get_login_store(login).touch, login, limiter=self._threads)
         except StorageError as error:
             log.warning("the use of a session or token could not be noted", error=str(error))
 
-    def _store_of_login(self, login: Login) -> LoginSessions | AccessTokens:
+    def _get_login_store(self, login: Login) -> LoginSessions | AccessTokens:
         return self._team.logins if login.token is None else self._team.tokens
 
 
-class _WhileAllowed(Response):
+class _PermissionBoundStream(Response):
     """A stream for as long as its reader may; whoever may read on comes back, and is told what they
     see from then on."""
 
     def __init__(
-        self, inner: Response, access: Access, subject: RequestSubject, roles: DatasetRoles
+        self, inner: Response, access: AccessControl, subject: RequestSubject, roles: DatasetRoles
     ):
         self._inner, self._access, self._asked, self._roles = inner, access, subject, roles
         self.status_code, self.background = inner.status_code, inner.background
@@ -207,7 +207,7 @@ class _WhileAllowed(Response):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         ended = asyncio.Event()
 
-        async def look() -> None:
+        async def watch_permission() -> None:
             # However the looking ends: nobody reads on whom nobody looks at.
             try:
                 while not ended.is_set():
@@ -217,7 +217,7 @@ class _WhileAllowed(Response):
             finally:
                 ended.set()
 
-        async def heard() -> Message:
+        async def receive_until_ended() -> Message:
             waiting = [asyncio.ensure_future(receive()), asyncio.ensure_future(ended.wait())]
             try:
                 await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
@@ -230,7 +230,7 @@ class _WhileAllowed(Response):
 
         begun = over = False
 
-        async def told(message: Message) -> None:
+        async def send_until_ended(message: Message) -> None:
             nonlocal begun, over
             if ended.is_set():
                 return
@@ -238,9 +238,9 @@ class _WhileAllowed(Response):
             over = message["type"] == "http.response.body" and not message.get("more_body", False)
             await send(message)
 
-        looking = asyncio.ensure_future(look())
+        looking = asyncio.ensure_future(watch_permission())
         try:
-            await self._inner(scope, heard, told)
+            await self._inner(scope, receive_until_ended, send_until_ended)
         finally:
             looking.cancel()
         if begun and not over:

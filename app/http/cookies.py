@@ -42,51 +42,58 @@ class Cookies:
     @property
     def session_name(self) -> str:
         """Name of the session cookie."""
-        return self._name(SESSION)
+        return self._make_cookie_name(SESSION)
 
     def session(self, scope: Scope) -> str | None:
         """The token of the session that a browser sent."""
         return read_cookie(scope, self.session_name)
 
-    def session_values(self, token: str | None) -> dict[str, Any]:
+    def make_session_cookie(self, token: str | None) -> dict[str, Any]:
         """How the session cookie of a token is set; None: how it is removed."""
-        return self._arguments(SESSION, token, SESSION_LASTS)
+        return self._make_cookie_arguments(SESSION, token, SESSION_LASTS)
 
-    def passkey_secret(self, scope: Scope) -> str:
+    def read_passkey_secret(self, scope: Scope) -> str:
         """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
-        return read_cookie(scope, self._name(PASSKEY)) or ""
+        return read_cookie(scope, self._make_cookie_name(PASSKEY)) or ""
 
-    def passkey_values(self, secret: str) -> dict[str, Any]:
+    def make_passkey_cookie(self, secret: str) -> dict[str, Any]:
         """How a browser is given it."""
-        return self._arguments(PASSKEY, secret, CHALLENGE_LASTS)
+        return self._make_cookie_arguments(PASSKEY, secret, CHALLENGE_LASTS)
 
-    def sign_on_secret(self, scope: Scope) -> str:
+    def read_sign_on_secret(self, scope: Scope) -> str:
         """What a browser alone knows that was sent to single sign-on; empty: it was not."""
-        return read_cookie(scope, self._name(SIGN_ON)) or ""
+        return read_cookie(scope, self._make_cookie_name(SIGN_ON)) or ""
 
-    def sign_on_values(self, secret: str | None) -> dict[str, Any]:
+    def make_sign_on_cookie(self, secret: str | None) -> dict[str, Any]:
         """How a browser is given that; None: how it is removed."""
-        return self._arguments(SIGN_ON, secret, SIGN_ON_LASTS)
+        return self._make_cookie_arguments(SIGN_ON, secret, SIGN_ON_LASTS)
 
-    def known_device(self, scope: Scope, person: str) -> str | None:
+    def find_known_device(self, scope: Scope, person: str) -> str | None:
         """The browser that sent a request, if the person has logged in there before."""
-        token = read_cookie(scope, self._device_name(person))
+        token = read_cookie(scope, self._make_device_cookie_name(person))
         return self.devices.recognise(person, token) if token else None
 
-    def known_device_values(self, person: str) -> dict[str, Any]:
+    def make_known_device_cookie(self, person: str) -> dict[str, Any]:
         """How a browser is made a known one of a person, who has just logged in there."""
-        values = self._arguments(DEVICE, self.devices.make(person), DEVICE_LASTS)
-        return {**values, "key": self._device_name(person)}
+        values = self._make_cookie_arguments(DEVICE, self.devices.make(person), DEVICE_LASTS)
+        return {**values, "key": self._make_device_cookie_name(person)}
 
-    def _device_name(self, person: str) -> str:
-        return f"{self._name(DEVICE)}_{self.devices.cookie_of(person)}"
+    def _make_device_cookie_name(self, person: str) -> str:
+        return f"{self._make_cookie_name(DEVICE)}_{self.devices.make_cookie_suffix(person)}"
 
-    def _name(self, name: str) -> str:
+    def _make_cookie_name(self, name: str) -> str:
         return f"__Host-{name}" if self.secure else name
 
-    def _arguments(self, name: str, value: str | None, lasts: timedelta) -> dict[str, Any]:
+    def _make_cookie_arguments(
+        self, name: str, value: str | None, lasts: timedelta
+    ) -> dict[str, Any]:
         age = int(lasts.total_seconds()) if value else 0
-        full = {"key": self._name(name), "value": value or "", "path": "/", "httponly": True}
+        full = {
+            "key": self._make_cookie_name(name),
+            "value": value or "",
+            "path": "/",
+            "httponly": True,
+        }
         return {**full, "samesite": "strict", "secure": self.secure, "max_age": age}
 
 

@@ -84,13 +84,13 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
     def decorate(route: Callable[P, Answer]) -> Callable[..., Answer]:
         whose = f"{route.__module__}.{route.__qualname__}"
 
-        def cut(
+        def slice_answer(
             whole: Any, limit: int | None, cursor: str | None, arguments: Mapping[str, Any]
         ) -> Any:
             if not isinstance(whole, ListDocument):
                 return whole
             items, following = slice_page(
-                whole.items, limit, cursor, _list_identity(whose, arguments)
+                whole.items, limit, cursor, _hash_list_identity(whose, arguments)
             )
             return whole.model_copy(update={"items": items, "next": following})
 
@@ -98,21 +98,21 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
             waiting: Callable[..., Awaitable[Any]] = route
 
             @wraps(route)
-            async def page(
+            async def respond_with_page(
                 *args: Any, limit: int | None = None, cursor: str | None = None, **requested: Any
             ) -> Any:
-                return cut(await waiting(*args, **requested), limit, cursor, requested)
+                return slice_answer(await waiting(*args, **requested), limit, cursor, requested)
         else:
             direct: Callable[..., Any] = route
 
             @wraps(route)
-            def page(
+            def respond_with_page(
                 *args: Any, limit: int | None = None, cursor: str | None = None, **requested: Any
             ) -> Any:
-                return cut(direct(*args, **requested), limit, cursor, requested)
+                return slice_answer(direct(*args, **requested), limit, cursor, requested)
 
-        page.__signature__ = _signature_with_page(route, default)  # type: ignore[attr-defined]
-        return page  # type: ignore[return-value]
+        respond_with_page.__signature__ = _add_page_parameters(route, default)  # type: ignore[attr-defined]
+        return respond_with_page  # type: ignore[return-value]
 
     return decorate
 
@@ -135,7 +135,7 @@ def slice_page(
     end = len(items) if limit is None else min(start + limit, len(items))
     if end == len(items) or end == start:
         return list(items[start:end]), None
-    return list(items[start:end]), f"{end - 1}.{_item_identity(items[end - 1])}.{whose}"
+    return list(items[start:end]), f"{end - 1}.{_hash_item_identity(items[end - 1])}.{whose}"
 
 
 def _start_of_page(items: Sequence[Any], cursor: str, whose: str) -> int:
@@ -143,28 +143,28 @@ def _start_of_page(items: Sequence[Any], cursor: str, whose: str) -> int:
     if found is None or found[3] != whose:
         raise foreign_cursor_error()
     place = int(found[1])
-    if place < len(items) and _item_identity(items[place]) == found[2]:
+    if place < len(items) and _hash_item_identity(items[place]) == found[2]:
         return place + 1
-    now = (index for index, item in enumerate(items) if _item_identity(item) == found[2])
+    now = (index for index, item in enumerate(items) if _hash_item_identity(item) == found[2])
     # Where the item is gone, the one behind it has moved into its place.
     return next((index + 1 for index in now), min(place, len(items)))
 
 
-def _item_identity(item: Any) -> str:
+def _hash_item_identity(item: Any) -> str:
     value = item.model_dump(mode="json") if isinstance(item, BaseModel) else item
     if isinstance(value, dict):
         value = {name: value[name] for name in _NAMES if name in value} or value
     return hashlib.sha256(json_text(value).encode()).hexdigest()[:12]
 
 
-def _list_identity(route: str, arguments: Mapping[str, Any]) -> str:
+def _hash_list_identity(route: str, arguments: Mapping[str, Any]) -> str:
     """Which list is asked for: the route, and what its address and query say."""
     texts = {name: value for name, value in arguments.items() if isinstance(value, str | int)}
     text = json_text([route, sorted(texts.items())])
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def _signature_with_page(route: Callable[..., Any], default: int | None) -> inspect.Signature:
+def _add_page_parameters(route: Callable[..., Any], default: int | None) -> inspect.Signature:
     signature = inspect.signature(route, eval_str=True)
     if default is None:
         kind: Any = int | None

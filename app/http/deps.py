@@ -22,19 +22,19 @@ from app.errors import BusyError, InputError
 from app.features.agreement.service import compare_uncompared_groups
 from app.features.exports.jobs import ExportFolder, resume_exports
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
-from app.features.maintenance.upkeep import Upkeep
+from app.features.maintenance.upkeep import UpkeepScheduler
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.people.visibility_queries import Visibility
-from app.features.policies.noise import NoiseStore
+from app.features.policies.noise import NoiseCache
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
-from app.features.recordings.camera_jobs import resume_cameras
+from app.features.recordings.camera_jobs import resume_camera_jobs
 from app.features.recordings.follow import BallFollower
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
@@ -51,9 +51,9 @@ from app.http.access import (
     get_current_visibility_without_hidden,
 )
 from app.http.errors import PreconditionRequiredError
-from app.http.events import Events
+from app.http.events import EventPublisher
 from app.json_text import MAX_ID
-from app.media.frames import Frames
+from app.media.frames import FrameProvider
 from app.soccer.actors import LOCAL_USER, parse_script_name
 from app.solving.solve import warm_up_solver
 
@@ -109,7 +109,7 @@ class Services:
 
     settings: Settings
     store: Store
-    frames: Frames
+    frames: FrameProvider
     recordings: RecordingFrames
     balls: BallFollower
     large: LargeGroupSolver
@@ -117,25 +117,25 @@ class Services:
     predictions: PredictionReader
     exports: ExportFolder
     jobs: Jobs
-    events: Events
+    events: EventPublisher
     yields: YieldStore
     statistics: StatisticsCache
-    noises: NoiseStore
-    upkeep: Upkeep
+    noises: NoiseCache
+    upkeep: UpkeepScheduler
     webhooks: WebhookSender
     stopping: StopSignal = field(default_factory=StopSignal)
 
     @property
-    def paint(self) -> PaintFollower:
+    def paint(self) -> PaintUpdater:
         """Reads the paint of edited lines again."""
-        return PaintFollower(self.frames)
+        return PaintUpdater(self.frames)
 
     @staticmethod
     def open(settings: Settings, pool: Pool = nullcontext) -> Services:
         """Open everything over one home; ``pool`` is for jobs that are worth processes."""
         store = Store.open(settings)
         jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
-        exports, frames = ExportFolder(settings.exports), Frames(settings)
+        exports, frames = ExportFolder(settings.exports), FrameProvider(settings)
         large = LargeGroupSolver(settings)
         return Services(
             settings,
@@ -144,15 +144,15 @@ class Services:
             RecordingFrames(settings),
             BallFollower(settings),
             large,
-            PreviewSolver(settings, store, PaintFollower(frames), large),
+            PreviewSolver(settings, store, PaintUpdater(frames), large),
             PredictionReader(settings),
             exports,
             jobs,
-            Events(store, jobs),
+            EventPublisher(store, jobs),
             YieldStore(store),
             StatisticsCache(store),
-            NoiseStore(store),
-            Upkeep(store, jobs),
+            NoiseCache(store),
+            UpkeepScheduler(store, jobs),
             WebhookSender(store, leads=jobs.is_leader),
         )
 
@@ -163,25 +163,25 @@ class Services:
         self.frames.warm()
         resume_solving(self.jobs, self.store)
         for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
-            kind.take_up(self.jobs, self.store)
+            kind.register_with_jobs(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_recordings(self.jobs, self.store)
-        resume_cameras(self.jobs, self.store)
+        resume_camera_jobs(self.jobs, self.store)
         resume_ball_links(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
-        self.jobs.call_on_leadership(self._start_leading)
+        self.jobs.call_on_leadership(self._start_leader_work)
         self.jobs.start()
         self.store.subscribe()
         self.upkeep.start()
         self.webhooks.start()
 
-    def _start_leading(self) -> None:
+    def _start_leader_work(self) -> None:
         """Begin what one process does for all."""
-        if not self._solved_leftovers():
-            Thread(target=self._solve_leftovers_later, daemon=True).start()
+        if not self._try_solve_leftovers():
+            Thread(target=self._retry_leftovers_until_solved, daemon=True).start()
         Thread(target=self._compare_uncompared_annotations, name="agreement", daemon=True).start()
         self.webhooks.wake()
 
@@ -196,7 +196,7 @@ class Services:
         self.statistics.refresh_large_datasets()
         self.yields.refresh_large_datasets()
 
-    def _solved_leftovers(self) -> bool:
+    def _try_solve_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""
         try:
             solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
@@ -204,8 +204,8 @@ class Services:
             return False
         return True
 
-    def _solve_leftovers_later(self) -> None:
-        while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._solved_leftovers():
+    def _retry_leftovers_until_solved(self) -> None:
+        while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._try_solve_leftovers():
             pass
 
     def stop(self) -> None:
@@ -279,7 +279,7 @@ async def get_visibility(request: Request) -> Visibility:
     return get_current_visibility(request.scope)
 
 
-async def get_whole_visibility(request: Request) -> Visibility:
+async def get_visibility_without_hidden(request: Request) -> Visibility:
     """What whoever asks sees and nothing of which is hidden from them."""
     return get_current_visibility_without_hidden(request.scope)
 
@@ -318,7 +318,7 @@ AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
 Sees = Annotated[Visibility, Depends(get_visibility)]
-SeesWhole = Annotated[Visibility, Depends(get_whole_visibility)]
+SeesWhole = Annotated[Visibility, Depends(get_visibility_without_hidden)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 
 

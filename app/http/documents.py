@@ -118,33 +118,37 @@ def respond_with(
         @wraps(route)
         def respond(*, keyed_request: KeyedRequest | None = None, **given: Any) -> Response:
             made = partial(make, **{name: given[name] for name in names})
-            pending = PendingResponse(keyed_request, made, response_to_stored)
+            pending = PendingResponse(keyed_request, made, make_stored_response)
             with pending.open():
                 outcome: Any = route(**given)  # type: ignore[call-arg]
-            return outcome if isinstance(outcome, Response) else pending.response_to(outcome)
+            return (
+                outcome if isinstance(outcome, Response) else pending.make_or_get_response(outcome)
+            )
 
-        respond.__signature__ = _signature_with_key(route)  # type: ignore[attr-defined]
+        respond.__signature__ = _add_key_parameter(route)  # type: ignore[attr-defined]
         return respond  # type: ignore[return-value]
 
     return decorate
 
 
-def response_to_stored(response: Response, digest: str) -> StoredResponse:
+def make_stored_response(response: Response, digest: str) -> StoredResponse:
     """What is stored of a response; ``digest`` is that of its request."""
     headers = {name: response.headers[name] for name in STORED_HEADERS if name in response.headers}
     return StoredResponse(digest, response.status_code, headers, bytes(response.body))
 
 
-def document(content: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+def make_document_response(
+    content: Any, status: int = 200, headers: dict[str, str] | None = None
+) -> Response:
     """A document, or a frozen value that is its own, as it is sent."""
     return Response(encode_document(content), status, headers, "application/json")
 
 
-def respond_with_document(
+def make_document_responder(
     show: Callable[[Outcome], Any], status: int = 200
 ) -> Callable[[Outcome], Response]:
     """How an outcome is sent of which ``show`` makes a document."""
-    return lambda outcome: document(show(outcome), status)
+    return lambda outcome: make_document_response(show(outcome), status)
 
 
 def make_empty_response(_outcome: object) -> Response:
@@ -158,7 +162,7 @@ async def get_keyed_request(request: Request) -> KeyedRequest | None:
     return keyed
 
 
-def _signature_with_key(route: Callable[..., Any]) -> inspect.Signature:
+def _add_key_parameter(route: Callable[..., Any]) -> inspect.Signature:
     """The signature of a route as FastAPI calls it."""
     signature = inspect.signature(route, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY

@@ -123,12 +123,12 @@ def find_http_status(error: ReviewError) -> int:
     special = {PreconditionRequiredError: 428, StaleStateError: 412}
     if type(error) in special:
         return special[type(error)]
-    if isinstance(error, StorageError) and not _is_full(error):
+    if isinstance(error, StorageError) and not _is_disk_full(error):
         return 503
     return next((status for kind, status in STATUSES if isinstance(error, kind)), 500)
 
 
-def _is_full(error: StorageError) -> bool:
+def _is_disk_full(error: StorageError) -> bool:
     """Whether the disk is full, rather than the database busy or damaged."""
     cause = error.__cause__
     original = getattr(cause, "orig", None)
@@ -139,12 +139,12 @@ def _is_full(error: StorageError) -> bool:
 
 def install_error_handlers(app: FastAPI) -> None:
     """Make the application answer every known error with a problem."""
-    app.add_exception_handler(ReviewError, _review_error)
-    app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(HTTPException, _http_exception)
+    app.add_exception_handler(ReviewError, _handle_review_error)
+    app.add_exception_handler(RequestValidationError, _handle_validation_error)
+    app.add_exception_handler(HTTPException, _handle_http_exception)
 
 
-async def _review_error(request: Request, error: Exception) -> Response:
+async def _handle_review_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ReviewError)
     status = find_http_status(error)
     hint = error.hint
@@ -178,7 +178,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     return problem_response(problem, headers, current)
 
 
-async def _validation_error(request: Request, error: Exception) -> Response:
+async def _handle_validation_error(request: Request, error: Exception) -> Response:
     """422 with a pointer for each field; 404 where the id in the path cannot be one."""
     assert isinstance(error, RequestValidationError)
     details = error.errors()
@@ -232,7 +232,7 @@ def _pointer_of_location(location: Sequence[int | str]) -> str:
     return "".join(f"/{part}" for part in escaped)
 
 
-async def _http_exception(request: Request, error: Exception) -> Response:
+async def _handle_http_exception(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     detail = {
         404: "there is nothing at this address",

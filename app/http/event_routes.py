@@ -12,8 +12,8 @@ from fastapi.responses import StreamingResponse
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import hides_groups_from_reader
 from app.http.deps import AppServices, SeesWhole, Services
-from app.http.events import EVENTS, Listener, make_first_event
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.events import EVENTS, EventListener, make_first_event
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.requests import is_head
 from app.http.route import Route
@@ -40,18 +40,18 @@ STREAM: Responses = {
 }
 
 
-async def require_free_listener(services: AppServices) -> Services:
+async def require_listener_slot(services: AppServices) -> Services:
     """The services, unless as many listen as may: who is turned away costs the database nothing."""
-    services.events.require_room()
+    services.events.require_free_slot()
     return services
 
 
-class StreamStart:
+class EventStreamStart:
     """Where a listener begins: all that asks the database, done off the event loop."""
 
     def __init__(
         self,
-        services: Annotated[Services, Depends(require_free_listener)],
+        services: Annotated[Services, Depends(require_listener_slot)],
         dataset: Annotated[
             str | None, Query(max_length=200, description="Name or id; default: all datasets.")
         ] = None,
@@ -93,8 +93,8 @@ class StreamStart:
 
 
 async def open_event_feed(
-    services: AppServices, visibility: SeesWhole, start: Annotated[StreamStart, Depends()]
-) -> AsyncIterator[Listener]:
+    services: AppServices, visibility: SeesWhole, start: Annotated[EventStreamStart, Depends()]
+) -> AsyncIterator[EventListener]:
     """A feed for as long as the request lasts."""
     feed = services.events.subscribe(
         start.dataset_id,
@@ -113,14 +113,14 @@ async def open_event_feed(
 def read_current_events(
     services: AppServices,
     visibility: SeesWhole,
-    start: Annotated[StreamStart, Depends()],
-    feed: Annotated[Listener, Depends(open_event_feed)],
+    start: Annotated[EventStreamStart, Depends()],
+    feed: Annotated[EventListener, Depends(open_event_feed)],
 ) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
     jobs = services.events.open_jobs(start.dataset_id, visibility)
     if start.solution is None:
         return jobs
-    return [*services.events.solved_since(start.solution, feed), *jobs]
+    return [*services.events.list_solved_since(start.solution, feed), *jobs]
 
 
 @router.get(
@@ -129,11 +129,11 @@ def read_current_events(
     response_class=Response,
     responses={**responses(404), **STREAM},
 )
-@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE)
+@may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE)
 async def listen(
     request: Request,
-    start: Annotated[StreamStart, Depends()],
-    feed: Annotated[Listener, Depends(open_event_feed)],
+    start: Annotated[EventStreamStart, Depends()],
+    feed: Annotated[EventListener, Depends(open_event_feed)],
     first: Annotated[list[bytes], Depends(read_current_events)],
 ) -> StreamingResponse:
     """What changes, as it changes: by anybody, in a browser or on the command line.
@@ -143,11 +143,11 @@ async def listen(
     notice is shown to everybody. The stream begins with the jobs that are under way.
     """
 
-    async def told() -> AsyncIterator[bytes]:
+    async def stream_events() -> AsyncIterator[bytes]:
         yield b"".join([make_first_event(start.position), *first])
         if is_head(request.scope):
             return
         async for events in feed.read():
             yield events
 
-    return StreamingResponse(told(), headers=_UNBUFFERED, media_type="text/event-stream")
+    return StreamingResponse(stream_events(), headers=_UNBUFFERED, media_type="text/event-stream")

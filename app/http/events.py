@@ -32,9 +32,9 @@ from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
     LoggedChange,
     find_newest_entry_and_solution,
-    read_news,
+    read_groups_solved_since,
+    read_new_changes,
     read_position,
-    read_solved_since,
 )
 from app.http.documents import encode_document
 from app.http.problem import PresenceDocument
@@ -113,7 +113,7 @@ class ListenerCounts:
     lost: int = 0
 
 
-class Listener:
+class EventListener:
     """One listener: what it has not been told yet.
 
     Args:
@@ -149,7 +149,7 @@ class Listener:
         meant = self.dataset_id is None or dataset_id in (None, self.dataset_id)
         return meant and self._sight.sees(dataset_id, actor)
 
-    def is_told(self, change: LoggedChange) -> bool:
+    def listens_to_change(self, change: LoggedChange) -> bool:
         """Whether a change is told here.
 
         Who saw a dataset that was gone before this one listened, nobody knows any more.
@@ -177,12 +177,12 @@ class Listener:
                 yield b"".join(events)
 
 
-class Events:
+class EventPublisher:
     """All listeners of one server, and the thread that looks at the log for them."""
 
     def __init__(self, store: Store, jobs: Jobs):
         self._store, self._jobs = store, jobs
-        self._feeds: set[Listener] = set()
+        self._feeds: set[EventListener] = set()
         self._lock = threading.Lock()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -206,10 +206,10 @@ class Events:
         banner = read_banner(self._store)
         return "" if banner is None else encode_document(banner).decode()
 
-    def solved_since(self, solution: int, feed: Listener) -> list[bytes]:
+    def list_solved_since(self, solution: int, feed: EventListener) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
-        found = read_solved_since(self._store, solution)
-        return [_change_event(item) for item in found if feed.is_told(item)]
+        found = read_groups_solved_since(self._store, solution)
+        return [_change_event(item) for item in found if feed.listens_to_change(item)]
 
     @property
     def counts(self) -> ListenerCounts:
@@ -217,7 +217,7 @@ class Events:
         with self._lock:
             return replace(self._counts, open=len(self._feeds))
 
-    def require_room(self) -> None:
+    def require_free_slot(self) -> None:
         """Raise OverloadedError where as many listen as may, or the server stops; waits for nothing."""
         if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
             raise OverloadedError("too many browser windows and scripts listen for events")
@@ -231,20 +231,20 @@ class Events:
         visibility: Visibility = EVERYTHING,
         began: int | None = None,
         numbered: bool = True,
-    ) -> Listener:
+    ) -> EventListener:
         """Begin to listen, or go on where an earlier stream ended; on the event loop.
 
         ``began`` is the newest entry of the log by now, where that is not the position; ``numbered``
-        as ``Listener`` has it.
+        as ``EventListener`` has it.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
         """
-        feed = Listener(
+        feed = EventListener(
             dataset_id, position, visibility, position if began is None else began, numbered
         )
         with self._lock:
-            self.require_room()
+            self.require_free_slot()
             self._feeds.add(feed)
             self._counts.opened += 1
             self._counts.resumed += resumed
@@ -256,7 +256,7 @@ class Events:
         self._wake.set()
         return feed
 
-    def unsubscribe(self, feed: Listener) -> None:
+    def unsubscribe(self, feed: EventListener) -> None:
         """Stop listening."""
         with self._lock:
             self._feeds.discard(feed)
@@ -270,19 +270,19 @@ class Events:
         """End every feed, so that the server can stop; may be called twice."""
         self._closing.set()
         self._wake.set()
-        _deliver_events({feed: [] for feed in self._current_listeners()}, ended=True)
+        _deliver_events({feed: [] for feed in self._list_listeners()}, ended=True)
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(5)
 
-    def _current_listeners(self) -> list[Listener]:
+    def _list_listeners(self) -> list[EventListener]:
         with self._lock:
             return list(self._feeds)
 
     def _publish_until_closed(self) -> None:
         awake = False
         while not self._closing.is_set():
-            if feeds := self._current_listeners():
+            if feeds := self._list_listeners():
                 try:
                     self._publish_changes(feeds, first=not awake)
                     awake = True
@@ -298,22 +298,22 @@ class Events:
             self._wake.wait(POLL if feeds else None)
             self._wake.clear()
 
-    def _publish_changes(self, feeds: list[Listener], *, first: bool) -> None:
+    def _publish_changes(self, feeds: list[EventListener], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
         places = {feed.position for feed in feeds}
-        self._look_for_banner(feeds, first=first)
-        news = read_news(self._store, places, None if first else self._solutions)
+        self._publish_banner_change(feeds, first=first)
+        news = read_new_changes(self._store, places, None if first else self._solutions)
         self._solutions = news.solution
         written = functools.cache(_change_event)
-        queued: dict[Listener, list[bytes]] = {}
+        queued: dict[EventListener, list[bytes]] = {}
         for feed in feeds:
             wanted = [*news.changes.get(feed.position, []), *news.solved]
             feed.position = max(feed.position, news.entry)
-            if events := [written(item) for item in wanted if feed.is_told(item)]:
+            if events := [written(item) for item in wanted if feed.listens_to_change(item)]:
                 queued[feed] = events
         _deliver_events(queued)
 
-    def _look_for_banner(self, feeds: list[Listener], *, first: bool) -> None:
+    def _publish_banner_change(self, feeds: list[EventListener], *, first: bool) -> None:
         """Tell each listener of another notice of maintenance, whichever process has set it."""
         before, self._banner = self._banner, read_banner(self._store)
         if first or self._banner == before:
@@ -342,15 +342,15 @@ class Events:
     def _publish_work(self, dataset_id: int, document: WorkEvent) -> None:
         event = _format_event("work", document)
         _deliver_events(
-            {feed: [event] for feed in self._current_listeners() if feed.wants(dataset_id)}
+            {feed: [event] for feed in self._list_listeners() if feed.wants(dataset_id)}
         )
 
     def _publish_job(self, job: Job) -> None:
-        event, feeds = _job_event(job), self._current_listeners()
+        event, feeds = _job_event(job), self._list_listeners()
         _deliver_events({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
 
 
-def _deliver_events(queued: Mapping[Listener, list[bytes]], *, ended: bool = False) -> None:
+def _deliver_events(queued: Mapping[EventListener, list[bytes]], *, ended: bool = False) -> None:
     """Tell listeners of something, each loop by one call; from any thread."""
 
     def take(loop: asyncio.AbstractEventLoop) -> None:

@@ -119,7 +119,7 @@ def _add_default_port(host: str, scheme: str) -> str:
     return host if host.rpartition(":")[2].isdigit() and not host.endswith("]") else host + default
 
 
-def _without_default_port(url: str) -> str:
+def _remove_default_port(url: str) -> str:
     """An address as browsers write it in Origin: without ``:443`` of https and ``:80`` of http."""
     scheme, _, host = url.partition("://")
     default = {"http": ":80", "https": ":443"}.get(scheme, "")
@@ -160,7 +160,7 @@ class SameOrigin:
 
     def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
         self.app = app
-        self.url, self.required = url and _without_default_port(url.lower()), required
+        self.url, self.required = url and _remove_default_port(url.lower()), required
         self._name = "" if self.url is None else parse_host_name(self.url.partition("://")[2])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

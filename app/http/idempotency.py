@@ -26,14 +26,14 @@ from app.db.idempotency import (
     KeyedRequest,
     StoredResponse,
     claim_key,
-    end_claim,
-    find_stored,
-    store_sent,
+    find_stored_response,
+    release_key,
+    store_sent_response,
 )
 from app.db.store import Store
 from app.errors import BusyError, OverloadedError, StorageError
 from app.http.deps import ACTOR_HEADER
-from app.http.documents import KEYED_REQUEST, response_to_stored
+from app.http.documents import KEYED_REQUEST, make_stored_response
 from app.http.problem import make_problem, problem_response
 from app.http.requests import TimedBody
 from app.json_text import canonical_json_text
@@ -105,7 +105,7 @@ class RequestDigest:
         return hashlib.sha256(canonical_json_text([*place, body]).encode()).hexdigest()
 
 
-class Idempotency:
+class IdempotencyHandler:
     """Answers a repetition with the first response, and the same key with another request with 422."""
 
     def __init__(self) -> None:
@@ -135,17 +135,17 @@ class Idempotency:
             problem = make_problem(400, f"{HEADER} must be 1 to 200 visible ASCII characters")
             return problem_response(problem)
         store: Store = request.app.state.services.store
-        async with self._respond_alone(store, keys[0], actor):
+        async with self._hold_key(store, keys[0], actor):
             known = await self._find_stored_response(store, keys[0], actor)
             if known is None or await hidden():
-                return await self._carry_out(request, digest, keys[0], actor, work)
+                return await self._execute_and_store(request, digest, keys[0], actor, work)
             is_same = await digest.whole() == known.request_digest
-            if is_same and known.under_way:
-                return await self._carry_out(request, digest, keys[0], actor, work)
-            return _response_of_stored(known, is_same=is_same)
+            if is_same and known.is_in_progress:
+                return await self._execute_and_store(request, digest, keys[0], actor, work)
+            return _make_replayed_response(known, is_same=is_same)
 
     @asynccontextmanager
-    async def _respond_alone(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
+    async def _hold_key(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
         """Answer while nobody else answers a request of that key, in this process or another."""
         whose = (actor, key)
         try:
@@ -163,7 +163,7 @@ class Idempotency:
                 yield
             finally:
                 with CancelScope(shield=True):
-                    await run_sync(end_claim, store, key, actor, limiter=self._storing)
+                    await run_sync(release_key, store, key, actor, limiter=self._storing)
         finally:
             del self._under_way[whose]
             done.set()
@@ -181,11 +181,11 @@ class Idempotency:
     ) -> StoredResponse | None:
         """What is stored under a key; in a thread only where there is something to wait for."""
         try:
-            return find_stored(store, key, actor, at_once=True)
+            return find_stored_response(store, key, actor, at_once=True)
         except BusyError:
-            return await run_sync(find_stored, store, key, actor, limiter=self._finding)
+            return await run_sync(find_stored_response, store, key, actor, limiter=self._finding)
 
-    async def _carry_out(
+    async def _execute_and_store(
         self, request: Request, digest: RequestDigest, key: str, actor: str, work: Work
     ) -> Response:
         keyed = None
@@ -197,8 +197,8 @@ class Idempotency:
         response = await work()
         if not (keyed and keyed.stored) and _is_storable(response):
             try:
-                sent = response_to_stored(response, await digest.whole())
-                await run_sync(store_sent, store, key, actor, sent, limiter=self._storing)
+                sent = make_stored_response(response, await digest.whole())
+                await run_sync(store_sent_response, store, key, actor, sent, limiter=self._storing)
             except StorageError as error:
                 # The work is done; a repetition is answered with the state as it is then.
                 log.warning("a response could not be stored", error=str(error))
@@ -215,7 +215,7 @@ def _in_progress_error() -> OverloadedError:
     return OverloadedError("the first request with this Idempotency-Key is still running")
 
 
-def _response_of_stored(known: StoredResponse, *, is_same: bool) -> Response:
+def _make_replayed_response(known: StoredResponse, *, is_same: bool) -> Response:
     if not is_same:
         problem = make_problem(
             422,

@@ -20,7 +20,7 @@ from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentato
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.maintenance.upkeep import HomeReport, read_home
+from app.features.maintenance.upkeep import HomeReport, read_home_report
 from app.http.deps import Services
 from app.http.events import ListenerCounts
 from app.http.pages import ELSEWHERE
@@ -47,7 +47,7 @@ def install_metrics(app: FastAPI, limits: RequestLimits) -> None:
     registry = app.state.metrics = CollectorRegistry()
     own = ProcessCollector(app, limits)
     if MULTIPROCESS in os.environ:
-        app.state.shared_metrics = SharedNumbers(own)
+        app.state.shared_metrics = SharedProcessMetrics(own)
         answered = CollectorRegistry()
         MultiProcessCollector(answered)  # type: ignore[no-untyped-call]
     else:
@@ -118,21 +118,25 @@ class ProcessCollector(Collector):
     def collect(self) -> Iterator[Metric]:
         """Every number of this moment."""
         services: Services = self._app.state.services
-        yield from self._request_classes()
+        yield from self._collect_request_metrics()
         yield from _stream_metrics(services.events.counts)
         yield from _worker_metrics()
 
-    def _request_classes(self) -> Iterator[Metric]:
+    def _collect_request_metrics(self) -> Iterator[Metric]:
         limits = {one.request_class.name: one for one in self._limits.all}
         busy = {name: one.busy for name, one in limits.items()}
-        yield _gauges("requests_busy", "Requests at work, by class.", "class", busy)
+        yield _make_labelled_gauge("requests_busy", "Requests at work, by class.", "class", busy)
         waiting = {name: one.waiting for name, one in limits.items()}
-        yield _gauges("requests_waiting", "Requests that wait to be admitted.", "class", waiting)
+        yield _make_labelled_gauge(
+            "requests_waiting", "Requests that wait to be admitted.", "class", waiting
+        )
         refused = {name: one.refused for name, one in limits.items()}
-        yield _counter("requests_refused", "Requests refused with Retry-After.", "class", refused)
+        yield _make_labelled_counter(
+            "requests_refused", "Requests refused with Retry-After.", "class", refused
+        )
 
 
-class SharedNumbers:
+class SharedProcessMetrics:
     """Keeps the numbers of this process where the other web processes read them.
 
     Numbers of this moment are added up over the processes that live; what is counted also over those
@@ -156,7 +160,7 @@ class SharedNumbers:
                     else:
                         self._set_counter(family, sample)
 
-    async def keep_fresh(self) -> None:
+    async def refresh_forever(self) -> None:
         """Refresh every second, without an end."""
         while True:
             self.refresh()
@@ -189,17 +193,19 @@ class SharedNumbers:
 
 
 def _stream_metrics(counts: ListenerCounts) -> Iterator[Metric]:
-    yield _gauge("event_streams", "Windows that listen for events.", counts.open)
+    yield _make_gauge("event_streams", "Windows that listen for events.", counts.open)
     ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
     text = "Event streams that were opened, came back, or were let go for being too slow."
-    yield _counter("event_stream", text, "what", ended)
+    yield _make_labelled_counter("event_stream", text, "what", ended)
 
 
 def _worker_metrics() -> Iterator[Metric]:
     busy = {kind: counts.busy for kind, counts in COUNTS.items()}
-    yield _gauges("worker_busy", "Tasks at work in worker processes.", "kind", busy)
+    yield _make_labelled_gauge("worker_busy", "Tasks at work in worker processes.", "kind", busy)
     waiting = {kind: counts.waiting for kind, counts in COUNTS.items()}
-    yield _gauges("worker_waiting", "Tasks that wait for a worker process.", "kind", waiting)
+    yield _make_labelled_gauge(
+        "worker_waiting", "Tasks that wait for a worker process.", "kind", waiting
+    )
     ended = CounterMetricFamily(
         "touchline_worker_ended",
         "Worker processes that ended in the midst of a task.",
@@ -214,26 +220,28 @@ def _worker_metrics() -> Iterator[Metric]:
 def _database_metrics(store: Store) -> Iterator[Metric]:
     home = None
     with suppress(StorageError):
-        home = read_home(store)
-    yield _gauge("database_up", "1 while the database answers.", int(home is not None))
+        home = read_home_report(store)
+    yield _make_gauge("database_up", "1 while the database answers.", int(home is not None))
     # After it was read, which may have shown damage.
     text = "1 from the first sign on that the database is damaged."
-    yield _gauge("database_damaged", text, int(store.is_damaged))
+    yield _make_gauge("database_damaged", text, int(store.is_damaged))
     if home is not None:
         yield from _home_metrics(home)
 
 
 def _home_metrics(home: HomeReport) -> Iterator[Metric]:
-    yield _gauge("groups", "Groups of all datasets.", home.groups)
-    yield _gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
-    yield _gauge(
+    yield _make_gauge("groups", "Groups of all datasets.", home.groups)
+    yield _make_gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
+    yield _make_gauge(
         "oldest_unsolved_seconds",
         "How long the oldest group waits to be solved.",
         home.oldest_unsolved_seconds,
     )
-    yield _gauge("log_entries", "Entries of the log of changes.", home.entries)
-    yield _gauges("file_bytes", "Size of the database's files.", "file", home.file_bytes)
-    yield _gauge("disk_free_bytes", "Room on the disk of the home.", home.free_bytes)
+    yield _make_gauge("log_entries", "Entries of the log of changes.", home.entries)
+    yield _make_labelled_gauge(
+        "file_bytes", "Size of the database's files.", "file", home.file_bytes
+    )
+    yield _make_gauge("disk_free_bytes", "Room on the disk of the home.", home.free_bytes)
     jobs = GaugeMetricFamily(
         "touchline_jobs", "Jobs on record, by kind and state.", labels=["kind", "state"]
     )
@@ -242,18 +250,18 @@ def _home_metrics(home: HomeReport) -> Iterator[Metric]:
     yield jobs
 
 
-def _gauge(name: str, text: str, value: float) -> Metric:
+def _make_gauge(name: str, text: str, value: float) -> Metric:
     return GaugeMetricFamily(f"touchline_{name}", text, value=value)
 
 
-def _gauges(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+def _make_labelled_gauge(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
     family = GaugeMetricFamily(f"touchline_{name}", text, labels=[label])
     for key, value in values.items():
         family.add_metric([key], value)
     return family
 
 
-def _counter(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+def _make_labelled_counter(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
     family = CounterMetricFamily(f"touchline_{name}", text, labels=[label])
     for key, value in values.items():
         family.add_metric([key], value)

@@ -15,7 +15,7 @@ from starlette.responses import JSONResponse
 
 from app.http.cookies import SESSION
 from app.http.events import EVENTS
-from app.http.permissions import Action, Where, may
+from app.http.permissions import Action, RoleScope, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
 from app.http.route import Route, list_routes
@@ -197,24 +197,24 @@ router = APIRouter(include_in_schema=False, route_class=Route)
 
 
 @router.get("/openapi.json")
-@may(Action.DESCRIBE, where=Where.SOMEWHERE)
+@may(Action.DESCRIBE, where=RoleScope.SOMEWHERE)
 async def get_document(request: Request) -> JSONResponse:
     """What the server says of its addresses."""
     return JSONResponse(request.app.openapi())
 
 
-def describe_errors_in_openapi(app: FastAPI) -> None:
+def install_openapi_document(app: FastAPI) -> None:
     """Replace the framework's own description of errors by ours."""
 
-    def openapi() -> dict[str, Any]:
+    def build_openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
-            app.openapi_schema = _make_document(app)
+            app.openapi_schema = _make_openapi_document(app)
         return app.openapi_schema
 
-    app.openapi = openapi  # type: ignore[method-assign]
+    app.openapi = build_openapi  # type: ignore[method-assign]
 
 
-def _make_document(app: FastAPI) -> dict[str, Any]:
+def _make_openapi_document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(
         title=app.title,
         version=app.version,
@@ -311,7 +311,7 @@ def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) 
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             # What the framework makes of a function's name may be that of another one, too.
-            operation["summary"] = _summary_words(operation["operationId"])
+            operation["summary"] = _format_summary(operation["operationId"])
             parameters = operation.setdefault("parameters", [])
             for parameter in parameters:
                 if not parameter.get("description"):
@@ -328,7 +328,7 @@ def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) 
                 answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
 
 
-def _summary_words(name: str) -> str:
+def _format_summary(name: str) -> str:
     """``listSavedViews`` as a person writes it: *List saved views*."""
     words = re.sub("([A-Z])", lambda found: f" {found[1].lower()}", name)
     return words[:1].upper() + words[1:]

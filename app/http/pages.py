@@ -20,13 +20,13 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
-from app.config import find_own_folder
+from app.config import find_packaged_folder
 from app.errors import StorageError
 from app.http.headers import make_content_security_policy
 from app.http.permissions import open_to_all
 from app.http.request_limits import limit
 from app.http.route import Route
-from app.json_text import digest_of
+from app.json_text import digest_content
 
 FOLDER = "built"
 APART = ("node_modules", FOLDER, f"{FOLDER}.new")
@@ -37,7 +37,7 @@ _ENTRY = re.compile(rb'(<script type="module"[^>]* src="/static/)((?:ahead|main)
 _PRELOAD = re.compile(rb'\s*<link rel="modulepreload"[^>]*>')
 
 
-STATIC = find_own_folder("static")
+STATIC = find_packaged_folder("static")
 _INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
 _SHEET = re.compile(rb'\s*<link rel="stylesheet" href="/static/(?P<path>css/[^"]+)">')
 _ALL_SHEETS = b'\n\t<link rel="stylesheet" href="/static/all.css">'
@@ -115,11 +115,11 @@ class JoinedModules:
         """The joined files of the modules as they are now; None where there are none."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             about = json.loads((folder / FOLDER / "about.json").read_text("utf-8"))
-            if about["of"] == digest(folder):
+            if about["of"] == digest_modules(folder):
                 return JoinedModules(tuple(about["needed_first"]))
         return None
 
-    def put_into(self, html: bytes) -> bytes:
+    def insert_into_page(self, html: bytes) -> bytes:
         """The page that asks for the joined files instead of the modules."""
         html = _ENTRY.sub(rb"\g<1>" + f"{FOLDER}/".encode() + rb"\g<2>", _PRELOAD.sub(b"", html))
         links = "".join(
@@ -129,7 +129,7 @@ class JoinedModules:
         return html.replace(b"\n</head>", f"{links}\n</head>".encode(), 1)
 
 
-def digest(folder: Path) -> str:
+def digest_modules(folder: Path) -> str:
     """Of the modules' names and contents, as ``static/build.mjs`` reckons it.
 
     Raises:
@@ -177,7 +177,7 @@ class IndexPage:
             f'data-banner="{escape(banner)}" ' if banner else ""
         )
         html = self.html.replace(b"<html ", f"<html {attributes}".encode(), 1)
-        version = f"{moment}-{digest_of(banner.encode())[:8]}" if banner else moment
+        version = f"{moment}-{digest_content(banner.encode())[:8]}" if banner else moment
         return replace(self, html=html, etag=f'{self.etag[:-1]}-{version}"')
 
     @staticmethod
@@ -199,12 +199,12 @@ class IndexPage:
             last = sheets[-1].end()
             html = _SHEET.sub(b"", html[:last]) + _ALL_SHEETS + html[last:]
         if (joined := JoinedModules.read(folder)) is not None:
-            html = joined.put_into(html)
+            html = joined.insert_into_page(html)
         modules = tuple(found.decode() for found in _MODULE.findall(html))
         html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
         if team:
             html = html.replace(b"<html ", b"<html data-team ", 1)
-        etag = f'"{digest_of(html)}"'
+        etag = f'"{digest_content(html)}"'
         return IndexPage(
             html, etag, make_content_security_policy(hash_import_maps(html)), styles, modules
         )
@@ -222,7 +222,7 @@ class BrowserSite:
     def index(self) -> IndexPage | None:
         """The page as it is on disk now; None where the application is not installed."""
         try:
-            version = self._folder_version()
+            version = self._digest_folder()
             if version != self._version:
                 self._page = IndexPage.make(self.folder, version, team=self.team)
                 self._version = version
@@ -235,7 +235,7 @@ class BrowserSite:
         """The version of the page that was asked for last."""
         return self._version
 
-    def _folder_version(self) -> str:
+    def _digest_folder(self) -> str:
         """Digest of the times and sizes of our own files and of the libraries' lock file."""
         digest = hashlib.sha256()
         for folder, folders, names in os.walk(self.folder):
@@ -323,16 +323,16 @@ class ModuleFiles(StaticFiles):
         return kept
 
 
-class _Elsewhere(StringConvertor):
+class _UnknownPagePathConvertor(StringConvertor):
     """Paths outside the REST interface and the static files that are no page of the application."""
 
     NAME = "elsewhere"
     regex = r"(?!(?:api|static|assets)(?:/|$)).*"
 
 
-ELSEWHERE = f"/{{path:{_Elsewhere.NAME}}}"
+ELSEWHERE = f"/{{path:{_UnknownPagePathConvertor.NAME}}}"
 """The route of whatever is nowhere else."""
-register_url_convertor(_Elsewhere.NAME, _Elsewhere())
+register_url_convertor(_UnknownPagePathConvertor.NAME, _UnknownPagePathConvertor())
 
 
 def install_pages(
@@ -349,15 +349,15 @@ def install_pages(
     """
     router = APIRouter(include_in_schema=False, route_class=Route)
 
-    def found() -> IndexPage:
+    def require_index_page() -> IndexPage:
         index = site.index()
         if index is None:
             raise HTTPException(status_code=404)
         return index
 
     @open_to_all
-    def page(request: Request) -> Response:
-        index = found()
+    def serve_page(request: Request) -> Response:
+        index = require_index_page()
         if moment is not None:
             # A page without it asks once more for what it has read when its stream begins.
             with suppress(StorageError):
@@ -369,22 +369,22 @@ def install_pages(
 
     @open_to_all
     @limit(None)
-    def styles(version: str) -> Response:
-        content = found().styles
+    def serve_styles(version: str) -> Response:
+        content = require_index_page().styles
         headers = {"Cache-Control": FOR_GOOD if version == site.version else REVALIDATED}
         return Response(content, media_type="text/css", headers=headers)
 
     @open_to_all
-    def elsewhere(request: Request) -> Response:
+    def serve_unknown_page(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
         if "text/html" not in request.headers.get("accept", ""):
             raise HTTPException(status_code=404)
-        return Response(found().html, status_code=404, media_type="text/html")
+        return Response(require_index_page().html, status_code=404, media_type="text/html")
 
     for path in PAGES:
-        router.add_api_route(path, page, methods=["GET", "HEAD"])
-    router.add_api_route(ELSEWHERE, elsewhere, methods=["GET", "HEAD"])
-    router.add_api_route("/assets/{version}/all.css", styles, methods=["GET", "HEAD"])
+        router.add_api_route(path, serve_page, methods=["GET", "HEAD"])
+    router.add_api_route(ELSEWHERE, serve_unknown_page, methods=["GET", "HEAD"])
+    router.add_api_route("/assets/{version}/all.css", serve_styles, methods=["GET", "HEAD"])
     app.include_router(router)
     _install_modules(app, site)
 
@@ -392,12 +392,12 @@ def install_pages(
 def _install_modules(app: FastAPI, site: BrowserSite) -> None:
     kept, fresh = ModuleFiles(site.folder, FOR_GOOD), ModuleFiles(site.folder, REVALIDATED)
 
-    async def versioned(scope: Scope, receive: Receive, send: Send) -> None:
+    async def serve_versioned_module(scope: Scope, receive: Receive, send: Send) -> None:
         """A page of an earlier version goes on, but nobody keeps our files under its address."""
         present = scope["path_params"]["version"] == site.version
         await (kept if present else fresh)(scope, receive, send)
 
-    app.mount("/assets/{version}", versioned, name="assets")
+    app.mount("/assets/{version}", serve_versioned_module, name="assets")
     app.mount("/static", fresh, name="static")
     if index := site.index():
         kept.warm(index.modules)

@@ -30,12 +30,12 @@ from app.features.people.roles import Action as Action
 from app.features.people.roles import DatasetRoles, Role, require_permission
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.fields import query_reveals_hidden_work
-from app.json_text import MAX_ID, quoted
+from app.json_text import MAX_ID, quote_text
 
 E = TypeVar("E", bound=Callable[..., Any])
 
 
-class Where(StrEnum):
+class RoleScope(StrEnum):
     """Where somebody has to have a role, besides in the datasets of what a request names."""
 
     NAMED = "named"
@@ -64,7 +64,7 @@ class Permission:
     action: Action | None
     names: Mapping[str, OwnedKind] = field(default_factory=dict)
     body: Mapping[str, OwnedKind] = field(default_factory=dict)
-    where: Where = Where.NAMED
+    where: RoleScope = RoleScope.NAMED
     whole: bool = False
     to_enrol: bool = False
 
@@ -78,7 +78,7 @@ def may(
     action: Action,
     *,
     body: Mapping[str, OwnedKind] | None = None,
-    where: Where = Where.NAMED,
+    where: RoleScope = RoleScope.NAMED,
     whole: bool = False,
     to_enrol: bool = False,
     **names: OwnedKind,
@@ -96,7 +96,7 @@ def may(
     things = {name.rstrip("_"): kind for name, kind in names.items()}
     found = Permission(action, things, body or {}, where, whole, to_enrol)
     of_none = action in (Action.ACCOUNT, Action.ADMINISTER)
-    if not (of_none or things or body or where is not Where.NAMED):
+    if not (of_none or things or body or where is not RoleScope.NAMED):
         raise TypeError(
             "a permission needs a resource that the route names, or another value of `where`"
         )
@@ -186,7 +186,7 @@ class RequestSubject:
         """What a request names, by the parameters of its path and the rest of it."""
         query = tuple(parse_qsl(query_string, keep_blank_values=True))
         return RequestSubject(
-            permission, query, body, tuple(_mentions_of_request(permission, path, query, body))
+            permission, query, body, tuple(_list_mentions(permission, path, query, body))
         )
 
 
@@ -208,11 +208,11 @@ def find_missing_error(store: Store, owned: list[OwnedMention]) -> NotFoundError
         if item.ownership is None and named.kind is not OwnedKind.NEW_DATASET:
             if named.kind is OwnedKind.DATASET:
                 return unknown_dataset_error(store, str(named.by)[:200])
-            return NotFoundError(f"there is no {named.kind} {quoted(str(named.by), 80)}")
+            return NotFoundError(f"there is no {named.kind} {quote_text(str(named.by), 80)}")
     return None
 
 
-def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
+def is_any_mention_hidden(store: Store, owned: list[OwnedMention]) -> bool:
     """Whether anything that a request mentions is there, and its reader does not see it."""
     return any(
         item.ownership is None
@@ -252,17 +252,17 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
     action, where = permission.action, permission.where
     if roles.is_admin or action is None:
         return
-    if where is Where.EVERYWHERE or _names_operator_folder(subject):
+    if where is RoleScope.EVERYWHERE or _names_operator_folder(subject):
         require_permission(roles.everywhere, action, ALL)
-    elif where is Where.OWN and roles.limited:
+    elif where is RoleScope.OWN and roles.limited:
         require_permission(Role.NONE, action, ALL)
     elif not subject.mentions and action is Action.ADMINISTER:
         require_permission(roles.everywhere, action)
-    elif not subject.mentions and not (where is Where.SOMEWHERE and action is Action.READ):
-        require_permission(roles.highest, action)
+    elif not subject.mentions and not (where is RoleScope.SOMEWHERE and action is Action.READ):
+        require_permission(roles.highest_role, action)
     for item in owned:
         if item.mention.named.kind is OwnedKind.NEW_DATASET:
-            _require_may_make(item.ownership, roles, action)
+            _require_create_permission(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = find_role_at(item.ownership, roles, login.owner)
@@ -301,12 +301,14 @@ def _find_queries(body: Any) -> Iterator[str]:
 def _names_operator_folder(subject: RequestSubject) -> bool:
     """Whether a body names a folder of the operator, which lies beside all datasets."""
     return any(
-        kind is OwnedKind.FOLDER and _field_of_body(subject.body, name) is not None
+        kind is OwnedKind.FOLDER and _get_body_field(subject.body, name) is not None
         for name, kind in subject.permission.body.items()
     )
 
 
-def _require_may_make(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
+def _require_create_permission(
+    present: Ownership | None, roles: DatasetRoles, action: Action
+) -> None:
     """What is made where it is not there; whoever cannot know that it is, is not told."""
     role = roles.everywhere if present is None else roles.find_role_in(present.dataset)
     if role is not Role.NONE or present is None:
@@ -338,7 +340,7 @@ def _needs_ownership(named: NamedResource, roles: DatasetRoles) -> bool:
     return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
 
-def _mentions_of_request(
+def _list_mentions(
     permission: Permission,
     path: Mapping[str, str],
     query: tuple[tuple[str, str], ...],
@@ -347,17 +349,17 @@ def _mentions_of_request(
     names = permission.names
     for name, kind in names.items():
         if name in path:
-            yield from _mention_of_value("path", name, kind, path[name])
+            yield from _make_mention("path", name, kind, path[name])
     for name, value in query:
         if name in names and name not in path:
-            yield from _mention_of_value("query", name, names[name], value)
+            yield from _make_mention("query", name, names[name], value)
     for name, kind in permission.body.items():
-        found = None if kind is OwnedKind.FOLDER else _field_of_body(body, name)
+        found = None if kind is OwnedKind.FOLDER else _get_body_field(body, name)
         if isinstance(found, str if kind in TEXTS else int) and not isinstance(found, bool):
-            yield from _mention_of_value("body", name, kind, found)
+            yield from _make_mention("body", name, kind, found)
 
 
-def _mention_of_value(
+def _make_mention(
     place: str, name: str, kind: OwnedKind, value: str | int
 ) -> Iterator[RequestMention]:
     """Nothing for what is no id: the route refuses it by the same rule."""
@@ -370,7 +372,7 @@ def _mention_of_value(
         return
 
 
-def _field_of_body(body: Any, name: str) -> Any:
+def _get_body_field(body: Any, name: str) -> Any:
     for part in name.split("/"):
         body = body.get(part) if isinstance(body, dict) else None
     return body

@@ -89,14 +89,16 @@ def limit(request_class: RequestClass | None) -> Callable[[E], E]:
     return decorate
 
 
-def request_class_of(endpoint: Callable[..., Any], methods: Collection[str]) -> RequestClass | None:
+def find_request_class(
+    endpoint: Callable[..., Any], methods: Collection[str]
+) -> RequestClass | None:
     """The class of a route, by the function that answers and its methods."""
     otherwise = READ if set(methods) <= SAFE_METHODS else WRITE
     found: RequestClass | None = getattr(endpoint, _CLASS, otherwise)
     return found
 
 
-def is_large(scope: Scope) -> bool:
+def is_large_request(scope: Scope) -> bool:
     """Whether a request brings far more than a person draws; one that does not say how much may."""
     headers = Headers(scope=scope)
     size = headers.get("content-length", "")
@@ -145,7 +147,7 @@ class ClassLimiter:
         request = object()
         limiters = [(self._everybody, MOST_WAITING)]
         if self._team:
-            limiters.insert(0, (self._of_person(who), MOST_WAITING // 2))
+            limiters.insert(0, (self._get_person_limiter(who), MOST_WAITING // 2))
         for limiter, most in limiters:
             try:
                 limiter.acquire_on_behalf_of_nowait(request)
@@ -163,7 +165,7 @@ class ClassLimiter:
             held.callback(limiter.release_on_behalf_of, request)
         return True
 
-    def _of_person(self, who: str) -> CapacityLimiter:
+    def _get_person_limiter(self, who: str) -> CapacityLimiter:
         """As many as there are people in the team at most."""
         if who not in self._people:
             self._people[who] = CapacityLimiter(self.request_class.each)
@@ -192,7 +194,7 @@ class RequestLimits:
         if request_class is None:
             yield None
             return
-        if request_class in (READ, WRITE) and is_large(scope):
+        if request_class in (READ, WRITE) and is_large_request(scope):
             # An edit or preview of hundreds of points is solved for as long as dozens of those that people draw.
             request_class = COMPUTE
         login = get_current_login(scope)

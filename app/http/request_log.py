@@ -35,12 +35,12 @@ MOST_REFUSALS = 20
 """Refused requests of one second that are told of one by one; of the others the number is told."""
 
 
-def _call_in_a_second(work: Callable[[], None]) -> None:
+def _call_after_one_second(work: Callable[[], None]) -> None:
     # What is told then is of no request alone.
     asyncio.get_running_loop().call_later(1.0, work, context=Context())
 
 
-class RefusalBound:
+class RefusalLogLimiter:
     """How many refusals the log tells of: whoever sends what is refused does not fill a disk.
 
     Args:
@@ -51,13 +51,13 @@ class RefusalBound:
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
-        later: Callable[[Callable[[], None]], Any] = _call_in_a_second,
+        later: Callable[[Callable[[], None]], Any] = _call_after_one_second,
     ):
         self._clock, self._later = clock, later
         self._began = -inf
         self._told = self._untold = 0
 
-    def admits(self) -> bool:
+    def should_log(self) -> bool:
         """Whether one more is told of; only the event loop asks."""
         if self._clock() - self._began >= 1.0:
             self._began, self._told = self._clock(), 0
@@ -109,7 +109,7 @@ class RequestLog:
 
     def __init__(self, app: ASGIApp):
         self.app = app
-        self._refusals = RefusalBound()
+        self._refusals = RefusalLogLimiter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -142,7 +142,7 @@ class RequestLog:
             if scope["method"] in SAFE_METHODS and status < 500:
                 return
             refused = 400 <= status < 500 or status == 503
-            if refused and not self._refusals.admits():
+            if refused and not self._refusals.should_log():
                 return
             log.info(
                 "request answered",

@@ -25,7 +25,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.http.problem import make_problem, problem_response
-from app.json_text import quoted
+from app.json_text import quote_text
 
 _HEAD = "touchline.head"
 _ONE_RANGE = re.compile(rb"bytes=(\d{1,18}-\d{0,18}|-\d{1,18})")
@@ -69,7 +69,7 @@ def is_head(scope: Scope) -> bool:
     return bool(scope.get(_HEAD))
 
 
-class OneLength:
+class AmbiguousLengthGuard:
     """Refuses a request that says twice how long it is: proxies differ in whom they believe."""
 
     def __init__(self, app: ASGIApp):
@@ -93,7 +93,7 @@ def _is_one_range(value: bytes) -> bool:
     return not first or not last or int(first) <= int(last)
 
 
-class OneRange:
+class SingleRangeFilter:
     """Lets one Range through; many small ones would cost more than the whole file."""
 
     def __init__(self, app: ASGIApp):
@@ -152,7 +152,7 @@ def describe_unknown_name(request: Request, location: tuple[int | str, ...]) -> 
     route = request.scope["route"]
     if place == "query":
         nearest = get_close_matches(name, _parameter_names(route), n=1)
-        return f"there is no such parameter{_meant(nearest)}"
+        return f"there is no such parameter{_suggest_nearest(nearest)}"
     by_place = _body_field_names(route)
     # Items of a list have no place of their own in a schema.
     above = tuple(str(part) for part in location[1:-1] if not isinstance(part, int))
@@ -161,23 +161,23 @@ def describe_unknown_name(request: Request, location: tuple[int | str, ...]) -> 
         known = frozenset(one for names in by_place.values() for one in names if one != name)
     nearest = get_close_matches(name, known, n=1)
     if nearest:
-        return f"there is no such field{_meant(nearest)}"
+        return f"there is no such field{_suggest_nearest(nearest)}"
     places = [f"/{'/'.join((*at, name))}" for at, names in by_place.items() if name in names]
     belongs = f", it belongs at {' or '.join(places)}" if places else ""
     here = f"; known here: {', '.join(sorted(known))}" if 0 < len(known) <= MOST_NAMED else ""
     return f"there is no such field{belongs}{here}"
 
 
-def _meant(nearest: list[str]) -> str:
+def _suggest_nearest(nearest: list[str]) -> str:
     return f"; did you mean {nearest[0]}?" if nearest else ""
 
 
 def _parameter_names(route: APIRoute) -> frozenset[str]:
-    return _names_read_by_endpoint(route.path_format, route.endpoint)
+    return _list_query_names(route.path_format, route.endpoint)
 
 
 @lru_cache(maxsize=256)
-def _names_read_by_endpoint(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
+def _list_query_names(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
     dependant = get_dependant(path=path, call=endpoint)
     found = get_flat_params(dependant)
     return frozenset(item.alias for item in found if isinstance(item.field_info, Query))
@@ -342,20 +342,20 @@ def read_json(body: bytes) -> Any:
         text = body.decode("utf-8")
     except UnicodeDecodeError:
         raise BodyError(400, "the body is not UTF-8 text") from None
-    _require_few_parts(body)
+    _require_json_size_limits(body)
     try:
         value = json.loads(
-            text, parse_constant=_refuse_constant, object_pairs_hook=_object_without_repeated_names
+            text, parse_constant=_refuse_constant, object_pairs_hook=_build_object_with_unique_keys
         )
     except ValueError as error:
         place = f" at character {error.pos}" if isinstance(error, json.JSONDecodeError) else ""
         raise BodyError(400, f"the body is not JSON{place}") from None
     if _DOUBTFUL.search(body):
-        _refuse_what_cannot_be_written(value)
+        _require_encodable(value)
     if rb"\u0000" in body and (where := _find_null_character(value)) is not None:
         raise BodyError(
             400,
-            f"the text at {quoted(where, 80)} in the body holds U+0000, which is not stored",
+            f"the text at {quote_text(where, 80)} in the body holds U+0000, which is not stored",
             hint="Leave it out.",
         )
     return value
@@ -376,9 +376,9 @@ def _find_null_character(value: object, place: str = "") -> str | None:
     return next((one for one in found if one is not None), None)
 
 
-def _require_few_parts(body: bytes) -> None:
+def _require_json_size_limits(body: bytes) -> None:
     """Count brackets and commas before anything is made of them, on text that may not be JSON."""
-    outside = _without_strings(body)
+    outside = _remove_strings(body)
     if outside.count(b",") > MAX_VALUES:
         raise BodyError(400, f"the body holds more than {MAX_VALUES} values")
     brackets = outside.translate(None, _NO_BRACKETS)
@@ -389,7 +389,7 @@ def _require_few_parts(body: bytes) -> None:
         raise BodyError(400, f"the body holds more than {MAX_CONTAINERS} lists and objects")
 
 
-def _without_strings(body: bytes) -> bytes:
+def _remove_strings(body: bytes) -> bytes:
     """What stands outside of quotes."""
     if b"\\" in body:
         return _STRINGS.sub(b"", body)
@@ -401,7 +401,7 @@ def _refuse_constant(name: str) -> NoReturn:
     raise BodyError(400, f"{name} is not a number in JSON")
 
 
-def _object_without_repeated_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _build_object_with_unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names differ: of two equal ones, readers disagree which counts."""
     if len(pairs) > MAX_NAMES:
         raise BodyError(400, f"a JSON object of the body has more than {MAX_NAMES} keys")
@@ -412,13 +412,13 @@ def _object_without_repeated_names(pairs: list[tuple[str, Any]]) -> dict[str, An
         names = Counter(name for name, _ in pairs)
         raise BodyError(
             400,
-            f"a JSON object of the body has the key {quoted(names.most_common(1)[0][0], 80)}"
+            f"a JSON object of the body has the key {quote_text(names.most_common(1)[0][0], 80)}"
             " more than once",
         )
     return found
 
 
-def _refuse_what_cannot_be_written(value: object) -> None:
+def _require_encodable(value: object) -> None:
     try:
         json.dumps(value, ensure_ascii=False, allow_nan=False).encode("utf-8")
     except UnicodeEncodeError:
@@ -458,7 +458,7 @@ def _too_large_error(most: int) -> BodyError:
     return BodyError(413, f"a request body may have at most {most} bytes")
 
 
-def require_bytes(types: list[str]) -> None:
+def require_bytes_type(types: list[str]) -> None:
     """Raise ``BodyError`` (415) unless the Content-Type is plain bytes."""
     if [kind.strip().lower() for kind in types] != [BYTES]:
         raise BodyError(415, "an upload must be plain bytes", hint=f"Send Content-Type: {BYTES}.")

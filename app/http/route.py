@@ -21,18 +21,18 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from app.features.people.logins import Login
-from app.http.access import Access, find_actor_name
+from app.http.access import AccessControl, find_actor_name
 from app.http.headers import SAFE_METHODS
-from app.http.idempotency import Idempotency, RequestDigest
+from app.http.idempotency import IdempotencyHandler, RequestDigest
 from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
-from app.http.request_limits import RequestLimits, request_class_of
+from app.http.request_limits import RequestLimits, find_request_class
 from app.http.requests import (
     BYTES,
     MAX_STRANGERS_BYTES,
     BodyError,
     read_body,
     read_json,
-    require_bytes,
+    require_bytes_type,
     require_json_type,
 )
 from app.soccer.actors import LOCAL_USER
@@ -41,7 +41,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
 @dataclass(frozen=True)
-class Gate:
+class RequestPipeline:
     """What the requests of one server share on their way.
 
     Attributes:
@@ -51,15 +51,15 @@ class Gate:
         max_json_bytes: Of a body.
     """
 
-    access: Access | None
-    idempotency: Idempotency
+    access: AccessControl | None
+    idempotency: IdempotencyHandler
     limits: RequestLimits
     max_json_bytes: int
 
 
-def get_gate(scope: Scope) -> Gate:
+def get_request_pipeline(scope: Scope) -> RequestPipeline:
     """That of the application that a request came to."""
-    gate: Gate = scope["app"].state.gate
+    gate: RequestPipeline = scope["app"].state.gate
     return gate
 
 
@@ -77,23 +77,23 @@ class Route(APIRoute):
                 f"the route {path} has no permission: add @may or @open_to_all to its function"
             )
         self.permission = permission
-        self.request_class = request_class_of(endpoint, options.get("methods") or ("GET",))
+        self.request_class = find_request_class(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
         self._takes_bytes = BYTES in content
         super().__init__(path, endpoint, **options)
 
     def get_route_handler(self) -> Handler:
         """What answers a request, all told."""
-        return partial(self._answer, super().get_route_handler())
+        return partial(self._answer_request, super().get_route_handler())
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer; a method that is not answered here is nothing that a stranger is told."""
         if self.methods and scope["method"] not in self.methods:
-            await require_somebody(scope)
+            await require_logged_in(scope)
         await super().handle(scope, receive, send)
 
-    async def _answer(self, handler: Handler, request: Request) -> Response:
-        gate, access, login = get_gate(request.scope), None, None
+    async def _answer_request(self, handler: Handler, request: Request) -> Response:
+        gate, access, login = get_request_pipeline(request.scope), None, None
         if self.permission.action is not None and (access := gate.access) is not None:
             login = await access.log_in(request.scope)
         try:
@@ -102,15 +102,15 @@ class Route(APIRoute):
                 body = await self._read_request_body(gate, request)
             if access is None or login is None:
                 return await self._answer_once_per_key(gate, request, body, handler)
-            return await self._answer_as_login(access, login, gate, request, body, handler)
+            return await self._answer_logged_in(access, login, gate, request, body, handler)
         except BodyError as error:
             return error.response()
 
-    async def _answer_as_login(
+    async def _answer_logged_in(
         self,
-        access: Access,
+        access: AccessControl,
         login: Login,
-        gate: Gate,
+        gate: RequestPipeline,
         request: Request,
         body: RequestBody,
         handler: Handler,
@@ -127,19 +127,19 @@ class Route(APIRoute):
         access.admit(scope, login)
         _replace_names_by_ids(scope, owned)
 
-        async def work(request: Request) -> Response:
+        async def answer_if_existing(request: Request) -> Response:
             await access.require_there(owned)
             return await handler(request)
 
         hidden = partial(access.is_hidden, owned)
-        response = await self._answer_once_per_key(gate, request, body, work, hidden)
+        response = await self._answer_once_per_key(gate, request, body, answer_if_existing, hidden)
         if isinstance(response, StreamingResponse) and response.media_type == "text/event-stream":
-            return access.end_when_not_allowed(response, asked, login)
+            return access.end_stream_when_not_allowed(response, asked, login)
         return response
 
     async def _answer_once_per_key(
         self,
-        gate: Gate,
+        gate: RequestPipeline,
         request: Request,
         body: RequestBody,
         handler: Handler,
@@ -156,11 +156,11 @@ class Route(APIRoute):
             request,
             digest,
             find_actor_name(request.scope, LOCAL_USER),
-            hidden or _hides_nothing,
+            hidden or _is_never_hidden,
             partial(self._answer_within_limits, gate, read, handler),
         )
 
-    async def _read_request_body(self, gate: Gate, request: Request) -> RequestBody:
+    async def _read_request_body(self, gate: RequestPipeline, request: Request) -> RequestBody:
         """The body of a request that may change something.
 
         Raises:
@@ -168,7 +168,7 @@ class Route(APIRoute):
         """
         types = request.headers.getlist("content-type")
         if self._takes_bytes:
-            require_bytes(types)
+            require_bytes_type(types)
             return RequestBody()
         most = gate.max_json_bytes
         if self.permission.action is None:
@@ -180,7 +180,7 @@ class Route(APIRoute):
         return RequestBody(sent, read_json(sent), has_value=True)
 
     async def _answer_within_limits(
-        self, gate: Gate, request: Request, handler: Handler
+        self, gate: RequestPipeline, request: Request, handler: Handler
     ) -> Response:
         async with gate.limits.admit(self.request_class, request.scope) as refusal:
             return refusal or await handler(request)
@@ -212,9 +212,9 @@ class ReadRequest(StarletteRequest):
             self._json = body.value
 
 
-async def require_somebody(scope: Scope) -> None:
+async def require_logged_in(scope: Scope) -> None:
     """Raise NotLoggedInError where a stranger asks a server of a team."""
-    access = get_gate(scope).access
+    access = get_request_pipeline(scope).access
     if access is not None:
         await access.log_in(scope)
 
@@ -227,7 +227,7 @@ async def respond_to_unknown_route(scope: Scope, receive: Receive, send: Send) -
         HTTPException: There is nothing at that address.
     """
     if scope["type"] == "http":
-        await require_somebody(scope)
+        await require_logged_in(scope)
         raise HTTPException(status_code=404)
     await WebSocketClose()(scope, receive, send)
 
@@ -254,7 +254,7 @@ def list_routes(app: FastAPI) -> Iterator[tuple[str, Route]]:
                 yield f"{method} {context.path}", context.original_route
 
 
-async def _hides_nothing() -> bool:
+async def _is_never_hidden() -> bool:
     return False
 
 

@@ -94,7 +94,7 @@ def _bind_socket(host: str, port: int) -> socket.socket:
     return server
 
 
-def run(app: FastAPI, server: socket.socket) -> None:
+def serve_application(app: FastAPI, server: socket.socket) -> None:
     """Serve until the process is told to stop."""
     Thread(target=warm_up_process, daemon=True).start()
     make_server(app).run(sockets=[server])
@@ -111,7 +111,7 @@ def warm_up_process() -> None:
     gc.set_threshold(*GC_THRESHOLDS)
 
 
-def find_connection_limit() -> int:
+def raise_connection_limit() -> int:
     """How many connections fit; the process is given as many descriptors as it may have."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = MAX_CONNECTIONS + SPARE_FILES
@@ -130,7 +130,7 @@ def make_server(app: FastAPI) -> Server:
         # The parser that bounds a head; clients that are slow with theirs are the business of the proxy.
         http="h11",
         h11_max_incomplete_event_size=HEAD_BYTES,
-        limit_concurrency=find_connection_limit(),
+        limit_concurrency=raise_connection_limit(),
         ws="none",
         # What a stranger sends must not fill the log: malformed bytes are answered, not logged.
         log_level="error",
@@ -165,7 +165,7 @@ class Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def serve_with(
+def serve_with_processes(
     count: int, part: ServeUntilStopped, settings: Settings, listening: socket.socket
 ) -> None:
     """Serve with so many processes until this one is told to stop.
@@ -177,7 +177,7 @@ def serve_with(
         listening: The socket that all of them take connections from.
     """
     arguments = (part, settings, listening)
-    with _stop_event() as stopping, _shared_metrics() as metrics:
+    with _listen_for_stop_signals() as stopping, _open_metrics_folder() as metrics:
         running = [_start_process(*arguments) for _ in range(count)]
         try:
             while not stopping.is_set():
@@ -212,7 +212,7 @@ def _stop_processes(running: list[BaseProcess]) -> None:
 
 
 @contextmanager
-def _shared_metrics() -> Iterator[str]:
+def _open_metrics_folder() -> Iterator[str]:
     """A folder in which the processes count together: ``/metrics`` of any of them adds up all.
 
     The library reads the variable when it is imported, which the processes do once they run.
@@ -226,14 +226,16 @@ def _shared_metrics() -> Iterator[str]:
 
 
 @contextmanager
-def _stop_event() -> Iterator[Event]:
+def _listen_for_stop_signals() -> Iterator[Event]:
     """Set once this process is asked to end."""
     stopping = Event()
 
-    def stop(*_: Any) -> None:
+    def set_stopping(*_: Any) -> None:
         stopping.set()
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT)}
+    before = {
+        number: signal.signal(number, set_stopping) for number in (signal.SIGTERM, signal.SIGINT)
+    }
     try:
         yield stopping
     finally:
@@ -243,7 +245,7 @@ def _stop_event() -> Iterator[Event]:
 
 def _run_process(part: ServeUntilStopped, settings: Settings, listening: socket.socket) -> None:
     """One process."""
-    Thread(target=_end_with_parent, daemon=True).start()
+    Thread(target=_terminate_with_parent, daemon=True).start()
     try:
         part(settings, listening)
     except KeyboardInterrupt:
@@ -251,7 +253,7 @@ def _run_process(part: ServeUntilStopped, settings: Settings, listening: socket.
         sys.exit(130)
 
 
-def _end_with_parent() -> None:
+def _terminate_with_parent() -> None:
     parent = parent_process()
     if parent is not None:
         parent.join()

@@ -171,16 +171,16 @@ class TeamLogin:
         """The cookies of its server."""
         return Cookies(self.secure, self.devices)
 
-    def count_try(self, request: Request, name: str | None = None) -> None:
+    def count_login_attempt(self, request: Request, name: str | None = None) -> None:
         """Count that somebody asks whether a password is right.
 
         Raises:
             TooManyTriesError: There were too many.
         """
-        device = None if name is None else self.cookies.known_device(request.scope, name)
+        device = None if name is None else self.cookies.find_known_device(request.scope, name)
         self.attempts.count_login(self.address(request), name, device)
 
-    def landing(self, request: Request) -> str:
+    def make_landing_url(self, request: Request) -> str:
         """The address to which the provider sends people back."""
         return self.base(request) + LANDING
 
@@ -227,7 +227,7 @@ class TeamLogin:
         token = self.token(request)
         return self.logins.find(token) if token else None
 
-    def login_with(self, token: str, request: Request) -> Login:
+    def find_login_by_token(self, token: str, request: Request) -> Login:
         """Who asks with a token.
 
         Raises:

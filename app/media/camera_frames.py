@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.media.files import decode_frame, read_video_times, turn_as_annotated
-from app.media.frames import file_of_frame
-from app.media.object_frames import is_stored
+from app.media.files import decode_frame, orient_as_annotated, read_video_times
+from app.media.frames import find_later_frame_file
+from app.media.object_frames import is_in_object_store
 from app.media.video import FrameReader
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
@@ -45,7 +45,7 @@ class ViewFrame:
     media: Media
 
 
-def frames_between(views: Sequence[ViewFrame], settings: Settings) -> dict[int, Media]:
+def map_frames_by_number(views: Sequence[ViewFrame], settings: Settings) -> dict[int, Media]:
     """The frames of views, and those between them that are on disk, by number.
 
     Args:
@@ -56,14 +56,16 @@ def frames_between(views: Sequence[ViewFrame], settings: Settings) -> dict[int, 
     for here, there in pairwise(views):
         gap = there.number - here.number
         if 1 < gap <= LONGEST_GAP:
-            found |= dict(_between(here, there, settings))
+            found |= dict(_find_frames_between(here, there, settings))
     return dict(sorted(found.items()))
 
 
-def _between(here: ViewFrame, there: ViewFrame, settings: Settings) -> Iterator[tuple[int, Media]]:
+def _find_frames_between(
+    here: ViewFrame, there: ViewFrame, settings: Settings
+) -> Iterator[tuple[int, Media]]:
     """Those between two views; none of a store, which would have to be asked for each."""
     media, gap = here.media, there.number - here.number
-    if is_stored(media):
+    if is_in_object_store(media):
         return
     if media.frame is not None:
         # Another rate of numbers than of frames leaves it open which frame is which.
@@ -72,7 +74,7 @@ def _between(here: ViewFrame, there: ViewFrame, settings: Settings) -> Iterator[
                 yield here.number + off, replace(media, frame=media.frame + off)
         return
     for off in range(1, gap):
-        between = file_of_frame(media, here.group, static=True, later=off)
+        between = find_later_frame_file(media, here.group, static=True, later=off)
         if between is not None:
             yield here.number + off, between
 
@@ -108,47 +110,47 @@ class CameraFrames:
             back = number + 1 in self._kept and self._media[number].frame is not None
             for each in range(number - BEHIND + 1 if back else number, number):
                 if each in self._media:
-                    self._try(each)
-            self._keep(number, self._decode(number))
+                    self._decode_and_cache(each)
+            self._cache_frame(number, self._decode_by_number(number))
         return self._kept[number]
 
     def read_or_none(self, number: int) -> Image | None:
         """The same; None where it cannot be read."""
-        return self._attempt(self.read, number)
+        return self._call_or_none(self.read, number)
 
     def close(self) -> None:
         """Close the videos."""
         for reader, _ in self._readers.values():
             reader.close()
 
-    def _try(self, number: int) -> None:
-        picture = self._attempt(self._decode, number)
+    def _decode_and_cache(self, number: int) -> None:
+        picture = self._call_or_none(self._decode_by_number, number)
         if picture is not None:
-            self._keep(number, picture)
+            self._cache_frame(number, picture)
 
     @staticmethod
-    def _attempt(read: Callable[[int], Image], number: int) -> Image | None:
+    def _call_or_none(read: Callable[[int], Image], number: int) -> Image | None:
         try:
             return read(number)
         except (NotFoundError, ImageError, StorageError, TooLargeError):
             return None
 
-    def _keep(self, number: int, picture: Image) -> None:
+    def _cache_frame(self, number: int, picture: Image) -> None:
         self._kept[number] = picture
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
 
-    def _decode(self, number: int) -> Image:
+    def _decode_by_number(self, number: int) -> Image:
         media = self._media[number]
         if media.frame is None:
             picture = decode_frame(media, self._flipped, self._settings)
         else:
-            found = self._video(media).read(media.frame)
+            found = self._get_video_reader(media).read(media.frame)
             if found is None:
                 raise NotFoundError(
                     f"frame {media.frame} of {Path(media.path).name} cannot be decoded"
                 )
-            picture = turn_as_annotated(found, self._flipped)
+            picture = orient_as_annotated(found, self._flipped)
         size = self._size.width, self._size.height
         if picture.shape[1::-1] == size:
             return picture
@@ -156,7 +158,7 @@ class CameraFrames:
         how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
         return np.asarray(cv2.resize(picture, size, interpolation=how), np.uint8)
 
-    def _video(self, media: Media) -> FrameReader:
+    def _get_video_reader(self, media: Media) -> FrameReader:
         """What reads the frames of a video, which has this one."""
         if media.path not in self._readers:
             times = read_video_times(media, self._settings)

@@ -18,10 +18,10 @@ import numpy.typing as npt
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
-from app.media.object_frames import ArchiveMembers, is_stored, read_object
-from app.media.video import Times, make_index, open_video, read_frame_at, read_kept_index
+from app.media.object_frames import ArchiveMembers, is_in_object_store, read_object
+from app.media.video import Times, make_index, open_video, read_cached_index, read_frame_at
 from app.object_store.path import unseal_address
 from app.soccer.group import Media
 from app.wording import plural
@@ -58,7 +58,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
-    _require_contained(media, settings)
+    _require_inside_root(media, settings)
     if media.frame is None and width is None and not flipped:
         data, name = _read_source(media, settings), describe_frame(media)
         if read_header(data, name).orientation == 1:
@@ -92,21 +92,21 @@ def read_pixels(
     Raises:
         NotFoundError, ImageError, TooLargeError: As ``read_frame`` does.
     """
-    _require_contained(media, settings)
+    _require_inside_root(media, settings)
     if media.frame is not None:
-        picture = _video_frame(media, settings)
-        digest = digest_of(np.ascontiguousarray(picture).tobytes())
+        picture = _read_video_frame(media, settings)
+        digest = digest_content(np.ascontiguousarray(picture).tobytes())
     else:
         data, name = _read_source(media, settings), describe_frame(media)
-        digest = digest_of(data)
+        digest = digest_content(data)
         if read_header(data, name).orientation != 1:
             # What was once read of the stored pixels, under the plain digest, is read again.
-            digest = digest_of(f"{digest} upright".encode())
+            digest = digest_content(f"{digest} upright".encode())
         if digest != known:
             picture = _decode_pixels(data, settings, name)
     if digest == known:
         return digest, None
-    return digest, turn_as_annotated(picture, flipped)
+    return digest, orient_as_annotated(picture, flipped)
 
 
 def read_cached_frame(
@@ -130,7 +130,7 @@ def make_frame_stamp(media: Media) -> str:
     Raises:
         NotFoundError: The file is not there.
     """
-    if is_stored(media):
+    if is_in_object_store(media):
         return repr((media.path, media.member))
     status = _require_regular_file(Path(media.path))
     place = (media.path, media.member, media.frame)
@@ -151,14 +151,14 @@ def read_picture_header(media: Media) -> ImageHeader | None:
 
     None where it lies in an object store, cannot be read, or says nothing there.
     """
-    if is_stored(media):
+    if is_in_object_store(media):
         return None
     try:
         if media.frame is not None:
-            return _video_header(Path(media.path))
+            return _read_video_header(Path(media.path))
         for count in _HEADS:
             with contextlib.suppress(ImageError):
-                return read_header(_read_head(media, count))
+                return read_header(_read_first_bytes(media, count))
     except (NotFoundError, ImageError, StorageError):
         pass
     return None
@@ -187,12 +187,12 @@ def read_video_times(
         ImageError: It is not a video that can be read.
         TooLargeError: It is larger than the limits, in pixels or frames.
     """
-    _require_contained(media, settings)
+    _require_inside_root(media, settings)
     path, stamp = Path(media.path), make_video_stamp(media)
-    known = read_kept_index(stamp, settings)
+    known = read_cached_index(stamp, settings)
     if known is not None:
         return known
-    check_size(_video_header(path), settings, path.name)
+    check_size(_read_video_header(path), settings, path.name)
     return make_index(path, stamp, settings, tell)
 
 
@@ -217,7 +217,7 @@ def has_index(media: Media, settings: Settings) -> bool:
     Raises:
         NotFoundError: The video is not there.
     """
-    return read_kept_index(make_video_stamp(media), settings) is not None
+    return read_cached_index(make_video_stamp(media), settings) is not None
 
 
 def make_video_stamp(media: Media) -> str:
@@ -234,7 +234,7 @@ def read_media_facts(media: Media) -> dict[str, int]:
 
     Empty, too, of a frame in an object store: it is known by its address.
     """
-    if is_stored(media):
+    if is_in_object_store(media):
         return {}
     try:
         status = _require_regular_file(Path(media.path))
@@ -259,12 +259,12 @@ def has_member(media: Media, member: str) -> bool:
 
 def _decode_frame(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
-        return _video_frame(media, settings)
+        return _read_video_frame(media, settings)
     return _decode_pixels(_read_source(media, settings), settings, describe_frame(media))
 
 
 def _read_source(media: Media, settings: Settings) -> bytes:
-    if is_stored(media):
+    if is_in_object_store(media):
         return read_object(media, settings)
     path = Path(media.path)
     size = _require_regular_file(path).st_size
@@ -275,7 +275,7 @@ def _read_source(media: Media, settings: Settings) -> bytes:
     return _read_file(path, size)
 
 
-def _read_head(media: Media, count: int) -> bytes:
+def _read_first_bytes(media: Media, count: int) -> bytes:
     path = Path(media.path)
     _require_regular_file(path)
     if media.member is not None:
@@ -304,11 +304,11 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
-    _require_contained(media, settings)
-    return turn_as_annotated(_decode_frame(media, settings), flipped)
+    _require_inside_root(media, settings)
+    return orient_as_annotated(_decode_frame(media, settings), flipped)
 
 
-def turn_as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
+def orient_as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
     """Red green blue, and turned right where it is mirrored."""
     return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
 
@@ -373,7 +373,7 @@ def _require_declared_size(picture: Any, header: ImageHeader, name: str) -> None
         raise ImageError(f"{name} is not of the size that its header declares")
 
 
-def _video_frame(media: Media, settings: Settings) -> Any:
+def _read_video_frame(media: Media, settings: Settings) -> Any:
     path, number = Path(media.path), media.frame or 0
     times = read_video_times(media, settings)
     if not 0 <= number < len(times):
@@ -389,7 +389,7 @@ def _video_frame(media: Media, settings: Settings) -> Any:
     return picture
 
 
-def _video_header(path: Path) -> ImageHeader:
+def _read_video_header(path: Path) -> ImageHeader:
     _require_regular_file(path)
     with open_video(path) as video:
         if not video.isOpened():
@@ -439,9 +439,9 @@ def _require_regular_file(path: Path) -> os.stat_result:
     return status
 
 
-def _require_contained(media: Media, settings: Settings) -> None:
+def _require_inside_root(media: Media, settings: Settings) -> None:
     """Refuse a file that a folder on its way, swapped for a link, leads out of its root."""
-    if is_stored(media):
+    if is_in_object_store(media):
         return
     path = Path(media.path)
     for root in (settings.home, *settings.import_folders):

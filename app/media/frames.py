@@ -27,7 +27,7 @@ from app.errors import (
     StorageError,
     TooLargeError,
 )
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.media.files import (
     describe_frame,
     guess_content_type,
@@ -40,7 +40,7 @@ from app.media.files import (
     read_video_times,
 )
 from app.media.images import JPEG
-from app.media.object_frames import fetch_frame, is_kept, is_stored
+from app.media.object_frames import fetch_frame, is_cached, is_in_object_store
 from app.media.video import Times, get_remembered_index, remember_index
 from app.progress import ReportProgress
 from app.soccer.group import FARTHEST, Media, split_frame_number
@@ -61,36 +61,40 @@ def find_neighbouring_frames(
 
     None of a frame in an object store, which would have to be asked for each.
     """
-    if is_stored(media):
+    if is_in_object_store(media):
         return {}
     try:
         if media.frame is not None:
             return dict(
-                _neighbours_in_video(media, media.frame, len(read_video_times(media, settings)))
+                _find_neighbours_in_video(
+                    media, media.frame, len(read_video_times(media, settings))
+                )
             )
-        return dict(_neighbours_among_files(media, group, static))
+        return dict(_find_neighbours_among_files(media, group, static))
     except (NotFoundError, ImageError, StorageError, TooLargeError):
         return {}
 
 
-def _neighbour_offsets() -> Iterator[int]:
+def _list_neighbour_offsets() -> Iterator[int]:
     return (offset for offset in range(-FARTHEST, FARTHEST + 1) if offset)
 
 
-def _neighbours_in_video(media: Media, frame: int, count: int) -> Iterator[tuple[int, Media]]:
-    for offset in _neighbour_offsets():
+def _find_neighbours_in_video(media: Media, frame: int, count: int) -> Iterator[tuple[int, Media]]:
+    for offset in _list_neighbour_offsets():
         if 0 <= frame + offset < count:
             yield offset, replace(media, frame=frame + offset)
 
 
-def _neighbours_among_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
-    for offset in _neighbour_offsets():
-        there = file_of_frame(media, group, static=static, later=offset)
+def _find_neighbours_among_files(
+    media: Media, group: str, static: bool
+) -> Iterator[tuple[int, Media]]:
+    for offset in _list_neighbour_offsets():
+        there = find_later_frame_file(media, group, static=static, later=offset)
         if there is not None:
             yield offset, there
 
 
-def file_of_frame(media: Media, group: str, *, static: bool, later: int) -> Media | None:
+def find_later_frame_file(media: Media, group: str, *, static: bool, later: int) -> Media | None:
     """The file of a frame so many frames later than another one's; None where there is none."""
     found = split_frame_number(media, group, static)
     number = -1 if found is None else int(found[2]) + later
@@ -99,13 +103,13 @@ def file_of_frame(media: Media, group: str, *, static: bool, later: int) -> Medi
     name, head, digits = found
     # 100 may follow 099 or 99.
     for text in dict.fromkeys((f"{number:0{len(digits)}d}", str(number))):
-        there = _existing_neighbour(media, str(name.with_name(f"{head}{text}{name.suffix}")))
+        there = _find_neighbour_file(media, str(name.with_name(f"{head}{text}{name.suffix}")))
         if there is not None:
             return there
     return None
 
 
-def _existing_neighbour(media: Media, name: str) -> Media | None:
+def _find_neighbour_file(media: Media, name: str) -> Media | None:
     """The neighbour of that name, in the same folder or archive, if it is one."""
     if media.member is not None:
         return replace(media, member=name) if has_member(media, name) else None
@@ -141,7 +145,7 @@ Whatever else ends a process is the machine's doing, and the frame is tried agai
 
 
 @dataclass(frozen=True)
-class SentPicture:
+class EncodedPicture:
     """A frame as it is sent.
 
     Attributes:
@@ -155,12 +159,12 @@ class SentPicture:
     digest: str
 
     @staticmethod
-    def of(kind: str, data: bytes) -> SentPicture:
+    def of(kind: str, data: bytes) -> EncodedPicture:
         """The picture of these bytes."""
-        return SentPicture(kind, data, digest_of(data))
+        return EncodedPicture(kind, data, digest_content(data))
 
 
-class Frames:
+class FrameProvider:
     """Makes pictures; few at once, and none that nobody waits for."""
 
     def __init__(self, settings: Settings):
@@ -176,9 +180,9 @@ class Frames:
 
     def warm(self) -> None:
         """Start a process before anybody waits for it."""
-        self._pool.submit(load_libraries, bounded=False)
+        self._pool.submit(preload_libraries, bounded=False)
 
-    def cached(self, media: Media, width: int | None, flipped: bool) -> SentPicture | None:
+    def cached(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture | None:
         """What was made before, where it is kept.
 
         Raises:
@@ -187,7 +191,7 @@ class Frames:
         """
         self._require_not_refused(media)
         data = read_cached_frame(media, width, flipped, self._settings)
-        return None if data is None else SentPicture.of(JPEG, data)
+        return None if data is None else EncodedPicture.of(JPEG, data)
 
     def request_fetch(self, media: Media) -> PoolTask | None:
         """Have a frame made ready; None where it is: one of a store is brought to this disk, and
@@ -208,7 +212,7 @@ class Frames:
         """
         return self._submit_picture(media, width, flipped, bounded=True)
 
-    def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
+    def read(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture:
         """A picture, waited for however many others wait: for background work."""
         found = self.cached(media, width, flipped)
         if found is not None:
@@ -216,7 +220,7 @@ class Frames:
         fetching = self._submit_fetch(media, bounded=False)
         if fetching is not None:
             fetching.future.result()
-        made: SentPicture = self._submit_picture(
+        made: EncodedPicture = self._submit_picture(
             media, width, flipped, bounded=False
         ).future.result()
         return made
@@ -229,7 +233,7 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        work = self._videos.with_index(
+        work = self._videos.wrap_with_index(
             media, find_neighbouring_frames, media, group, static, self._settings
         )
         return self._pool.submit(*work)
@@ -253,7 +257,7 @@ class Frames:
         """
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return picture_error_of_ended_process(describe_frame(media), error)
+            return make_picture_error(describe_frame(media), error)
 
         return self._submit_read(
             media, work, media, flipped, self._settings, *arguments, explain=explain
@@ -286,7 +290,7 @@ class Frames:
         def submit(bounded: bool) -> PoolTask:
             call = (work, *arguments)
             if media is not None:
-                call = self._videos.with_index(media, *call)
+                call = self._videos.wrap_with_index(media, *call)
             return self._readers.submit(*call, explain=explain, bounded=bounded)
 
         indexing = None
@@ -298,7 +302,7 @@ class Frames:
             return submit(bounded=True)
         waiting = PoolTask(explain)
 
-        def go_on(done: Future[Any]) -> None:
+        def continue_after_index(done: Future[Any]) -> None:
             if waiting.future.cancelled():
                 return
             error = None if done.cancelled() else done.exception()
@@ -312,13 +316,13 @@ class Frames:
             )
             reading.future.add_done_callback(partial(_forward_result, waiting.future))
 
-        indexing.future.add_done_callback(go_on)
+        indexing.future.add_done_callback(continue_after_index)
         return waiting
 
     def _submit_fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
         if media.frame is not None:
             return self._videos.ask(media, bounded=bounded)
-        if not is_stored(media) or is_kept(media, self._settings):
+        if not is_in_object_store(media) or is_cached(media, self._settings):
             return None
 
         def explain(error: WorkerEnded) -> ReviewError:
@@ -332,12 +336,14 @@ class Frames:
         self, media: Media, width: int | None, flipped: bool, *, bounded: bool
     ) -> PoolTask:
         def explain(error: WorkerEnded) -> ReviewError:
-            refusal = picture_error_of_ended_process(describe_frame(media), error)
+            refusal = make_picture_error(describe_frame(media), error)
             if error.reason in REMEMBERED_SECONDS:
                 self._remember_refusal(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
 
-        work = self._videos.with_index(media, make_picture, media, width, flipped, self._settings)
+        work = self._videos.wrap_with_index(
+            media, make_picture, media, width, flipped, self._settings
+        )
         return self._pool.submit(
             *work,
             explain=explain,
@@ -383,7 +389,7 @@ class VideoIndexer:
             return None
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return picture_error_of_ended_process(describe_frame(replace(media, frame=None)), error)
+            return make_picture_error(describe_frame(replace(media, frame=None)), error)
 
         with self._lock:
             running = self._running.get(media.path)
@@ -423,7 +429,7 @@ class VideoIndexer:
                 if progress is not None and media is not None:
                     progress(done, total, f"Finding the frames of {Path(media.path).name}.")
 
-    def with_index(
+    def wrap_with_index(
         self, media: Media, work: Callable[..., Any], *arguments: Any
     ) -> tuple[Callable[..., Any], *tuple[Any, ...]]:
         """What to call in a process for ``work(*arguments)``, which reads a frame.
@@ -466,7 +472,7 @@ def _forward_result(waiting: Future[Any], done: Future[Any]) -> None:
             waiting.set_exception(error)
 
 
-def picture_error_of_ended_process(name: str, error: WorkerEnded) -> ReviewError:
+def make_picture_error(name: str, error: WorkerEnded) -> ReviewError:
     """What the end of a process over a picture says: of the picture, or of the machine."""
     if error.reason in ("killed", "terminated"):
         more = " Where it happens often, give more memory." if error.reason == "killed" else ""
@@ -475,10 +481,12 @@ def picture_error_of_ended_process(name: str, error: WorkerEnded) -> ReviewError
     return kind(f"{name} {error}")
 
 
-def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> SentPicture:
+def make_picture(
+    media: Media, width: int | None, flipped: bool, settings: Settings
+) -> EncodedPicture:
     """A picture, made in this process."""
     data = read_frame(media, width, flipped, settings)
-    return SentPicture.of(guess_content_type(data), data)
+    return EncodedPicture.of(guess_content_type(data), data)
 
 
 def index_video(media: Media, settings: Settings) -> tuple[str, Times | None]:
@@ -495,5 +503,5 @@ def with_index(stamp: str, times: Times, work: Callable[..., Any], *arguments: A
     return work(*arguments)
 
 
-def load_libraries() -> None:
+def preload_libraries() -> None:
     """What a process does that shall only be there: it has loaded what it needs."""

@@ -75,13 +75,13 @@ def read_header(data: bytes, name: str = "the image") -> ImageHeader:
         known = data.startswith((b"\xff\xd8\xff", b"\x89PNG", b"RIFF"))
         problem = "is damaged in its header" if known else "is no JPEG, PNG or WebP image"
         raise ImageError(f"{name} {problem}") from error
-    orientation = _exif_orientation(exif)
+    orientation = _read_exif_orientation(exif)
     if orientation in SIDEWAYS:
         width, height = height, width
     return ImageHeader(kind, width, height, orientation)
 
 
-def _exif_orientation(exif: bytes) -> int:
+def _read_exif_orientation(exif: bytes) -> int:
     """The orientation that a block of EXIF declares; 1 where it declares none that counts."""
     tiff = exif.removeprefix(b"Exif\0\0")
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(tiff[:4])
@@ -123,13 +123,13 @@ def check_scans(data: bytes, name: str = "the image") -> None:
     Raises:
         TooLargeError: It has more than ``MAX_SCANS`` scans.
     """
-    if next(islice(_jpeg_scan_offsets(data), MAX_SCANS, None), None) is not None:
+    if next(islice(_find_jpeg_scans(data), MAX_SCANS, None), None) is not None:
         raise TooLargeError(
             f"{name} is drawn in more than {MAX_SCANS} scans; progressive pictures have about 10"
         )
 
 
-def _jpeg_scan_offsets(data: bytes) -> Iterator[int]:
+def _find_jpeg_scans(data: bytes) -> Iterator[int]:
     """Where each scan of a JPEG begins, as a decoder comes by them."""
     place = 0
     while (found := _MARKER.search(data, place)) is not None and found[1] != _END:

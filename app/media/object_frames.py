@@ -17,7 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from app.config import Settings
-from app.db.locks import lock_within
+from app.db.locks import try_to_lock
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.path import StoredPath, is_address, split_address, unseal_address
@@ -136,7 +136,7 @@ def _open_nested_archive(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile
 
 def _archive_key(path: _Place) -> _Key:
     if isinstance(path, StoredPath):
-        return path.sealed(), 0, path.size, ""
+        return path.make_sealed_address(), 0, path.size, ""
     try:
         status = path.stat()
     except OSError as error:
@@ -157,14 +157,14 @@ PATIENCE_S = 5.0
 CHANGED_HINT = "Import it again to take the new one, or put the old one back."
 
 
-def is_stored(media: Media) -> bool:
+def is_in_object_store(media: Media) -> bool:
     """Whether a frame lies in an object store."""
     return is_address(media.path)
 
 
-def is_kept(media: Media, settings: Settings) -> bool:
+def is_cached(media: Media, settings: Settings) -> bool:
     """Whether a frame of an object store is on this disk already."""
-    return _cache_of_settings(settings).has(_cache_name(media))
+    return _get_cache(settings).has(_cache_name(media))
 
 
 def fetch_frame(media: Media, settings: Settings) -> bool:
@@ -186,7 +186,7 @@ def read_object(media: Media, settings: Settings) -> bytes:
     Raises:
         As ``fetch_frame``.
     """
-    cache, name = _cache_of_settings(settings), _cache_name(media)
+    cache, name = _get_cache(settings), _cache_name(media)
     data = cache.get(name)
     if data is None:
         data = _fetch_object(media, settings)
@@ -205,11 +205,11 @@ def _fetch_object(media: Media, settings: Settings) -> bytes:
         if etag:
             raise
         # The zip is another than that whose list is known here; its member may be the same.
-        _stored_zip.cache_clear()
+        _open_stored_zip.cache_clear()
         data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:
         raise ChangedObjectError(
-            f"{_address_text(address, media)} has changed: its SHA-256 differs from that of"
+            f"{_describe_address(address, media)} has changed: its SHA-256 differs from that of"
             " the imported frame",
             hint=CHANGED_HINT,
         )
@@ -222,7 +222,7 @@ def _read_object_or_member(
     limit = settings.max_file_bytes
     if member is None:
         return store.read_whole(key, limit, etag)[0]
-    path = _stored_zip(store, key, etag)
+    path = _open_stored_zip(store, key, etag)
     if etag and path.stored is not None and path.stored.etag != etag:
         raise ChangedObjectError(
             f"{path} was changed in its store since it was imported", hint=CHANGED_HINT
@@ -231,12 +231,12 @@ def _read_object_or_member(
 
 
 @lru_cache(maxsize=256)
-def _stored_zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
+def _open_stored_zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
     """A zip in a store, as it was when it was first asked for here."""
     return StoredPath(store.name, store.settings, key, store.head(key))
 
 
-def _address_text(address: str, media: Media) -> str:
+def _describe_address(address: str, media: Media) -> str:
     return address if media.member is None else f"{address}/{media.member}"
 
 
@@ -244,7 +244,7 @@ def _cache_name(media: Media) -> str:
     return repr((media.path, media.member))
 
 
-def _cache_of_settings(settings: Settings) -> ObjectCache:
+def _get_cache(settings: Settings) -> ObjectCache:
     return _open_cache(settings.cache / "objects", settings.store_cache_bytes)
 
 
@@ -271,7 +271,7 @@ class ObjectCache:
 
     def get(self, name: str) -> bytes | None:
         """What is kept under a name, whole, or None; it is the newest then."""
-        place = self._place(name)
+        place = self._file_path(name)
         try:
             content = place.read_bytes()
         except OSError:
@@ -286,13 +286,13 @@ class ObjectCache:
 
     def has(self, name: str) -> bool:
         """Whether something is kept under a name; ``get`` may find that it is damaged."""
-        return self._place(name).exists()
+        return self._file_path(name).exists()
 
     def put(self, name: str, data: bytes) -> None:
         """Keep bytes under a name; a full disk costs the cache and nothing else."""
         if len(data) > self._room * (1 - KEPT):
             return
-        place = self._place(name)
+        place = self._file_path(name)
         with contextlib.suppress(OSError):
             place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             replace_file(place, hashlib.sha256(data).digest() + data, durable=False)
@@ -300,14 +300,14 @@ class ObjectCache:
         if self._written > self._room / LOOKS:
             self._written = 0
             with contextlib.suppress(OSError):
-                self._make_room()
+                self._evict_oldest()
 
-    def _make_room(self) -> None:
+    def _evict_oldest(self) -> None:
         """Delete what was not asked for longest; one process at a time."""
-        with self._exclusive() as mine:
+        with self._try_exclusive_lock() as mine:
             if not mine:
                 return
-            found = sorted(self._files())
+            found = sorted(self._list_files())
             total = sum(size for _, size, _ in found)
             for _, size, path in found:
                 if total <= self._room * KEPT:
@@ -315,7 +315,7 @@ class ObjectCache:
                 path.unlink(missing_ok=True)
                 total -= size
 
-    def _files(self) -> Iterator[tuple[int, int, Path]]:
+    def _list_files(self) -> Iterator[tuple[int, int, Path]]:
         for folder, _, names in os.walk(self._folder):
             for path in (Path(folder, name) for name in names):
                 with contextlib.suppress(OSError):
@@ -323,14 +323,14 @@ class ObjectCache:
                     yield status.st_mtime_ns, status.st_size, path
 
     @contextlib.contextmanager
-    def _exclusive(self) -> Iterator[bool]:
+    def _try_exclusive_lock(self) -> Iterator[bool]:
         """Whether no other makes room any more: what was written meanwhile counts, too."""
         handle = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
         try:
-            yield lock_within(handle, PATIENCE_S)
+            yield try_to_lock(handle, PATIENCE_S)
         finally:
             os.close(handle)
 
-    def _place(self, name: str) -> Path:
+    def _file_path(self, name: str) -> Path:
         digest = hashlib.sha256(name.encode()).hexdigest()
         return self._folder / digest[:2] / digest[2:34]

@@ -123,7 +123,7 @@ def get_remembered_index(stamp: str) -> Times | None:
     return _REMEMBERED.get(stamp)
 
 
-def read_kept_index(stamp: str, settings: Settings) -> Times | None:
+def read_cached_index(stamp: str, settings: Settings) -> Times | None:
     """The index of a video that was decoded before; None where there is none."""
     if (remembered := get_remembered_index(stamp)) is not None:
         return remembered
@@ -183,15 +183,15 @@ class FrameReader:
         """
         self._sought = None
         if self._video is not None and self._next <= number <= self._next + _MARGINS[0]:
-            if self._advance(number):
+            if self._decode_up_to(number):
                 return _retrieve_frame(self._video)
         elif number > _MARGINS[0]:
-            for start in self._starts(number):
-                if self._jump(start, number):
+            for start in self._list_seek_starts(number):
+                if self._seek_to_frame(start, number):
                     return _retrieve_frame(self._video)
         # Opened anew: sent back to its start, a decoder may land behind the first frame.
         self.close()
-        video = self._opened()
+        video = self._ensure_open()
         while self._next <= number:
             if grab_next_frame(video) is None:
                 self.close()
@@ -199,7 +199,7 @@ class FrameReader:
             self._next += 1
         return _retrieve_frame(video)
 
-    def move_closer(self, number: int, most: int) -> bool:
+    def approach_frame(self, number: int, most: int) -> bool:
         """Come nearer to a frame, by a jump or by so many frames at most: between two steps others may be asked for.
 
         Returns:
@@ -212,16 +212,18 @@ class FrameReader:
         if self._sought != number and not near:
             if number <= _MARGINS[0]:
                 return True
-            if not any(self._land(start, number) for start in self._starts(number)):
+            if not any(
+                self._seek_near_frame(start, number) for start in self._list_seek_starts(number)
+            ):
                 self.close()
                 return True
         self._sought = number
         # That frame itself is left to ``read``.
         if self._next + most < number:
-            if self._advance(self._next + most - 1):
+            if self._decode_up_to(self._next + most - 1):
                 return False
             self.close()
-        elif self._next < number and not self._advance(number - 1):
+        elif self._next < number and not self._decode_up_to(number - 1):
             self.close()
         self._sought = None
         return True
@@ -233,50 +235,50 @@ class FrameReader:
         self._next += 1
         return True
 
-    def _opened(self) -> cv2.VideoCapture:
+    def _ensure_open(self) -> cv2.VideoCapture:
         if self._video is None:
             self._opening = ExitStack()
             self._video = self._opening.enter_context(_open_video(self._path))
             self._next = 0
         return self._video
 
-    def _key_before(self, number: int, keys: npt.NDArray[np.int64]) -> int:
+    def _find_key_frame_before(self, number: int, keys: npt.NDArray[np.int64]) -> int:
         return int(keys[max(int(np.searchsorted(keys, number, "right")) - 1, 0)])
 
-    def _starts(self, number: int) -> list[int]:
+    def _list_seek_starts(self, number: int) -> list[int]:
         """Frames to jump to on the way to another one, the nearest first."""
-        nearest = number if self._keys is None else self._key_before(number, self._keys)
+        nearest = number if self._keys is None else self._find_key_frame_before(number, self._keys)
         starts = [nearest - margin for margin in _MARGINS if nearest > margin]
         return starts if self._keys is None or nearest == number else [nearest, *starts]
 
-    def _jump(self, start: int, number: int) -> bool:
+    def _seek_to_frame(self, start: int, number: int) -> bool:
         """Go to a frame from about another one; whether every frame on the way came when it should."""
-        return self._land(start, number) and self._advance(number)
+        return self._seek_near_frame(start, number) and self._decode_up_to(number)
 
-    def _land(self, start: int, number: int) -> bool:
+    def _seek_near_frame(self, start: int, number: int) -> bool:
         """Go to about a frame on the way to another one; whether it is known which one this is."""
-        video = self._opened()
+        video = self._ensure_open()
         video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
         if grab_next_frame(video) is None:
             return False
-        places = np.flatnonzero(_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
+        places = np.flatnonzero(_is_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
         # Where the jump led too far, or two frames have one time, nothing says which one this is.
         if len(places) != 1:
             return False
         place, latest = int(places[0]), number - _MARGINS[0] // 2
         if self._keys is not None:
-            latest = self._key_before(number, self._keys)
+            latest = self._find_key_frame_before(number, self._keys)
         if place > latest:
             return False
         self._next = place + 1
         return True
 
-    def _advance(self, number: int) -> bool:
+    def _decode_up_to(self, number: int) -> bool:
         """Decode on to a frame; whether every frame on the way came when it should."""
-        video = self._opened()
+        video = self._ensure_open()
         while self._next <= number:
             gone = grab_next_frame(video) is None
-            if gone or not _same_time(self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)):
+            if gone or not _is_same_time(self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)):
                 return False
             self._next += 1
         return True
@@ -290,7 +292,7 @@ def _open_video(path: Path) -> Iterator[cv2.VideoCapture]:
         yield video
 
 
-def _same_time(time: Any, other: float) -> Any:
+def _is_same_time(time: Any, other: float) -> Any:
     """Whether times are the same, in milliseconds; an index may keep them as fractions."""
     return np.abs(time - other) < _SAME_TIME
 

@@ -13,7 +13,13 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from app.errors import InputError, NotFoundError
-from app.object_store.store import SCHEME, ObjectStore, StoredObject, open_configured, open_store
+from app.object_store.store import (
+    SCHEME,
+    ObjectStore,
+    StoredObject,
+    open_configured_store,
+    open_store,
+)
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings
@@ -78,7 +84,7 @@ class StoredPath:
     @property
     def store(self) -> ObjectStore:
         """Where it lies."""
-        return open_configured(self.store_name, self.settings)
+        return open_configured_store(self.store_name, self.settings)
 
     @property
     def name(self) -> str:
@@ -123,11 +129,11 @@ class StoredPath:
         """An object of the same store."""
         return StoredPath(self.store_name, self.settings, stored.key, stored)
 
-    def reads(self, ahead: int = AHEAD) -> RangeReads:
+    def reads(self, ahead: int = AHEAD) -> RangeReader:
         """Begin to read the object in ranges."""
-        return RangeReads(self, ahead)
+        return RangeReader(self, ahead)
 
-    def sealed(self) -> str:
+    def make_sealed_address(self) -> str:
         """Address of the object with what its content is called: another content is not it."""
         assert self.stored is not None
         return seal_address(str(self), self.stored.etag)
@@ -171,7 +177,7 @@ def resolve_target_path(settings: Settings, address: str) -> StoredPath:
     return StoredPath(name, open_store(settings, name).settings, key)
 
 
-class RangeReads:
+class RangeReader:
     """An object read in ranges; nothing between them is fetched.
 
     Args:

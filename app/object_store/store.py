@@ -114,7 +114,7 @@ class ObjectStore:
             StorageError: The store cannot be asked.
         """
         with self._translated(key):
-            return _stored_from_metadata(self._engine.head(self._store, key))
+            return _make_stored_object(self._engine.head(self._store, key))
 
     def read(self, key: str, start: int, end: int, etag: str) -> bytes:
         """Some bytes of an object, as long as it is the one that was meant.
@@ -144,7 +144,7 @@ class ObjectStore:
         """
         with self._translated(key):
             answer = self._engine.get(self._store, key, options={"if_match": etag} if etag else {})
-            found = _stored_from_metadata(answer.meta)
+            found = _make_stored_object(answer.meta)
             if found.size > limit:
                 raise TooLargeError(f"{self.address(key)} is larger than {limit:,} bytes")
             data = bytes(answer.bytes())
@@ -160,7 +160,7 @@ class ObjectStore:
         """
         with self._translated(folder):
             for some in self._engine.list(self._store, folder or None, chunk_size=LISTED):
-                yield from map(_stored_from_metadata, some)
+                yield from map(_make_stored_object, some)
 
     def folder(self, folder: str) -> tuple[list[str], list[StoredObject]]:
         """Names of folders in a folder, and the objects in it.
@@ -171,7 +171,7 @@ class ObjectStore:
         with self._translated(folder):
             found = self._engine.list_with_delimiter(self._store, folder or None)
         names = [prefix.rsplit("/", 1)[-1] for prefix in found["common_prefixes"]]
-        return names, [_stored_from_metadata(item) for item in found["objects"]]
+        return names, [_make_stored_object(item) for item in found["objects"]]
 
     def put(self, key: str, content: bytes) -> None:
         """Write an object, whole or not at all.
@@ -242,7 +242,7 @@ class _ObjectWriter:
         """Nothing: a part that is too small would be refused."""
 
 
-def _stored_from_metadata(meta: Any) -> StoredObject:
+def _make_stored_object(meta: Any) -> StoredObject:
     return StoredObject(meta["path"], meta["size"], meta["e_tag"] or "")
 
 
@@ -271,10 +271,10 @@ def open_store(settings: Settings, name: str) -> ObjectStore:
             f'there is no store "{name[:63]}"',
             hint="The operator names stores in TOUCHLINE_STORES.",
         )
-    return open_configured(name, found)
+    return open_configured_store(name, found)
 
 
-def open_configured(name: str, settings: StoreSettings) -> ObjectStore:
+def open_configured_store(name: str, settings: StoreSettings) -> ObjectStore:
     """The store that is described so, with the keys that hold now.
 
     Raises:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.paint.ridges import Strength, find_line_like
+from app.paint.ridges import Strength, find_line_like_pixels
 from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
 
@@ -59,14 +59,14 @@ def measure_agreement(
     Args:
         camera: In pixels of the picture.
         field: The field of play, shape (H, W).
-        paint: What ``ridges.find_line_like`` found, shape (H, W), or the picture itself, red green
+        paint: What ``ridges.find_line_like_pixels`` found, shape (H, W), or the picture itself, red green
             blue, shape (H, W, 3).
         pitch: The pitch.
     """
-    lines = find_line_like(np.asarray(paint, np.uint8), field) if paint.ndim == 3 else paint
+    lines = find_line_like_pixels(np.asarray(paint, np.uint8), field) if paint.ndim == 3 else paint
     width = field.shape[1]
-    (columns, rows), model = _pixels_near_markings(camera, field, pitch or Pitch())
-    supported = _dilate_mask(lines.astype(np.uint8), _near_px(width))[rows, columns] > 0
+    (columns, rows), model = _find_pixels_near_markings(camera, field, pitch or Pitch())
+    supported = _dilate_mask(lines.astype(np.uint8), _near_distance_px(width))[rows, columns] > 0
     explained = model[lines.astype(np.bool_)]
     return PaintAgreement(
         supported=float(supported.mean()) if len(supported) else 0.0,
@@ -92,7 +92,7 @@ def measure_clear_agreement(
     """
     strong = strength >= FAINT_SHARE * paint_strength
     rows, columns = np.nonzero(strong & (strength > 0))
-    ground = camera.on_ground(np.column_stack([columns, rows]).astype(np.float64))[:, :2]
+    ground = camera.project_to_ground(np.column_stack([columns, rows]).astype(np.float64))[:, :2]
     beyond = np.abs(ground) - np.array([pitch.length, pitch.width]) / 2
     on_pitch = np.isfinite(ground).all(axis=1) & (beyond < MARGIN_M).all(axis=1)
     clear = np.zeros(field.shape, np.bool_)
@@ -106,7 +106,7 @@ def measure_explained_strength(
 ) -> float:
     """Median strength of the line-like paint that lies near a camera's markings; 0 without any."""
     lines = strength > 0
-    near = _pixels_near_markings(camera, field, pitch)[1] & lines
+    near = _find_pixels_near_markings(camera, field, pitch)[1] & lines
     return float(np.median(strength[near])) if near.any() else 0.0
 
 
@@ -117,22 +117,22 @@ def _dilate_mask(mask: npt.NDArray[np.uint8], radius: float) -> npt.NDArray[np.u
     return np.asarray(cv2.dilate(mask, disc))
 
 
-def _near_px(width: int) -> float:
+def _near_distance_px(width: int) -> float:
     return max(NEAR_PX * width / REFERENCE_WIDTH, 1.5)
 
 
-def _pixels_near_markings(
+def _find_pixels_near_markings(
     camera: Camera, field: BoolArray, pitch: Pitch
 ) -> tuple[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]], BoolArray]:
-    """``_marking_points``, and which pixels lie near a marking, shape (H, W)."""
-    columns, rows = _marking_points(camera, field, pitch)
+    """``_sample_marking_pixels``, and which pixels lie near a marking, shape (H, W)."""
+    columns, rows = _sample_marking_pixels(camera, field, pitch)
     model = np.zeros(field.shape, np.uint8)
     model[rows, columns] = 1
-    near = _dilate_mask(model, _near_px(field.shape[1]) + SPACING_PX / 2)
+    near = _dilate_mask(model, _near_distance_px(field.shape[1]) + SPACING_PX / 2)
     return (columns, rows), np.asarray(near > 0)
 
 
-def _marking_points(
+def _sample_marking_pixels(
     camera: Camera, field: BoolArray, pitch: Pitch
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Columns and rows of points along the visible markings on the field."""

@@ -61,13 +61,13 @@ class CameraLibrary:
         return focals
 
 
-def _orientation_grid(*axes: tuple[float, ...]) -> FloatArray:
+def _make_orientation_grid(*axes: tuple[float, ...]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 MAIN = CameraLibrary(
     "main stand",
-    _orientation_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
+    _make_orientation_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
     (0.6, 5.0),
     np.array([6.0, 12.0, 6.0]),
 )
@@ -78,16 +78,18 @@ WIDE = CameraLibrary(
     np.vstack(
         [
             # Beside the penalty areas and towards the corners, high and low.
-            _orientation_grid(
+            _make_orientation_grid(
                 (-52.0, -38.0, -24.0, 24.0, 38.0, 52.0), (44.0, 56.0, 74.0), (-6.0, -12.0, -20.0)
             ),
             # At the touchline.
-            _orientation_grid((-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)),
+            _make_orientation_grid(
+                (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)
+            ),
             # Behind the goals.
-            _orientation_grid(
+            _make_orientation_grid(
                 (-96.0, -78.0, -62.0, 62.0, 78.0, 96.0), (0.0, 14.0), (-5.0, -11.0, -20.0)
             ),
-            _orientation_grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
+            _make_orientation_grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
         ]
     ),
     (0.45, 3.6),
@@ -120,7 +122,7 @@ def make_library_of_known_cameras(known: Sequence[Camera]) -> CameraLibrary:
     )
 
 
-def candidate_cameras(
+def find_candidate_cameras(
     pieces: FloatArray, library: CameraLibrary, pitch: Pitch, width: float
 ) -> FloatArray:
     """The cameras of a library that lay a marking on one of the pieces.
@@ -137,7 +139,7 @@ def candidate_cameras(
     """
     low, high = np.radians(TILT_DEGREES)
     return np.asarray(
-        level_cameras_on_pieces(
+        find_level_cameras_on_pieces(
             np.ascontiguousarray(library.stands),
             library.focals(width),
             np.ascontiguousarray(pieces, dtype=np.float64),
@@ -161,7 +163,7 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
-def level_cameras_on_pieces(stands, focals, pieces, markings, slack, low, high):
+def find_level_cameras_on_pieces(stands, focals, pieces, markings, slack, low, high):
     """Every camera that lays a marking on a piece; shape (N, 8)."""
     most = 2 * len(stands) * len(focals) * len(pieces) * len(markings)
     found = np.empty((most, 8))
@@ -210,7 +212,7 @@ def write_level_cameras(stand, marking, focal, piece, slack, low, high, found, c
             if not low <= tilt <= high:
                 continue
             st, ct = np.sin(tilt), np.cos(tilt)
-            if not piece_lies_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
+            if not is_piece_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
                 continue
             if count == len(found):
                 return count
@@ -224,7 +226,7 @@ def write_level_cameras(stand, marking, focal, piece, slack, low, high, found, c
 
 
 @compiled
-def piece_lies_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
+def is_piece_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
     """Whether both ends of the piece lie in front and on the marking, not beyond its ends."""
     dx, dy = marking[2] - marking[0], marking[3] - marking[1]
     length = np.sqrt(dx * dx + dy * dy)

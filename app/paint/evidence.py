@@ -16,7 +16,7 @@ import numpy.typing as npt
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
 from app.paint.grass import mark_grass_colour
-from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
+from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_outlier_offsets, find_stripes
 from app.paint.tracing import TracedPlaces, trace_places
 from app.soccer.frames import Box
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
@@ -52,7 +52,7 @@ SIGMA_FLOOR_PX = 0.04
 
 
 @dataclass(frozen=True)
-class Reading:
+class PreparedPicture:
     """A picture as paint is read from it.
 
     Attributes:
@@ -84,7 +84,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class DetectedPaint:
     """Paint at the places of ``traced`` where some was seen.
 
     Attributes:
@@ -109,7 +109,7 @@ class Evidence:
         """Where the paint is, pixels, shape (N, 2)."""
         return self.traced.pixels + self.offsets[:, None] * self.traced.normals
 
-    def scaled(self, factor: float) -> Evidence:
+    def scaled(self, factor: float) -> DetectedPaint:
         """The same evidence for the picture resized by a factor."""
         traced = replace(
             self.traced,
@@ -121,7 +121,7 @@ class Evidence:
         return replace(self, traced=traced, offsets=offsets, sigmas=sigmas)
 
 
-def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> Reading:
+def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> PreparedPicture:
     """A picture prepared for reading paint.
 
     Args:
@@ -133,11 +133,11 @@ def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> 
     red, green, blue = cv2.split(image)
     least = cv2.min(red, cv2.min(green, blue)).astype(np.float32)
     level = np.asarray(cv2.GaussianBlur(least, (5, 5), SMOOTH_PX), np.float32)
-    covered = np.logical_not(visible_field(field, hidden)).astype(np.uint8)
-    return Reading(image, level, covered, _estimate_noise(level, field))
+    covered = np.logical_not(exclude_hidden_boxes(field, hidden)).astype(np.uint8)
+    return PreparedPicture(image, level, covered, _estimate_noise(level, field))
 
 
-def visible_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
+def exclude_hidden_boxes(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
     """The field of play, shape (H, W), without boxes in which nothing is believed, pixels."""
     seen = field.copy()
     for box in hidden:
@@ -148,7 +148,7 @@ def visible_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
 
 
 def trace_visible_markings(
-    reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX
+    reading: PreparedPicture, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX
 ) -> TracedPlaces:
     """Places along the markings as the camera shows them, on the field of play.
 
@@ -162,7 +162,9 @@ def trace_visible_markings(
     return traced.only(found, int(on_field.sum()))
 
 
-def find_paint(reading: Reading, traced: TracedPlaces, window_px: float | FloatArray) -> Evidence:
+def find_paint(
+    reading: PreparedPicture, traced: TracedPlaces, window_px: float | FloatArray
+) -> DetectedPaint:
     """Paint across each place, sought up to a distance.
 
     Args:
@@ -176,8 +178,8 @@ def find_paint(reading: Reading, traced: TracedPlaces, window_px: float | FloatA
         reading.level, reading.image, reading.hidden, traced.pixels, traced.normals,
         traced.widths, windows, reading.noise, least, offsets, sigmas, strengths,
     )  # fmt: skip
-    offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
-    drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
+    offsets[~_is_bright_as_paint(strengths, traced.widths)] = np.nan
+    drop_outlier_offsets(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
     kept = np.flatnonzero(np.isfinite(offsets))
     seen = TracedPlaces(
         traced.places[kept],
@@ -190,10 +192,10 @@ def find_paint(reading: Reading, traced: TracedPlaces, window_px: float | FloatA
     )
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
     sigma *= 1 + (sigma / UNSURE_PX) ** 2
-    return Evidence(seen, offsets[kept], sigma, strengths[kept])
+    return DetectedPaint(seen, offsets[kept], sigma, strengths[kept])
 
 
-def shows_grass_beside(reading: Reading, traced: TracedPlaces, window_px: float) -> BoolArray:
+def has_grass_beside(reading: PreparedPicture, traced: TracedPlaces, window_px: float) -> BoolArray:
     """Where paint would be seen if it was there: in the picture, with grass to both sides.
 
     Args:
@@ -219,7 +221,7 @@ def shows_grass_beside(reading: Reading, traced: TracedPlaces, window_px: float)
     return seen
 
 
-def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
+def _is_bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
     """Which stripes are about as bright as the paint of this picture is at their width."""
     full = np.minimum(widths / FULL_PX, 1.0)
     found = strengths > 0
@@ -247,7 +249,7 @@ def _estimate_noise(level: FloatImage, field: BoolArray) -> float:
     return max(float(np.median(apart) / (0.6745 * np.sqrt(2))), LEAST_NOISE)
 
 
-def to_paint_evidence(evidence: Evidence, camera: Camera | None = None) -> PaintEvidence:
+def to_paint_evidence(evidence: DetectedPaint, camera: Camera | None = None) -> PaintEvidence:
     """The evidence as a value that is kept, to a ten-thousandth of a pixel.
 
     Args:

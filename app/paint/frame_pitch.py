@@ -50,7 +50,7 @@ def make_pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
     reading = read_picture(image, find_field_of_play(image))
     window = WINDOW_PX * max(width / 960, 0.6)
     evidence = find_paint(reading, trace_visible_markings(reading, camera, pitch), window)
-    return PitchFrame(to_paint_evidence(evidence, camera).some_points(), ImageSize(width, height))
+    return PitchFrame(to_paint_evidence(evidence, camera).thin_points(), ImageSize(width, height))
 
 
 def group_by_position(

@@ -96,7 +96,7 @@ def find_goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
         if np.count_nonzero(inside) < 2:
             continue
         thick = POST_M * camera.focal_length[0] / camera.pitch_to_camera(places[inside])[:, 2]
-        points = _bright_stripe(level, pixels[inside], float(np.median(thick)), unit)
+        points = _find_bright_stripe(level, pixels[inside], float(np.median(thick)), unit)
         if points is not None:
             found[name] = [ImagePoint(x, y) for x, y in points.tolist()]
     return make_lines(found)
@@ -117,25 +117,30 @@ def measure_goal_height(image: Image, camera: Camera, pitch: Pitch) -> GoalHeigh
     found = [
         height
         for side in ("left", "right")
-        if (height := _height_of_side(level, unit, camera, pitch, side)) is not None
+        if (height := _measure_height_of_side(level, unit, camera, pitch, side)) is not None
     ]
     return max(found, key=lambda item: item.contrast, default=None)
 
 
-def _height_of_side(
+def _measure_height_of_side(
     level: npt.NDArray[np.float32], unit: float, camera: Camera, pitch: Pitch, side: str
 ) -> GoalHeight | None:
     bar = pitch.with_goal("middle").shapes[f"Goal {side} crossbar"]
     assert isinstance(bar, Segment)
     ends = np.array([bar.start, bar.end])
-    bars = [_bright_share(level, unit, camera, *(ends * (1.0, 1.0, share))) for share in HEIGHTS]
+    bars = [
+        _measure_bright_fraction(level, unit, camera, *(ends * (1.0, 1.0, share)))
+        for share in HEIGHTS
+    ]
     contrasts = np.array([0.0 if seen is None else seen[1] for seen in bars])
     best = int(contrasts.argmax())
     crossbar = bars[best]
     if crossbar is None or crossbar[0] < LEAST_SHARE:
         return None
     posts = [
-        _bright_share(level, unit, camera, end * (1.0, 1.0, HEIGHTS[best]), end * (1.0, 1.0, 0.0))
+        _measure_bright_fraction(
+            level, unit, camera, end * (1.0, 1.0, HEIGHTS[best]), end * (1.0, 1.0, 0.0)
+        )
         for end in ends
     ]
     near = np.abs(np.log(HEIGHTS)) < np.log(MOST_SQUARE)
@@ -148,7 +153,7 @@ def _height_of_side(
     )
 
 
-def _bright_share(
+def _measure_bright_fraction(
     level: npt.NDArray[np.float32], unit: float, camera: Camera, start: FloatArray, end: FloatArray
 ) -> tuple[float, float] | None:
     """Share of a straight part's places that are brighter than both sides, and by how much in the
@@ -170,12 +175,12 @@ def _bright_share(
     depth = camera.pitch_to_camera(places[inside])[:, 2]
     thick = float(np.median(POST_M * camera.focal_length[0] / depth))
     offsets = np.arange(-ON_LINE_PX, ON_LINE_PX + STEP_PX, STEP_PX) * unit
-    contrast = _stripe_contrast(level, middles, offsets, normal, thick, unit).max(axis=1)
+    contrast = _measure_stripe_contrast(level, middles, offsets, normal, thick, unit).max(axis=1)
     mean = float(np.clip(contrast, 0.0, MOST_CONTRAST).mean())
     return float((contrast >= LEAST_CONTRAST).mean()), mean
 
 
-def _stripe_contrast(
+def _measure_stripe_contrast(
     level: npt.NDArray[np.float32],
     middles: FloatArray,
     offsets: FloatArray,
@@ -200,7 +205,7 @@ def _smooth_darkest_channel(image: Image) -> tuple[npt.NDArray[np.float32], floa
     return np.asarray(cv2.GaussianBlur(least, (0, 0), SMOOTH_PX * unit), np.float32), unit
 
 
-def _bright_stripe(
+def _find_bright_stripe(
     level: npt.NDArray[np.float32], pixels: FloatArray, thick: float, unit: float
 ) -> FloatArray | None:
     """Points of a bright stripe near a projected part, shape (N, 2); None where none is seen."""
@@ -214,7 +219,7 @@ def _bright_stripe(
     shares = np.linspace(0.0, 1.0, count)
     middles = start + shares[:, None] * (end - start)
     offsets = np.arange(-WINDOW_PX, WINDOW_PX + STEP_PX, STEP_PX) * unit
-    contrast = _stripe_contrast(level, middles, offsets, normal, thick, unit)
+    contrast = _measure_stripe_contrast(level, middles, offsets, normal, thick, unit)
     best = contrast.argmax(axis=1)
     bright = contrast[np.arange(count), best] >= LEAST_CONTRAST
     if np.count_nonzero(bright) < LEAST_SHARE * count:

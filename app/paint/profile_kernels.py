@@ -61,7 +61,7 @@ def find_stripes(
         x, y, nx, ny = pixels[n, 0], pixels[n, 1], normals[n, 0], normals[n, 1]
         if not _write_profile(level, x, y, nx, ny, half, profile):
             continue
-        peak = _most_prominent_stripe(
+        peak = _find_most_prominent_stripe(
             image, hidden, profile, x, y, nx, ny, half, window, side, least
         )
         if peak < 0:
@@ -96,7 +96,7 @@ def _write_profile(level, x, y, nx, ny, half, profile):
 
 
 @compiled
-def _most_prominent_stripe(image, hidden, profile, x, y, nx, ny, half, window, side, least):
+def _find_most_prominent_stripe(image, hidden, profile, x, y, nx, ny, half, window, side, least):
     """Index of the most prominent stripe within the window; -1 where there is none."""
     apart = int(side / STEP + 0.5)
     inner = int(window / STEP)
@@ -111,8 +111,8 @@ def _most_prominent_stripe(image, hidden, profile, x, y, nx, ny, half, window, s
         if value <= best:
             continue
         if not (
-            _grass_at(image, hidden, x + (s - side) * nx, y + (s - side) * ny)
-            and _grass_at(image, hidden, x + (s + side) * nx, y + (s + side) * ny)
+            _is_grass_at(image, hidden, x + (s - side) * nx, y + (s - side) * ny)
+            and _is_grass_at(image, hidden, x + (s + side) * nx, y + (s + side) * ny)
             and hidden[int(y + s * ny + 0.5), int(x + s * nx + 0.5)] == 0
         ):
             continue
@@ -124,7 +124,7 @@ def _most_prominent_stripe(image, hidden, profile, x, y, nx, ny, half, window, s
 
 
 @compiled
-def _grass_at(image, hidden, x, y):
+def _is_grass_at(image, hidden, x, y):
     row, column = int(y + 0.5), int(x + 0.5)
     if hidden[row, column] == 1:
         return False
@@ -162,7 +162,7 @@ def _measure_stripe(profile, peak, half, side, width, noise, n, offsets, sigmas,
 
 
 @compiled
-def drop_strays(offsets, marking, around, apart, share):
+def drop_outlier_offsets(offsets, marking, around, apart, share):
     """Sets to NaN what its neighbours along the marking do not confirm.
 
     Args:

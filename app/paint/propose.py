@@ -37,7 +37,12 @@ from app.paint.agreement import (
     measure_explained_strength,
 )
 from app.paint.candidates import KNOWN, MAIN, WIDE, CameraLibrary, make_library_of_known_cameras
-from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace_visible_markings
+from app.paint.evidence import (
+    PreparedPicture,
+    has_grass_beside,
+    read_picture,
+    trace_visible_markings,
+)
 from app.paint.goal import measure_goal_height
 from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.ridges import Strength, find_straight_pieces, measure_line_strength
@@ -51,7 +56,7 @@ from app.paint.search import (
     is_same_view,
     search_cameras,
 )
-from app.paint.snap import SnappedCamera, snap_reading
+from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
@@ -137,7 +142,7 @@ class SearchedFrame:
     strength: Strength
     pieces: FloatArray
     picture: ScoredPicture
-    reading: Reading
+    reading: PreparedPicture
 
     @property
     def paint(self) -> BoolArray:
@@ -195,7 +200,7 @@ def propose_camera(
             their lenses, first.
         policy: Prior of the distortion.
     """
-    frame = read_frame(image)
+    frame = read_and_prepare_frame(image)
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     return propose_for_frame(
@@ -224,7 +229,7 @@ def propose_for_frame(
         found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
             found = [_move_to_known_position(frame, item, match, pitch) for item in found]
-        ranked = merge_ranked(frame, ranked, found)
+        ranked = merge_ranked_cameras(frame, ranked, found)
         if explain_uncertain_camera(ranked) is None:
             break
     else:
@@ -248,7 +253,7 @@ def explain_too_small_picture(image: Image) -> str | None:
     return f"the picture is too small ({width} x {height} pixels): no line can be followed"
 
 
-def read_frame(image: Image) -> SearchedFrame | str:
+def read_and_prepare_frame(image: Image) -> SearchedFrame | str:
     """A frame ready to be searched, or why there is nothing to search for."""
     if (small := explain_too_small_picture(image)) is not None:
         return small
@@ -268,7 +273,7 @@ def read_frame(image: Image) -> SearchedFrame | str:
 
 
 def prepare_frame_to_search(
-    image: Image, field: BoolArray, strength: Strength, reading: Reading
+    image: Image, field: BoolArray, strength: Strength, reading: PreparedPicture
 ) -> SearchedFrame | str:
     """A frame that is read, ready to be searched, or why there is nothing to search for.
 
@@ -331,7 +336,7 @@ def _rank_in_own_size(
         again,
     )
     clear = [replace(item, agreement=one) for item, one in zip(again, seen, strict=True)]
-    return merge_ranked(frame, [], clear)
+    return merge_ranked_cameras(frame, [], clear)
 
 
 def _snap_in_own_size(
@@ -340,7 +345,7 @@ def _snap_in_own_size(
     """A camera drawn onto the paint of the picture in its own size, from near and from afar; the
     better of both."""
     height, width = looked.field.shape
-    start = scale_snapped(item.snapped, height, width).camera
+    start = scale_snapped_camera(item.snapped, height, width).camera
     found = []
     for windows in (LAST_WINDOWS, WINDOWS):
         snapped = _snap_with_known_position(
@@ -380,13 +385,13 @@ def rank_cameras(
     drawn = get_kernel_executor().map(
         lambda item: _snap_from_search(frame, item.camera, library, pitch, policy), found
     )
-    known = _start_covariance(library) if library.name == KNOWN else None
+    known = _make_start_covariance(library) if library.name == KNOWN else None
     ranked = [
         _rank_snapped(frame, item, pitch, policy, known) for item in drawn if item.reason is None
     ]
     if known is not None:
         ranked = [_move_to_known_position(frame, item, library, pitch) for item in ranked]
-    return merge_ranked(frame, [], ranked)
+    return merge_ranked_cameras(frame, [], ranked)
 
 
 def _rank_snapped(
@@ -414,11 +419,11 @@ def _snap_from_search(
     alone = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy)
     if alone.reason is None:
         return alone
-    known = _start_covariance(library)
+    known = _make_start_covariance(library)
     if library.name == KNOWN:
         start = _move_to_nearest_stand(frame.reading, start, library, pitch)
         return _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
-    return snap_reading(
+    return snap_to_prepared_picture(
         frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
 
@@ -437,7 +442,7 @@ def _move_to_known_position(
     policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
     start, known = (
         _move_to_nearest_stand(frame.reading, camera, match, pitch),
-        _start_covariance(match),
+        _make_start_covariance(match),
     )
     snapped = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
     if snapped.reason is not None:
@@ -447,7 +452,7 @@ def _move_to_known_position(
 
 
 def _move_to_nearest_stand(
-    reading: Reading, camera: Camera, library: CameraLibrary, pitch: Pitch
+    reading: PreparedPicture, camera: Camera, library: CameraLibrary, pitch: Pitch
 ) -> Camera:
     """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
     away = np.linalg.norm(library.stands - camera.position, axis=1)
@@ -464,29 +469,29 @@ def _move_to_nearest_stand(
     return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
 
 
-def _start_covariance(library: CameraLibrary) -> FloatArray:
+def _make_start_covariance(library: CameraLibrary) -> FloatArray:
     """Covariance of a start of the search, shape (8, 8)."""
     sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
     return np.diag(sigma**2)
 
 
 def _snap_with_known_position(
-    reading: Reading,
+    reading: PreparedPicture,
     start: Camera,
     pitch: Pitch,
     windows: Sequence[float],
     policy: CalibrationPolicy,
     known: FloatArray | None = None,
 ) -> SnappedCamera:
-    """As ``snap_reading``, with what is known of the position where the match knows it."""
-    return snap_reading(
+    """As ``snap_to_prepared_picture``, with what is known of the position where the match knows it."""
+    return snap_to_prepared_picture(
         reading, start, pitch, windows, policy, known,
         circles_count_twice=True, position_is_known=known is not None,
     )  # fmt: skip
 
 
 def measure_weakest_marking(
-    reading: Reading, snapped: SnappedCamera, pitch: Pitch, visible_px: float = VISIBLE_PX
+    reading: PreparedPicture, snapped: SnappedCamera, pitch: Pitch, visible_px: float = VISIBLE_PX
 ) -> float:
     """The lowest share of a marking's places that have paint; short markings do not count.
 
@@ -494,7 +499,7 @@ def measure_weakest_marking(
     Nothing is asked of places behind people and along the border of the picture.
     """
     traced, paint = trace_visible_markings(reading, snapped.camera, pitch), snapped.evidence.traced
-    usable = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
+    usable = has_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
     usable &= traced.widths > visible_px
     shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
     seen = np.bincount(paint.marking[paint.widths > visible_px], minlength=len(MARKINGS))
@@ -503,7 +508,7 @@ def measure_weakest_marking(
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
 
 
-def merge_ranked(
+def merge_ranked_cameras(
     frame: SearchedFrame, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
 ) -> list[RankedCamera]:
     """Both lists in one, best first, each camera once."""
@@ -521,7 +526,7 @@ def merge_ranked(
     return kept
 
 
-def measure_lead_over_second(ranked: Sequence[RankedCamera]) -> float | None:
+def measure_score_lead(ranked: Sequence[RankedCamera]) -> float | None:
     """How far the second camera lies behind the first, in supported x explained."""
     if len(ranked) < 2:
         return None
@@ -532,7 +537,7 @@ def explain_uncertain_camera(ranked: Sequence[RankedCamera]) -> str | None:
     """Why the best camera cannot be proposed; None where it can."""
     if not ranked:
         return "no camera was found that fits the paint"
-    best, lead = ranked[0], measure_lead_over_second(ranked)
+    best, lead = ranked[0], measure_score_lead(ranked)
     if best.is_contradicted:
         return "the best camera shows a marking where there is no paint"
     supported = best.agreement.supported
@@ -584,7 +589,7 @@ def _choose_proposal(
     reason = explain_uncertain_camera(ranked)
     if not ranked:
         return FrameProposal("unsure", reason)
-    best, lead = ranked[0], measure_lead_over_second(ranked)
+    best, lead = ranked[0], measure_score_lead(ranked)
     snapped = best.snapped
     height, width = image.shape[:2]
     rows, columns = frame.field.shape
@@ -593,7 +598,7 @@ def _choose_proposal(
         small = small.scaled(columns / width, rows / height)
     reason = reason or explain_non_square_pixels(frame.image, small, pitch)
     if width < ENLARGED_WIDTH:
-        snapped = scale_snapped(snapped, height, width)
+        snapped = scale_snapped_camera(snapped, height, width)
     elif (height, width) != snapped.size:
         snapped = _snap_at_full_size(image, frame, best, pitch)
     return FrameProposal(
@@ -614,14 +619,14 @@ def _snap_at_full_size(
     as it was found in the small one."""
     height, width = image.shape[:2]
     reading = read_picture(image, _resize_field(frame, width, height))
-    found = scale_snapped(best.snapped, height, width)
+    found = scale_snapped_camera(best.snapped, height, width)
     last = _snap_with_known_position(
         reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known
     )
     return last if last.reason is None else found
 
 
-def scale_snapped(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
+def scale_snapped_camera(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
     """A camera on the paint, and that paint, in the pixels of the picture at another size."""
     factor = width / snapped.size[1]
     return replace(

@@ -27,7 +27,7 @@ SIDE_PX = 5.0
 """Where grass is looked for to both sides."""
 
 
-def find_line_like(image: Image, field: BoolArray) -> BoolArray:
+def find_line_like_pixels(image: Image, field: BoolArray) -> BoolArray:
     """The thin pixels of everything on the field that looks like a painted line.
 
     Args:
@@ -47,20 +47,20 @@ def measure_line_strength(image: Image, field: BoolArray) -> Strength:
     full = np.zeros((height, width), np.float32)
     if not field.any():
         return full
-    small, inside = _work_size(image, field)
-    thin = _thin_lines(small, inside, small.shape[1] / WORK_WIDTH)
+    small, inside = _resize_to_work_size(image, field)
+    thin = _measure_thin_lines(small, inside, small.shape[1] / WORK_WIDTH)
     if small.shape[:2] == (height, width):
         return thin
     rows, columns = np.nonzero(thin)
     to = (
-        _full_size_pixels(rows, height, len(small)),
-        _full_size_pixels(columns, width, small.shape[1]),
+        _to_full_size_pixels(rows, height, len(small)),
+        _to_full_size_pixels(columns, width, small.shape[1]),
     )
     full[to] = thin[rows, columns]
     return full
 
 
-def _work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.uint8]]:
+def _resize_to_work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.uint8]]:
     height, width = field.shape
     inside = field.astype(np.uint8)
     if width <= WORK_WIDTH:
@@ -71,14 +71,14 @@ def _work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.ui
     return np.asarray(small, np.uint8), np.asarray(near, np.uint8)
 
 
-def _full_size_pixels(
+def _to_full_size_pixels(
     places: npt.NDArray[np.int64], size: int, small: int
 ) -> npt.NDArray[np.int64]:
     """Pixels of the full picture at the centres of those of the small one."""
     return np.asarray(((places + 0.5) * size / small).astype(np.int64))
 
 
-def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Strength:
+def _measure_thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Strength:
     """As ``measure_line_strength``, for a picture in which lengths are ``unit`` times those above."""
     # Paint is bright in all channels; shirts and boards rarely are.
     red, green, blue = cv2.split(image)
@@ -134,12 +134,12 @@ def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatAr
     pieces: list[FloatArray] = []
     for _ in range(most):
         support = np.array(
-            [np.count_nonzero(free & _paint_beside_piece(paint, end, unit)) for end in ends]
+            [np.count_nonzero(free & _find_paint_beside_piece(paint, end, unit)) for end in ends]
         )
         best = int(np.argmax(support))
         if support[best] < LEAST_PIXELS or support[best] < 0.6 * SHORTEST_PX * unit:
             break
-        taken = free & _paint_beside_piece(paint, ends[best], unit)
+        taken = free & _find_paint_beside_piece(paint, ends[best], unit)
         for _ in range(2):
             taken = free & _extend_piece(paint, _fit_segment(paint[taken]), unit)
             if np.count_nonzero(taken) < LEAST_PIXELS:
@@ -154,9 +154,7 @@ def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatAr
     return np.array(pieces).reshape(-1, 4)
 
 
-def coordinates_along_piece(
-    paint: FloatArray, end: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
+def measure_along_piece(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
     start, stop = end[:2], end[2:]
     length = float(np.hypot(*(stop - start)))
@@ -166,16 +164,18 @@ def coordinates_along_piece(
     return offset @ direction, across, length
 
 
-def _paint_beside_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+def _find_paint_beside_piece(
+    paint: FloatArray, end: FloatArray, unit: float
+) -> npt.NDArray[np.bool_]:
     """The paint beside a piece, between its ends."""
-    along, across, length = coordinates_along_piece(paint, end)
+    along, across, length = measure_along_piece(paint, end)
     near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
     return near
 
 
 def _extend_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
-    along, across, length = coordinates_along_piece(paint, end)
+    along, across, length = measure_along_piece(paint, end)
     near = across < NEAR_PX * unit
     places = np.sort(along[near])
     gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)

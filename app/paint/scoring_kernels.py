@@ -24,7 +24,7 @@ HOPELESS = 0.8
 
 
 @compiled
-def nearest_place(camera, px, py, shapes, nearest, origin, cell):
+def find_nearest_place(camera, px, py, shapes, nearest, origin, cell):
     """The place on the nearest marking for a pixel without distortion: x, y, z and its tangent.
 
     Before it 1 where the place lies within its marking, 0 at an end, -1 where the pixel shows no
@@ -60,7 +60,7 @@ def nearest_place(camera, px, py, shapes, nearest, origin, cell):
 
 
 @compiled
-def offset_from(camera, place, inside, px, py):
+def distance_from_place(camera, place, inside, px, py):
     """Distance of a pixel from a place's tangent in the picture, or from the place at an end."""
     a, b, c = pitch_to_camera(camera, place[0], place[1], 0.0)
     if c < 0.3:
@@ -87,11 +87,11 @@ def write_unexplained_paint(
         total = 0.0
         for n in range(len(points)):
             px, py = ideal_pixel(camera, points[n, 0], points[n, 1])
-            inside, place = nearest_place(camera, px, py, shapes, nearest, origin, cell)
+            inside, place = find_nearest_place(camera, px, py, shapes, nearest, origin, cell)
             if inside < 0:
                 total += 1.0
             else:
-                total += min(offset_from(camera, place, inside, px, py) / reach, 1.0)
+                total += min(distance_from_place(camera, place, inside, px, py) / reach, 1.0)
             if n + 1 == FIRST and total > HOPELESS * FIRST:
                 total = 1.0 * len(points)
                 break
@@ -143,7 +143,7 @@ def write_unsupported_markings(
 
 
 @compiled
-def refine_rows(
+def refine_camera_rows(
     parameters, points, shapes, nearest, origin, cell, scales, mean, sigma, half_diagonal
 ):  # fmt: skip
     """Moves each camera so that the paint comes to lie on the nearest markings.
@@ -164,8 +164,8 @@ def refine_rows(
                 H[k, k] = weight
             for n in range(len(points)):
                 px, py = ideal_pixel(camera, points[n, 0], points[n, 1])
-                inside, place = nearest_place(camera, px, py, shapes, nearest, origin, cell)
-                if inside < 0 or offset_from(camera, place, inside, px, py) > 3.0 * scale:
+                inside, place = find_nearest_place(camera, px, py, shapes, nearest, origin, cell)
+                if inside < 0 or distance_from_place(camera, place, inside, px, py) > 3.0 * scale:
                     continue
                 write_residual_row(
                     camera, place, inside == 1, points[n, 0], points[n, 1], offset, jacobian, 0

@@ -20,7 +20,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PARAMETERS, ROLL, X, Z, camera_from_parameters
 from app.paint import scoring_kernels as kernels
-from app.paint.candidates import CameraLibrary, candidate_cameras
+from app.paint.candidates import CameraLibrary, find_candidate_cameras
 from app.soccer.pitch import MARKINGS, Arc, Pitch
 
 CELL_M = 0.25
@@ -32,7 +32,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Markings:
+class MarkingTable:
     """The painted markings on the grass as the kernels read them.
 
     Attributes:
@@ -49,10 +49,10 @@ class Markings:
 
 
 @lru_cache(maxsize=8)
-def painted_markings_of_pitch(pitch: Pitch) -> Markings:
+def build_marking_table(pitch: Pitch) -> MarkingTable:
     """The painted markings of a pitch; goals are not painted."""
     names = [name for name in MARKINGS if not name.startswith("Goal")]
-    shapes = np.array([_marking_row(pitch, name) for name in names])
+    shapes = np.array([_make_marking_row(pitch, name) for name in names])
     half = np.array([pitch.length / 2 + RIM_M, pitch.width / 2 + RIM_M])
     columns, rows = (np.ceil(2 * half / CELL_M)).astype(int)
     x = -half[0] + (np.arange(columns) + 0.5) * CELL_M
@@ -62,12 +62,12 @@ def painted_markings_of_pitch(pitch: Pitch) -> Markings:
         points = pitch.sample(name, 0.1, 0.1)[:, :2]
         dense.append(points)
         owner.append(np.full(len(points), index))
-        samples.append(_with_tangents(pitch.sample(name, SPACING_M, SPACING_M)[:, :2]))
-    nearest = _nearest_points_of_cells(np.vstack(dense), np.concatenate(owner), x, y)
-    return Markings(shapes, nearest, np.vstack(samples), -half)
+        samples.append(_append_tangents(pitch.sample(name, SPACING_M, SPACING_M)[:, :2]))
+    nearest = _index_nearest_points(np.vstack(dense), np.concatenate(owner), x, y)
+    return MarkingTable(shapes, nearest, np.vstack(samples), -half)
 
 
-def _nearest_points_of_cells(
+def _index_nearest_points(
     points: FloatArray, owner: npt.NDArray[np.int64], x: FloatArray, y: FloatArray
 ) -> npt.NDArray[np.uint8]:
     """Of the points, to the centre of each cell, shape (rows, columns)."""
@@ -78,14 +78,14 @@ def _nearest_points_of_cells(
     return np.asarray(owner[index].reshape(len(y), len(x)), np.uint8)
 
 
-def _marking_row(pitch: Pitch, name: str) -> tuple[float, ...]:
+def _make_marking_row(pitch: Pitch, name: str) -> tuple[float, ...]:
     shape = pitch.shapes[name]
     if isinstance(shape, Arc):
         return (1.0, *shape.center, shape.radius, 0.0)
     return (0.0, *shape.start[:2], *shape.end[:2])
 
 
-def _with_tangents(points: FloatArray) -> FloatArray:
+def _append_tangents(points: FloatArray) -> FloatArray:
     direction = np.gradient(points, axis=0)
     return np.column_stack([points, direction / np.linalg.norm(direction, axis=1, keepdims=True)])
 
@@ -146,10 +146,10 @@ def score_coarsely(
     parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Mean truncated distance of some of the paint to the markings, 0 to 1, shape (B,)."""
-    return _unexplained_share(parameters, picture.few, picture, pitch, reach, executor)
+    return _compute_unexplained_paint(parameters, picture.few, picture, pitch, reach, executor)
 
 
-def _unexplained_share(
+def _compute_unexplained_paint(
     parameters: FloatArray,
     points: FloatArray,
     picture: ScoredPicture,
@@ -157,16 +157,16 @@ def _unexplained_share(
     reach: float,
     executor: Executor,
 ) -> FloatArray:
-    m = painted_markings_of_pitch(pitch)
+    m = build_marking_table(pitch)
     cost = np.empty(len(parameters))
 
-    def run(part: slice) -> None:
+    def process_slice(part: slice) -> None:
         kernels.write_unexplained_paint(
             parameters[part], points, m.shapes, m.nearest, m.origin, CELL_M,
             reach * picture.unit, picture.half_diagonal, cost[part],
         )  # fmt: skip
 
-    list(executor.map(run, _split_range(len(parameters))))
+    list(executor.map(process_slice, _split_range(len(parameters))))
     return cost
 
 
@@ -177,17 +177,17 @@ def score_fully(
 
     Shape (B, 4).
     """
-    m = painted_markings_of_pitch(pitch)
+    m = build_marking_table(pitch)
     result = np.empty((len(parameters), 3))
 
-    def run(part: slice) -> None:
+    def process_slice(part: slice) -> None:
         kernels.write_unsupported_markings(
             parameters[part], m.samples, SPACING_M, picture.distance, picture.field,
             picture.center, reach * picture.unit, picture.half_diagonal, result[part],
         )  # fmt: skip
 
-    list(executor.map(run, _split_range(len(parameters))))
-    cost = _unexplained_share(parameters, picture.points, picture, pitch, reach, executor)
+    list(executor.map(process_slice, _split_range(len(parameters))))
+    cost = _compute_unexplained_paint(parameters, picture.points, picture, pitch, reach, executor)
     return np.column_stack([cost, result])
 
 
@@ -216,17 +216,17 @@ def refine_cameras(
     Returns:
         Shape (B, 8).
     """
-    m = painted_markings_of_pitch(pitch)
+    m = build_marking_table(pitch)
     moved = np.ascontiguousarray(parameters).copy()
     pixels = np.asarray(scales) * picture.unit
 
-    def run(part: slice) -> None:
-        kernels.refine_rows(
+    def process_slice(part: slice) -> None:
+        kernels.refine_camera_rows(
             moved[part], points, m.shapes, m.nearest, m.origin, CELL_M,
             pixels, mean[part], sigma, picture.half_diagonal,
         )  # fmt: skip
 
-    list(executor.map(run, _split_range(len(parameters), 32)))
+    list(executor.map(process_slice, _split_range(len(parameters), 32)))
     return moved
 
 
@@ -284,34 +284,34 @@ def search_cameras(
         kappa: The lens's distortion to start with.
     """
     width = float(picture.field.shape[1])
-    rows = candidate_cameras(pieces - np.tile(picture.center, 2), library, pitch, width)
+    rows = find_candidate_cameras(pieces - np.tile(picture.center, 2), library, pitch, width)
     if not len(rows):
         return []
     cost = score_coarsely(rows, picture, pitch, FIRST_REACH_PX, executor)
-    rows = rows[_smallest_indices(cost, scouted)]
+    rows = rows[_find_smallest_indices(cost, scouted)]
     rows[:, KAPPA] = kappa
-    sigma = _library_sigma(library)
+    sigma = _prior_sigma_of_library(library)
     start = rows.copy()
     start[:, ROLL] = 0.0
     rows = refine_cameras(rows, start, sigma, picture, picture.some, pitch, SCOUT_SCALES, executor)
-    score = _combined_score(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
-    chosen = _smallest_indices(-score, searched)
+    score = _combine_scores(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    chosen = _find_smallest_indices(-score, searched)
     rows, start = rows[chosen], start[chosen]
     rows = refine_cameras(
         rows, start, sigma, picture, picture.points, pitch, SEARCH_SCALES, executor
     )
-    score = _combined_score(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
-    return _distinct_cameras(rows, score, picture, most)
+    score = _combine_scores(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    return _select_distinct_cameras(rows, score, picture, most)
 
 
-def _library_sigma(library: CameraLibrary) -> FloatArray:
+def _prior_sigma_of_library(library: CameraLibrary) -> FloatArray:
     sigma = np.full(PARAMETERS, np.inf)
     sigma[ROLL], sigma[X : Z + 1] = ROLL_SIGMA, library.position_sigma
     sigma[Z + 1], sigma[KAPPA] = FOCAL_SIGMA, KAPPA_SIGMA
     return sigma
 
 
-def _combined_score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
+def _combine_scores(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
     """Explained times supported; markings drawn where no grass is count half."""
     unexplained, unsupported, on, off = looked.T
     score = (1 - unexplained) * (1 - unsupported) * (1 - 0.5 * off / (on + off + 1))
@@ -319,11 +319,11 @@ def _combined_score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
     return np.where(np.isfinite(score), score, 0.0)
 
 
-def _smallest_indices(cost: FloatArray, count: int) -> npt.NDArray[np.int64]:
+def _find_smallest_indices(cost: FloatArray, count: int) -> npt.NDArray[np.int64]:
     return np.asarray(np.argsort(cost, kind="stable")[:count], np.int64)
 
 
-def _distinct_cameras(
+def _select_distinct_cameras(
     rows: FloatArray, score: FloatArray, picture: ScoredPicture, most: int
 ) -> list[FoundCamera]:
     found: list[FoundCamera] = []

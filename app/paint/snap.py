@@ -17,9 +17,9 @@ from app.geometry.camera import Camera
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
 from app.paint.evidence import (
     SPACING_PX,
-    Evidence,
+    DetectedPaint,
     Image,
-    Reading,
+    PreparedPicture,
     find_paint,
     read_picture,
     trace_visible_markings,
@@ -70,7 +70,7 @@ class SnappedCamera:
     """
 
     camera: Camera
-    evidence: Evidence
+    evidence: DetectedPaint
     error_px: float | None
     covariance: FloatArray | None
     moved_px: float
@@ -106,13 +106,13 @@ def snap_camera(
         start_covariance: How well the start is known, where it is known, shape (8, 8).
     """
     reading = read_picture(image, field, hidden)
-    return snap_reading(
+    return snap_to_prepared_picture(
         reading, start, pitch or Pitch(), WINDOWS, policy or CalibrationPolicy(), start_covariance
     )
 
 
-def snap_reading(
-    reading: Reading,
+def snap_to_prepared_picture(
+    reading: PreparedPicture,
     start: Camera,
     pitch: Pitch,
     windows: Sequence[float],
@@ -135,7 +135,7 @@ def snap_reading(
     least = LEAST_MARKINGS - position_is_known
     problem = ResectionProblem.of(ImageSize(reading.width, reading.height), policy)
     twice = CURVED if circles_count_twice else []
-    rounds = _Rounds(reading, start, pitch, problem, start_covariance)
+    rounds = _SnapProblem(reading, start, pitch, problem, start_covariance)
     parameters = rounds.first
     for index, window in enumerate(windows):
         strict = index >= len(windows) - STRICT_ROUNDS
@@ -169,12 +169,12 @@ def snap_reading(
     return SnappedCamera(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
 
 
-class _Rounds:
+class _SnapProblem:
     """What all rounds of one snap share."""
 
     def __init__(
         self,
-        reading: Reading,
+        reading: PreparedPicture,
         start: Camera,
         pitch: Pitch,
         resection: ResectionProblem,
@@ -192,7 +192,9 @@ class _Rounds:
             parameters, self.start.principal_point, self._reading.half_diagonal
         )
 
-    def seek(self, parameters: FloatArray, window: float, spacing: float = SPACING_PX) -> Evidence:
+    def seek(
+        self, parameters: FloatArray, window: float, spacing: float = SPACING_PX
+    ) -> DetectedPaint:
         traced = trace_visible_markings(
             self._reading, self.camera(parameters), self._pitch, spacing
         )
@@ -204,7 +206,7 @@ class _Rounds:
         known = START_SIGMAS * sigma + START_PX * self.unit
         return find_paint(self._reading, traced, np.minimum(window, known))
 
-    def seen(self, evidence: Evidence) -> PaintOffsets:
+    def seen(self, evidence: DetectedPaint) -> PaintOffsets:
         """The evidence as it is solved with."""
         traced = evidence.traced
         apart = (traced.pixels - self.start.principal_point) / self._reading.half_diagonal
@@ -218,7 +220,10 @@ class _Rounds:
 
 
 def _has_enough_paint(
-    evidence: Evidence, twice: list[int], spacing: float = SPACING_PX, least: int = LEAST_MARKINGS
+    evidence: DetectedPaint,
+    twice: list[int],
+    spacing: float = SPACING_PX,
+    least: int = LEAST_MARKINGS,
 ) -> bool:
     counts = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
     markings = int((counts >= LEAST_ON_MARKING).sum())
@@ -227,8 +232,8 @@ def _has_enough_paint(
 
 
 def _keep_start(
-    rounds: _Rounds,
-    evidence: Evidence,
+    rounds: _SnapProblem,
+    evidence: DetectedPaint,
     reason: str,
     error: float | None = None,
     moved: float = 0.0,
@@ -237,7 +242,7 @@ def _keep_start(
     return SnappedCamera(rounds.start, evidence, error, None, moved, reason, rounds.size)
 
 
-def _median_shift_px(start: Camera, camera: Camera, evidence: Evidence) -> float:
+def _median_shift_px(start: Camera, camera: Camera, evidence: DetectedPaint) -> float:
     places = evidence.traced.places
     apart = np.hypot(*(camera.project(places) - start.project(places)).T)
     known = apart[np.isfinite(apart)]

@@ -73,7 +73,7 @@ def trace_places(
     places, pixels, normals = (np.empty((most, n)) for n in (3, 2, 2))
     widths, marking, rows = np.empty(most), np.empty(most, np.int64), np.empty((most, 8))
     count = trace_markings(
-        parameters_from_camera(camera, half), curves.kinds, curves.shapes, painted_markings(),
+        parameters_from_camera(camera, half), curves.kinds, curves.shapes, painted_marking_mask(),
         np.array(camera.principal_point), half, width, height, spacing_px,
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
@@ -85,7 +85,7 @@ def trace_places(
 
 
 @lru_cache(maxsize=1)
-def painted_markings() -> BoolArray:
+def painted_marking_mask() -> BoolArray:
     return np.array([name in PAINTED for name in MARKINGS])
 
 
@@ -133,8 +133,8 @@ def trace_markings(
         carried = 0.5 * spacing
         last_x, last_y, was_seen = 0.0, 0.0, False
         for k in range(steps + 1):
-            place = at_share(kinds[m], shape, k / steps)
-            x, y, seen = _pixel(camera, x0, y0, place[0], place[1], place[2])
+            place = point_at_fraction(kinds[m], shape, k / steps)
+            x, y, seen = _project_to_pixel(camera, x0, y0, place[0], place[1], place[2])
             # Far outside nothing is followed; the margin keeps steps that enter the picture.
             seen = seen and -width < x < 2 * width and -height < y < 2 * height
             if seen and was_seen:
@@ -142,8 +142,8 @@ def trace_markings(
                 at = spacing - carried
                 while at <= apart:
                     share = (k - 1 + at / apart) / steps
-                    place = at_share(kinds[m], shape, share)
-                    if _write(
+                    place = point_at_fraction(kinds[m], shape, share)
+                    if _write_traced_place(
                         camera, x0, y0, place, width, height, m, count, derivatives,
                         places, pixels, normals, widths, marking, rows,
                     ):  # fmt: skip
@@ -159,7 +159,7 @@ def trace_markings(
 
 
 @compiled
-def at_share(kind, shape, share):
+def point_at_fraction(kind, shape, share):
     """The place of a curve at a share of its length, and the direction along it, six numbers."""
     if kind == SEGMENT:
         ax, ay, az = shape[3] - shape[0], shape[4] - shape[1], shape[5] - shape[2]
@@ -173,7 +173,7 @@ def at_share(kind, shape, share):
 
 
 @compiled
-def _pixel(camera, x0, y0, x, y, z):
+def _project_to_pixel(camera, x0, y0, x, y, z):
     x, y, z = pitch_to_camera(camera, x, y, z)
     if z < NEAR:
         return 0.0, 0.0, False
@@ -183,7 +183,7 @@ def _pixel(camera, x0, y0, x, y, z):
 
 
 @compiled
-def _direction(camera, place, vx, vy):
+def _project_direction(camera, place, vx, vy):
     """How a step on the grass looks in the picture, pixels a metre."""
     ux, uy, uz = pitch_to_camera(camera, place[0], place[1], place[2])
     wx, wy, wz = rotate_to_camera(camera, vx, vy, 0.0)
@@ -196,25 +196,25 @@ def _direction(camera, place, vx, vy):
 
 
 @compiled
-def _write(
+def _write_traced_place(
     camera, x0, y0, place, width, height, m, n, derivatives,
     places, pixels, normals, widths, marking, rows,
 ):  # fmt: skip
     """Writes one place; False where it lies outside the picture."""
-    x, y, seen = _pixel(camera, x0, y0, place[0], place[1], place[2])
+    x, y, seen = _project_to_pixel(camera, x0, y0, place[0], place[1], place[2])
     if not (seen and 0 <= x <= width - 1 and 0 <= y <= height - 1):
         return False
     length = np.sqrt(place[3] ** 2 + place[4] ** 2)
     tx, ty = place[3] / length, place[4] / length
-    gx, gy = _direction(camera, place, tx, ty)
+    gx, gy = _project_direction(camera, place, tx, ty)
     size = np.sqrt(gx * gx + gy * gy)
     if size < 1e-9:
         return False
     nx, ny = -gy / size, gx / size
     half = 0.5 * PAINT_WIDTH_M
     ax, ay = half * ty, half * tx
-    lx, ly, left_seen = _pixel(camera, x0, y0, place[0] - ax, place[1] + ay, place[2])
-    rx, ry, right_seen = _pixel(camera, x0, y0, place[0] + ax, place[1] - ay, place[2])
+    lx, ly, left_seen = _project_to_pixel(camera, x0, y0, place[0] - ax, place[1] + ay, place[2])
+    rx, ry, right_seen = _project_to_pixel(camera, x0, y0, place[0] + ax, place[1] - ay, place[2])
     if not (left_seen and right_seen):
         return False
     across = abs(nx * (lx - rx) + ny * (ly - ry))

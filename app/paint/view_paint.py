@@ -15,10 +15,10 @@ from app.geometry.lens import BROWN_CONRADY
 from app.geometry.resection import PARAMETERS
 from app.media.files import decode_frame
 from app.paint.agreement import measure_agreement
-from app.paint.evidence import Image, to_paint_evidence, visible_field
+from app.paint.evidence import Image, exclude_hidden_boxes, to_paint_evidence
 from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.propose import LEAST_SIDE
-from app.paint.ridges import find_line_like
+from app.paint.ridges import find_line_like_pixels
 from app.paint.snap import SnappedCamera, snap_camera
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Media
@@ -166,10 +166,10 @@ def read_paint_of_image(
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
     hidden = [scale.box(box) for box in choose_hiding_boxes(people, size)]
-    seen_grass = visible_field(grass, hidden)
-    paint = find_line_like(image, grass) & seen_grass
+    seen_grass = exclude_hidden_boxes(grass, hidden)
+    paint = find_line_like_pixels(image, grass) & seen_grass
     nothing = ViewPaint("nothing", line_like=scale.line_like(paint))
-    why = _why_unusable(start)
+    why = _explain_unusable_calibration(start)
     if why is not None:
         return replace(nothing, sentence=why)
     assert start.camera is not None
@@ -205,7 +205,7 @@ def choose_hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
     return [box for box in people if box.width * box.height <= largest]
 
 
-def _why_unusable(start: Calibration) -> str | None:
+def _explain_unusable_calibration(start: Calibration) -> str | None:
     """Why paint cannot be sought with a calibration; None: it can."""
     camera = start.camera
     if camera is None:

@@ -80,7 +80,7 @@ def propose_lines_in_image(
         )
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
     if found.outcome == "proposed" and snapped is not None:
-        lines = dict(scale.evidence(snapped).some_points())
+        lines = dict(scale.evidence(snapped).thin_points())
         goals = find_goal_lines(image, snapped.camera, pitch)
         lines |= {name: tuple(scale.sentence(*place) for place in goals[name]) for name in goals}
     return ViewProposal(
@@ -138,9 +138,7 @@ def keep_undrawn_markings(
     if found.outcome != "proposed" or not drawn:
         return found
     turned = make_lines({opposite_marking(name): points for name, points in found.lines.items()})
-    sides = [
-        _fit_of_drawn_lines(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)
-    ]
+    sides = [_fit_drawn_lines(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)]
     side = min(sides, key=lambda item: item.cost(FAR_PERCENT / 100 * size.diagonal))
     rest = {name: points for name, points in side.lines.items() if name not in drawn}
     sentence = _describe_contradiction(side.apart, APART_PERCENT / 100 * size.diagonal)
@@ -169,7 +167,7 @@ def propose_undrawn_lines(
     return keep_undrawn_markings(found, drawn, pitch, size, policy)
 
 
-def _fit_of_drawn_lines(
+def _fit_drawn_lines(
     lines: Lines, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> _DrawnLinesFit:
     camera = calibrate(lines, pitch, size, policy).camera

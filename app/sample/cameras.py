@@ -177,7 +177,7 @@ def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> CameraCe
     x = camera.pitch_to_camera(np.vstack([COARSE.points[index], ball]))
     jacobian = _point_jacobian(camera, x)
     tangents = COARSE.tangents[index] @ camera.rotation.T
-    normals = _projected_normals(x[:-1], tangents)
+    normals = _project_normals(x[:-1], tangents)
     rows = normals[:, 0, None] * jacobian[:-1, 0] + normals[:, 1, None] * jacobian[:-1, 1]
     rows *= np.sqrt(weights)[:, None]
     information = np.einsum("ni,nj->ij", rows, rows) / CLICK_SIGMA**2
@@ -195,7 +195,7 @@ def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> CameraCe
     return CameraCertainty(sigma * float(x[-1, 2]) / focal, size_sigma)
 
 
-def _projected_normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
+def _project_normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
     """Unit normals of projected markings; points and tangents in the camera frame, (N, 3)."""
     depth = x[:, 2]
     along_u = tangents[:, 0] - tangents[:, 2] * x[:, 0] / depth
@@ -341,11 +341,11 @@ def find_camera(
             return None
         pixels = project_trials(trials, COARSE.points)
         seen = is_inside_image(pixels, 4.0)
-        good = _acceptable_trials(trials, ball, seen, is_main) & ~_has_too_close_marking(
+        good = _find_acceptable_trials(trials, ball, seen, is_main) & ~_has_too_close_marking(
             pixels, seen
         )
         for index in np.flatnonzero(good):
-            camera = _camera_of_trial(trials, int(index))
+            camera = _make_camera_of_trial(trials, int(index))
             if _is_good_certainty(estimate_certainty(camera, ball, seen[index])):
                 return camera
     return None
@@ -380,7 +380,9 @@ def _draw_trial_cameras(
     )
 
 
-def _acceptable_trials(trials: TrialCameras, ball: FloatArray, seen: Mask, is_main: bool) -> Mask:
+def _find_acceptable_trials(
+    trials: TrialCameras, ball: FloatArray, seen: Mask, is_main: bool
+) -> Mask:
     counts = count_seen_points(seen, COARSE)
     markings = counts >= 3
     straight_x = markings[:, COARSE.runs_along_x].sum(axis=1)
@@ -419,7 +421,7 @@ def _has_too_close_marking(pixels: FloatArray, seen: Mask) -> Mask:
     return close
 
 
-def _camera_of_trial(trials: TrialCameras, index: int) -> Camera:
+def _make_camera_of_trial(trials: TrialCameras, index: int) -> Camera:
     distortion = np.zeros(12)
     distortion[0] = trials.k1[index]
     focal = float(trials.focal[index])

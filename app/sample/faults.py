@@ -73,7 +73,7 @@ def choose_another_instant(
         shift = np.array([np.cos(angle), np.sin(angle), -abs(rng.normal(0, 0.25))]) * distance
         moved = advance_instant(instant, float(rng.choice([-1, 1]) * rng.uniform(0.3, 0.9)), shift)
         moved_by = float(np.linalg.norm(moved.ball - instant.ball))
-        gap = _ray_gap(main, instant.ball, replay, moved.ball)
+        gap = _distance_between_rays(main, instant.ball, replay, moved.ball)
         on_pitch = abs(moved.ball[0]) < 53.5 and abs(moved.ball[1]) < 34.5
         if on_pitch and (best is None or gap > best[0]):
             best = gap, moved, moved_by
@@ -84,7 +84,9 @@ def choose_another_instant(
     return best[1], best[2]
 
 
-def _ray_gap(a: FloatArray, ball_a: FloatArray, b: FloatArray, ball_b: FloatArray) -> float:
+def _distance_between_rays(
+    a: FloatArray, ball_a: FloatArray, b: FloatArray, ball_b: FloatArray
+) -> float:
     normal = np.cross(ball_a - a, ball_b - b)
     return float(abs((b - a) @ normal) / max(float(np.linalg.norm(normal)), 1e-12))
 
@@ -100,7 +102,7 @@ def plant_annotation_fault(plan: FaultPlan, view: View) -> tuple[View, PlantedFa
         return replace(view, balls=()), PlantedFault(plan.kind, view.key)
     if plan.kind == "swapped_sides":
         lines = {opposite_marking(name): points for name, points in view.station.lines.items()}
-        return _with_lines(view, make_lines(lines)), PlantedFault(plan.kind, view.key)
+        return _replace_lines(view, make_lines(lines)), PlantedFault(plan.kind, view.key)
     if plan.kind == "bad_point":
         return _misplace_point(rng, view)
     return _swap_label(rng, view)
@@ -115,14 +117,14 @@ def remove_markings(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFau
     rng = np.random.default_rng([plan.seed, 0xBAD])
     lines = dict(view.station.lines)
     plain = sorted(
-        n for n, p in lines.items() if n not in CIRCLES and _extent_of_points(p) > PLAIN_PX
+        n for n, p in lines.items() if n not in CIRCLES and _measure_point_extent(p) > PLAIN_PX
     )
     count = min(UNDRAWN, len(plain))
     chosen = [str(name) for name in rng.choice(plain or [""], count, replace=False)]
     for name in chosen:
         del lines[name]
     faults = tuple(PlantedFault(plan.kind, view.key, name) for name in chosen)
-    return _with_lines(view, make_lines(lines)), faults
+    return _replace_lines(view, make_lines(lines)), faults
 
 
 def _misplace_point(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
@@ -130,7 +132,7 @@ def _misplace_point(rng: np.random.Generator, view: View) -> tuple[View, Planted
     straight = [
         n
         for n, p in lines.items()
-        if n not in CIRCLES and len(p) >= 3 and _extent_of_points(p) > 60
+        if n not in CIRCLES and len(p) >= 3 and _measure_point_extent(p) > 60
     ]
     marking = str(rng.choice(straight or list(lines)))
     points = list(lines[marking])
@@ -142,7 +144,7 @@ def _misplace_point(rng: np.random.Generator, view: View) -> tuple[View, Planted
     points[index] = type(points[index])(float(moved[0]), float(moved[1]))
     lines[marking] = tuple(points)
     fault = PlantedFault("bad_point", view.key, marking, marking, index, amount)
-    return _with_lines(view, make_lines(lines)), fault
+    return _replace_lines(view, make_lines(lines)), fault
 
 
 def _swap_label(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
@@ -151,15 +153,17 @@ def _swap_label(rng: np.random.Generator, view: View) -> tuple[View, PlantedFaul
         (true, label)
         for true, points in lines.items()
         for label in list_confusable_markings(true)
-        if label not in lines and _extent_of_points(points) > 60
+        if label not in lines and _measure_point_extent(points) > 60
     ]
     if not mistakes:
         # All that could be confused is annotated itself: the wrong clicks replace the right ones.
-        longest = max(lines, key=lambda name: _extent_of_points(lines[name]))
+        longest = max(lines, key=lambda name: _measure_point_extent(lines[name]))
         mistakes = [(longest, label) for label in list_confusable_markings(longest)]
     true, label = mistakes[int(rng.integers(len(mistakes)))]
     lines[label] = lines.pop(true)
-    return _with_lines(view, make_lines(lines)), PlantedFault("wrong_label", view.key, label, true)
+    return _replace_lines(view, make_lines(lines)), PlantedFault(
+        "wrong_label", view.key, label, true
+    )
 
 
 def list_confusable_markings(marking: str) -> tuple[str, ...]:
@@ -202,10 +206,10 @@ def _swap_words(text: str, a: str, b: str) -> str:
     return " ".join(words.get(word, word) for word in text.split(" "))
 
 
-def _extent_of_points(points: tuple[tuple[float, float], ...]) -> float:
+def _measure_point_extent(points: tuple[tuple[float, float], ...]) -> float:
     array = np.array(points)
     return float(np.linalg.norm(array.max(axis=0) - array.min(axis=0)))
 
 
-def _with_lines(view: View, lines: Lines) -> View:
+def _replace_lines(view: View, lines: Lines) -> View:
     return replace(view, station=replace(view.station, lines=lines))

@@ -297,16 +297,16 @@ class _PersonPainter:
         point: FloatArray = self.person.joints[INDEX[joint]]
         return point
 
-    def _pixels_of_share(self, share: float) -> float:
+    def _height_fraction_to_pixels(self, share: float) -> float:
         return share * self.person.height * self.person.scale
 
     def _draw_limb(
         self, a: FloatArray, b: FloatArray, ra: float, rb: float, colour: Colour
     ) -> None:
-        ra, rb = self._pixels_of_share(ra), self._pixels_of_share(rb)
-        self.patch.capsule(a, b, ra, rb, _dim_colour(colour, 0.66))
+        ra, rb = self._height_fraction_to_pixels(ra), self._height_fraction_to_pixels(rb)
+        self.patch.fill_capsule(a, b, ra, rb, _dim_colour(colour, 0.66))
         shift = np.array([0.26 * self.lit_from, -0.10])
-        self.patch.capsule(a + shift * ra, b + shift * rb, ra * 0.72, rb * 0.72, colour)
+        self.patch.fill_capsule(a + shift * ra, b + shift * rb, ra * 0.72, rb * 0.72, colour)
 
     def _draw_leg(self, side: str) -> None:
         hip, knee, ankle, toe = (
@@ -325,7 +325,7 @@ class _PersonPainter:
         keeper = self.person.index in (0, TEAM)
         self._draw_limb(elbow, hand, 0.023, 0.018, self.kit.shirt if keeper else self.skin)
         if keeper:
-            self.patch.disc(hand, self._pixels_of_share(0.030), (230, 234, 236))
+            self.patch.fill_disc(hand, self._height_fraction_to_pixels(0.030), (230, 234, 236))
         cuff = shoulder + 0.75 * (elbow - shoulder)
         self._draw_limb(cuff, elbow, 0.025, 0.023, self.skin)
         sleeve = self.kit.second if self.kit.pattern == "halves" else self.kit.shirt
@@ -347,10 +347,10 @@ class _PersonPainter:
     def _draw_torso(self) -> None:
         top, low = self._joint_pixel("chest"), self._joint_pixel("pelvis")
         chest, waist = (
-            self._pixels_of_share(self._half_width_in_view(0.108, 0.066)),
-            self._pixels_of_share(self._half_width_in_view(0.080, 0.058)),
+            self._height_fraction_to_pixels(self._compute_half_width_in_view(0.108, 0.066)),
+            self._height_fraction_to_pixels(self._compute_half_width_in_view(0.080, 0.058)),
         )
-        self.patch.capsule(top, low, chest * 0.92, waist, _dim_colour(self.kit.shirt, 0.66))
+        self.patch.fill_capsule(top, low, chest * 0.92, waist, _dim_colour(self.kit.shirt, 0.66))
         # The shirt is a cylinder around the spine; each strip has its own light and colour.
         for left, right in pairwise(_TURNS):
             middle = (left + right) / 2
@@ -359,13 +359,13 @@ class _PersonPainter:
                 [[np.sin(left), np.sin(right), np.sin(right), np.sin(left)], [-0.25, -0.25, 0, 0]]
             )
             quad = np.array([top, top, low, low]) + rim.T * [[chest], [chest], [waist], [waist]]
-            colour = self._strip_colour(float(middle))
-            self.patch.polygon(quad, _dim_colour(colour, float(light)))
+            colour = self._shirt_colour_at_angle(float(middle))
+            self.patch.fill_polygon(quad, _dim_colour(colour, float(light)))
 
-    def _half_width_in_view(self, side: float, front: float) -> float:
+    def _compute_half_width_in_view(self, side: float, front: float) -> float:
         return float(np.hypot(side * np.cos(self.person.turn), front * np.sin(self.person.turn)))
 
-    def _strip_colour(self, angle: float) -> Colour:
+    def _shirt_colour_at_angle(self, angle: float) -> Colour:
         kit, around = self.kit, angle + self.person.turn
         second = {
             "stripes": int(np.floor(np.degrees(around) / 30.0)) % 2 == 1,
@@ -376,36 +376,37 @@ class _PersonPainter:
     def _draw_shirt_number(self, number: int) -> None:
         """On the back, where it can be read."""
         facing_away = -float(np.cos(self.person.turn))
-        tall = self._pixels_of_share(0.15) * self.patch.fine
-        if facing_away < 0.45 or tall < 14 or self._pixels_of_share(0.15) < 7:
+        tall = self._height_fraction_to_pixels(0.15) * self.patch.fine
+        if facing_away < 0.45 or tall < 14 or self._height_fraction_to_pixels(0.15) < 7:
             return
         text, font = str(number), cv2.FONT_HERSHEY_DUPLEX
         (width, height), _ = cv2.getTextSize(text, font, 1.0, 2)
         scale = min(
-            tall / height, self._pixels_of_share(0.15) * facing_away * self.patch.fine / width
+            tall / height,
+            self._height_fraction_to_pixels(0.15) * facing_away * self.patch.fine / width,
         )
         bright = sum(self.kit.shirt) > 330 or self.kit.pattern == "stripes"
         ink = (30, 28, 28, 255) if bright else (240, 240, 240, 255)
         center = self._joint_pixel("chest") + 0.36 * (
             self._joint_pixel("pelvis") - self._joint_pixel("chest")
         )
-        x, y = self.patch.to_fine(center) / 16
+        x, y = self.patch.to_enlarged_pixels(center) / 16
         origin = (int(x - width * scale / 2), int(y + height * scale / 2))
         thick = max(1, round(scale * 3))
         cv2.putText(self.patch.pixels, text, origin, font, scale, ink, thick, cv2.LINE_AA)
 
     def _draw_head(self, head: FloatArray) -> None:
-        radius = self._pixels_of_share(0.056)
+        radius = self._height_fraction_to_pixels(0.056)
         toward = float(np.cos(self.person.turn))
         side = float(np.sin(self.person.turn))
-        self.patch.disc(head, radius, _dim_colour(self.hair, 0.9))
+        self.patch.fill_disc(head, radius, _dim_colour(self.hair, 0.9))
         if toward > -0.35:
             # The face: shifted the way the person looks, below the hair line.
             share = min(1.0, 0.62 + 0.4 * toward)
             face = head + np.array([-side * 0.42, 0.26]) * radius
-            self.patch.disc(face, radius * 0.84 * share, _dim_colour(self.skin, 0.78))
+            self.patch.fill_disc(face, radius * 0.84 * share, _dim_colour(self.skin, 0.78))
             lit = face + np.array([0.16 * self.lit_from, -0.06]) * radius
-            self.patch.disc(lit, radius * 0.66 * share, self.skin)
+            self.patch.fill_disc(lit, radius * 0.66 * share, self.skin)
 
 
 def _dim_colour(colour: Colour, light: float) -> Colour:

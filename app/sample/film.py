@@ -96,7 +96,7 @@ class Backdrop:
             np.arange(-GRID, size + GRID, GRID) + GRID / 2 - 0.5 for size in (HEIGHT, WIDTH)
         )
         grid = np.stack(np.meshgrid(columns, rows), axis=-1)
-        pan, rise = _pixel_directions(camera, grid.reshape(-1, 2), self.pan)
+        pan, rise = _compute_pixel_directions(camera, grid.reshape(-1, 2), self.pan)
         across, down = (
             cv2.resize(
                 part.reshape(grid.shape[:2]).astype(np.float32),
@@ -109,7 +109,7 @@ class Backdrop:
         )  # fmt: skip
 
 
-def _pixel_directions(
+def _compute_pixel_directions(
     camera: Camera, pixels: FloatArray, pan: float
 ) -> tuple[FloatArray, FloatArray]:
     """How far to the right of a pan the rays of pixels go, radians, and how far they fall a metre, both shape (N,)."""
@@ -126,7 +126,9 @@ def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
         [(x, y) for x in across for y in down if x in across[[0, -1]] or y in down[[0, -1]]]
     )
     middle = np.radians(cameras[len(cameras) // 2].pan_tilt_roll_degrees[0])
-    seen = [_pixel_directions(camera, rim, middle) for camera in [*cameras[::5], cameras[-1]]]
+    seen = [
+        _compute_pixel_directions(camera, rim, middle) for camera in [*cameras[::5], cameras[-1]]
+    ]
     pan, rise = (np.concatenate(part) for part in zip(*seen, strict=True))
     size = float(np.ptp(pan) * np.ptp(rise))
     focal = min(max(camera.focal_length[0] for camera in cameras), (MOST_PIXELS / size) ** 0.5)
@@ -143,7 +145,7 @@ def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
     bowl = make_shading_stadium(cameras[0], look)
     for left in range(0, width, STRIP):
         eye = make_shading_camera(
-            _level_camera(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP)
+            _make_level_camera(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP)
         )
         shade_frame(
             strip, behind, light, exposure, eye, make_shading_grass(look), bowl, *make_noise_tiles()
@@ -158,7 +160,7 @@ def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
     return drawn
 
 
-def _level_camera(backdrop: Backdrop, camera: Camera, pan: float, width: int) -> Camera:
+def _make_level_camera(backdrop: Backdrop, camera: Camera, pan: float, width: int) -> Camera:
     """A level camera at the same place, whose rows are those of the cylinder where it looks."""
     return Camera(
         rotation=rotation_from_pan_tilt_roll(pan, LEVEL, 0.0),
@@ -183,7 +185,7 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: MatchLook)
     left = round((pan - backdrop.pan) * backdrop.focal - wide / 2)
     if left < 0 or left + wide > width or far < 10.0:
         return
-    flat = _level_camera(backdrop, camera, pan, wide)
+    flat = _make_level_camera(backdrop, camera, pan, wide)
     angle = (np.arange(left, left + wide) / backdrop.focal + backdrop.pan - pan)[None]
     fall = (np.arange(height)[:, None] - backdrop.horizon) / np.cos(angle)
     there = np.tan(angle) * backdrop.focal + wide / 2 + np.zeros((height, 1))
@@ -251,31 +253,34 @@ def _draw_soft_shadow(image: Image, camera: Camera, place: FloatArray, radius: f
     pixels = camera.project(np.column_stack([corners, np.zeros(4)]))
     if np.isnan(pixels).any():
         return
-    low, high = pixels.min(axis=0).round().astype(int), pixels.max(axis=0).round().astype(int) + 1
+    low, high = (
+        pixels.min(axis=0).round().astype(int),
+        pixels.max(axis=0).round().astype(int) + 1,
+    )
     rows, columns = image.shape[:2]
     if (low < 0).any() or high[0] > columns or high[1] > rows or (high - low < 2).any():
         return
     area = image[low[1] : high[1], low[0] : high[0]]
-    light = cv2.resize(_shadow_mask(), (high - low).tolist())
+    light = cv2.resize(_make_shadow_mask(), (high - low).tolist())
     area[...] = (area * light[..., None]).astype(np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _shadow_mask() -> FloatArray:
+def _make_shadow_mask() -> FloatArray:
     y, x = np.mgrid[-1:1:25j, -1:1:25j]
     return np.asarray(1.0 - 0.5 * np.clip(1.2 * (1 - np.hypot(x, y)), 0, 1))
 
 
 def add_grain(image: Image, number: int) -> Image:
     """The picture with the sensor's noise of a frame."""
-    lighter, darker = _grain_tiles()
+    lighter, darker = _make_grain_tiles()
     row, column = (number * 7919) % 61, (number * 104_729) % 67
     there = np.s_[row : row + HEIGHT, column : column + WIDTH]
     return np.asarray(cv2.subtract(cv2.add(image, lighter[there]), darker[there]), np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _grain_tiles() -> tuple[Image, Image]:
+def _make_grain_tiles() -> tuple[Image, Image]:
     noise = np.random.default_rng(7).normal(0, GRAIN, (HEIGHT + 61, WIDTH + 67, 1)).round()
     both = [
         np.repeat(np.clip(sign * noise, 0, 255), 3, axis=2).astype(np.uint8) for sign in (1, -1)

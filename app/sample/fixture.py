@@ -126,14 +126,14 @@ def make_look(index: int, seed: int, evening: bool) -> MatchLook:
     """The look of match ``index``: neighbours differ in kits, grass and light."""
     rng = np.random.default_rng([seed, index, 0x100C])
     home, away = _PAIRS[(index + seed) % len(_PAIRS)]
-    keepers = [_colour_far_from(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
-    referee = _colour_far_from(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
+    keepers = [_choose_distant_colour(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
+    referee = _choose_distant_colour(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
     return MatchLook(
         seed=int(rng.integers(1 << 31)),
         home=home,
         away=away,
-        home_keeper=_plain_outfit(keepers[0]),
-        away_keeper=_plain_outfit(keepers[1]),
+        home_keeper=_make_plain_outfit(keepers[0]),
+        away_keeper=_make_plain_outfit(keepers[1]),
         referee=Outfit(referee, _BLACK, _BLACK, _BLACK),
         light=_make_light(rng, index, evening),
         grass=_make_grass(rng, index),
@@ -141,11 +141,13 @@ def make_look(index: int, seed: int, evening: bool) -> MatchLook:
     )
 
 
-def _plain_outfit(colour: Colour) -> Outfit:
+def _make_plain_outfit(colour: Colour) -> Outfit:
     return Outfit(colour, _BLACK, colour, colour)
 
 
-def _colour_far_from(choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int) -> Colour:
+def _choose_distant_colour(
+    choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int
+) -> Colour:
     distances = [min(float(np.linalg.norm(np.subtract(c, t))) for t in taken) for c in choices]
     return choices[int(np.argsort(distances)[::-1][skip])]
 
@@ -300,17 +302,17 @@ def make_fixture(index: int, seed: int) -> Fixture:
         home=home,
         away=away,
         score=(int(goals[0]), int(goals[1])),
-        split=split_of(index),
+        split=split_of_match(index),
         look=make_look(index, seed, evening=hour >= 18),
     )
 
 
-def split_of(index: int) -> str:
+def split_of_match(index: int) -> str:
     """Six of eight matches train, one valid, one test; four matches have all three."""
     return {2: "valid", 3: "test"}.get(index % 8, "train")
 
 
-def group_counts(groups: int) -> list[int]:
+def group_counts_by_match(groups: int) -> list[int]:
     """How many groups each match holds: at least four matches, about 32 groups in large ones."""
     matches = max(min(4, groups), round(groups / 31.91))
     edges = [groups * i // matches for i in range(matches + 1)] if matches else [0]

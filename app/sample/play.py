@@ -251,7 +251,7 @@ class Play:
         at = min(max(seconds / PEOPLE_STEP, 0.0), len(self.feet) - 1.001)
         low, share = int(at), at - int(at)
 
-        def between(values: FloatArray) -> FloatArray:
+        def interpolate(values: FloatArray) -> FloatArray:
             return np.asarray(values[low] + share * (values[low + 1] - values[low]))
 
         ball = self.ball_at(np.array([seconds]))[0]
@@ -260,10 +260,10 @@ class Play:
         return Instant(
             ball=ball,
             spin=spin,
-            feet=between(self.feet),
-            heading=between(self.heading),
-            speed=between(self.speed),
-            stride=between(self.stride),
+            feet=interpolate(self.feet),
+            heading=interpolate(self.heading),
+            speed=interpolate(self.speed),
+            stride=interpolate(self.stride),
             height=self.height,
             numbers=self.numbers,
         )
@@ -275,10 +275,10 @@ def make_play(seconds: float, seed: int, numbers: tuple[int, ...]) -> Play:
     Args:
         numbers: Of the shirts, 23.
     """
-    ball, modes, receptions = _play_ball(seconds + 1.0, np.random.default_rng([seed, 0xBA]))
+    ball, modes, receptions = _simulate_ball(seconds + 1.0, np.random.default_rng([seed, 0xBA]))
     rng = np.random.default_rng([seed, 0x9E])
     height = np.clip(rng.normal(1.82, 0.06, PEOPLE), 1.66, 1.98)
-    feet, velocity = _run_people(ball, receptions, rng)
+    feet, velocity = _simulate_people(ball, receptions, rng)
     speed = np.hypot(velocity[..., 0], velocity[..., 1])
     every = round(PEOPLE_STEP / BALL_STEP)
     to_ball = ball[::every, None, :2][: len(feet)] - feet
@@ -288,7 +288,7 @@ def make_play(seconds: float, seed: int, numbers: tuple[int, ...]) -> Play:
     return Play(ball, modes, feet, heading, speed, stride, height, numbers)
 
 
-def _play_ball(
+def _simulate_ball(
     seconds: float, rng: np.random.Generator
 ) -> tuple[FloatArray, list[BallMode], list[tuple[int, int]]]:
     """Its places and modes; and each pass: the steps at which it is kicked, and received."""
@@ -310,14 +310,14 @@ def _play_ball(
             and (now >= until or (np.abs(place[:2]) > REACH + 3.0).any())
         ):
             held, until = True, now + rng.uniform(0.4, 1.6)
-            way = _pass_target(now, rng) - place[:2]
+            way = _choose_pass_target(now, rng) - place[:2]
             velocity = np.array([*(rng.uniform(0.5, 3.5) * way / np.linalg.norm(way)), 0.0])
             place[2] = RADIUS
             passes.append((kicked, step))
     return np.array(places), modes, passes
 
 
-def _pass_target(now: float, rng: np.random.Generator) -> FloatArray:
+def _choose_pass_target(now: float, rng: np.random.Generator) -> FloatArray:
     focus = ATTACK_M * np.sin(2 * np.pi * (now / ATTACK_SECONDS + 0.08))
     aim = np.array([focus, 0.0]) + rng.normal(0, (8.0, 12.0))
     return np.asarray(np.clip(aim, -REACH, REACH))
@@ -327,7 +327,7 @@ def _plan_pass(
     place: FloatArray, now: float, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:  # fmt: skip
     """Velocity of a pass, and when somebody may stop it."""
-    way = _pass_target(now, rng) - place[:2]
+    way = _choose_pass_target(now, rng) - place[:2]
     far = float(np.linalg.norm(way)) + 1e-6
     if far > 14.0 and rng.random() < 0.75:
         lasts = float(np.clip(far / 15.0, 1.0, 2.4))
@@ -336,7 +336,7 @@ def _plan_pass(
     return np.array([*(pace * way / far), 0.0]), now + max(far / (0.9 * pace), 0.4)
 
 
-def _run_people(
+def _simulate_people(
     ball: FloatArray, passes: list[tuple[int, int]], rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Feet and velocities, shape (M, 23, 2): everybody keeps to a place that follows the ball; who gets it runs there."""
@@ -344,16 +344,16 @@ def _run_people(
     steps = len(ball) // every
     phase, pace = rng.uniform(0, 2 * np.pi, (2, PEOPLE, 2)), rng.uniform(0.25, 0.6, (PEOPLE, 2))
     passes = [*passes, (len(ball), len(ball))]
-    feet = push_people_apart(_formation_positions(ball[0, :2]))
+    feet = push_people_apart(_compute_formation_positions(ball[0, :2]))
     velocity, smooth = np.zeros((PEOPLE, 2)), ball[0, :2].copy()
     turn, receiver = 0, 0
     all_feet, all_velocity = np.empty((2, steps, PEOPLE, 2))
     for step in range(steps):
         at, now = step * every, step * PEOPLE_STEP
         smooth += PEOPLE_STEP / 1.2 * (ball[at, :2] - smooth)
-        wanted = _formation_positions(smooth) + 2.2 * np.sin(phase[0] + pace * now) * np.cos(
-            phase[1]
-        )
+        wanted = _compute_formation_positions(smooth) + 2.2 * np.sin(
+            phase[0] + pace * now
+        ) * np.cos(phase[1])
         caps = np.full(PEOPLE, RUN)
         while at >= passes[turn + 1][0] if turn + 1 < len(passes) else False:
             turn += 1
@@ -375,7 +375,7 @@ def _run_people(
     return all_feet, all_velocity
 
 
-def _formation_positions(ball: FloatArray) -> FloatArray:
+def _compute_formation_positions(ball: FloatArray) -> FloatArray:
     """Where people would stand for a ball there, shape (23, 2)."""
     focus = ball * (0.72, 0.35)
     teams = [

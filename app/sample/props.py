@@ -47,25 +47,29 @@ class Patch:
         """Whether it lies outside the frame."""
         return self.pixels.size == 0
 
-    def to_fine(self, points: FloatArray) -> npt.NDArray[np.int32]:
+    def to_enlarged_pixels(self, points: FloatArray) -> npt.NDArray[np.int32]:
         """Image pixels in the fixed-point coordinates of the enlarged picture."""
         # The centre of pixel 0 is at 0, that of the enlarged pixel 0 at (0.5 / fine) - 0.5.
         local = (points - (self.left - 0.5, self.top - 0.5)) * self.fine - 0.5
         return np.asarray(np.round(local * _SUB), np.int32)
 
-    def polygon(self, points: FloatArray, colour: Colour) -> None:
+    def fill_polygon(self, points: FloatArray, colour: Colour) -> None:
         """Fill a convex polygon, image pixels, shape (N, 2)."""
         cv2.fillConvexPoly(
-            self.pixels, self.to_fine(points), _premultiplied_colour(colour, 1.0), 8, _SHIFT
+            self.pixels,
+            self.to_enlarged_pixels(points),
+            _premultiplied_colour(colour, 1.0),
+            8,
+            _SHIFT,
         )
 
-    def disc(self, center: FloatArray, radius: float, colour: Colour) -> None:
+    def fill_disc(self, center: FloatArray, radius: float, colour: Colour) -> None:
         """Fill a circle; centre and radius in image pixels."""
         self._draw_disc(
             float(center[0]), float(center[1]), radius, _premultiplied_colour(colour, 1.0)
         )
 
-    def capsule(
+    def fill_capsule(
         self, a: FloatArray, b: FloatArray, radius_a: float, radius_b: float, colour: Colour
     ) -> None:
         """Fill a limb: two circles and what lies between them, image pixels."""
@@ -91,7 +95,7 @@ class Patch:
         cv2.circle(self.pixels, self._to_fixed_point(x, y), size, paint, -1, 8, _SHIFT)
 
     def _to_fixed_point(self, x: float, y: float) -> tuple[int, int]:
-        """As ``to_fine``, for one point."""
+        """As ``to_enlarged_pixels``, for one point."""
         return (
             round(((x - self.left + 0.5) * self.fine - 0.5) * _SUB),
             round(((y - self.top + 0.5) * self.fine - 0.5) * _SUB),
@@ -99,7 +103,7 @@ class Patch:
 
     def polyline(self, points: FloatArray, colour: Colour, opacity: float, thickness: int) -> None:
         """A thin line through image pixels, ``thickness`` in enlarged pixels."""
-        path = [self.to_fine(points).reshape(-1, 1, 2)]
+        path = [self.to_enlarged_pixels(points).reshape(-1, 1, 2)]
         cv2.polylines(
             self.pixels, path, False, _premultiplied_colour(colour, opacity), thickness, 8, _SHIFT
         )
@@ -133,7 +137,7 @@ WHITE: Colour = (238.0, 240.0, 240.0)
 
 def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     """The net of the goal at x = ``sign`` * 52.5 m."""
-    strands = _net_cords(sign)
+    strands = _list_net_cords(sign)
     everything = camera.project(np.vstack(strands))
     scale = _pixels_per_metre(camera, sign)
     if scale is None or np.isnan(everything).any() or not _is_in_frame(everything, image):
@@ -151,7 +155,7 @@ def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
 
 
 @lru_cache(maxsize=2)
-def _net_cords(sign: float) -> list[FloatArray]:
+def _list_net_cords(sign: float) -> list[FloatArray]:
     """Cords of the net: across the back, over the roof and down, and on both sides."""
     half = GOAL_WIDTH / 2
     profile = np.array(
@@ -202,7 +206,7 @@ def draw_goal_posts(image: Image, camera: Camera, sign: float, gain: Colour) -> 
         for path, radius in zip(pixels, radii, strict=True):
             for i in range(len(path) - 1):
                 move = np.array([shift, shift]) * radius[i]
-                patch.capsule(
+                patch.fill_capsule(
                     path[i] + move,
                     path[i + 1] + move,
                     radius[i] * share,
@@ -234,7 +238,7 @@ def draw_ball(
     ys = (np.arange(top, bottom)[:, None] + offsets).ravel()
     grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
     hit, normals = _intersect_sphere(camera, grid, instant.ball, radius)
-    colour = _ball_colours(camera, normals, instant.spin, lit_from) * np.array(gain)
+    colour = _shade_ball(camera, normals, instant.spin, lit_from) * np.array(gain)
     shape = (bottom - top, fine, right - left, fine)
     cover = hit.reshape(shape).mean(axis=(1, 3))[..., None]
     summed = (colour * hit[:, None]).reshape(*shape, 3).mean(axis=(1, 3))
@@ -257,7 +261,7 @@ def _intersect_sphere(
     return hit.astype(np.float64), normals
 
 
-def _ball_colours(
+def _shade_ball(
     camera: Camera, normals: FloatArray, spin: FloatArray, lit_from: float
 ) -> FloatArray:
     """White with dark pentagons at the corners of an icosahedron, lit from above."""

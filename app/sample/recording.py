@@ -196,7 +196,7 @@ def write_recording(
             if progress is not None:
                 progress(number + 1, total)
         video.release()
-        text = json_text(_recording_truth(play, shots, since), compact=True)
+        text = json_text(_recording_truth_to_json(play, shots, since), compact=True)
         truth.write_text(text + "\n", encoding="utf-8")
         part.replace(out)
     finally:
@@ -226,7 +226,7 @@ def _plan_recording(
             if live is None:
                 raise InputError(f"shot {number + 1} is a replay, but no live shot comes before it")
             source = live[0]
-            start = _start_of_liveliest_stretch(play, *live[1:], part.seconds * part.speed)
+            start = _find_liveliest_stretch(play, *live[1:], part.seconds * part.speed)
         elif part.kind == "main":
             live = number, since + first / FPS, since + last / FPS
         low, high = begin - soft[number] // 2, end + soft[number + 1] // 2
@@ -234,14 +234,14 @@ def _plan_recording(
             math.floor((frame - begin) * part.speed * rate / FPS) for frame in (low, high)
         )
         times = start + np.arange(lowest, highest + 2) / rate
-        cameras = _cameras_of_shot(part, play, times)
+        cameras = _make_cameras_of_shot(part, play, times)
         shots.append(
             _FilmedShot(part, number, first, last, begin, start, rate, lowest, cameras, source)
         )
     return play, shots
 
 
-def _start_of_liveliest_stretch(play: Play, first: float, last: float, length: float) -> float:
+def _find_liveliest_stretch(play: Play, first: float, last: float, length: float) -> float:
     """When a replay begins: the stretch of a live shot in which the ball goes farthest, heights above all."""
     if length > last - first:
         raise InputError("a replay must not be longer than the live shot before it")
@@ -254,12 +254,12 @@ def _start_of_liveliest_stretch(play: Play, first: float, last: float, length: f
     return float(starts[np.argmax(covered)]) + (0.007 if length < last - first - 0.1 else 0.0)
 
 
-def _cameras_of_shot(part: ShotPlan, play: Play, times: FloatArray) -> list[Camera]:
+def _make_cameras_of_shot(part: ShotPlan, play: Play, times: FloatArray) -> list[Camera]:
     """The cameras of a shot at times."""
     if part.kind == "main":
-        return _cameras_following_ball(play, times, MAIN, 0.7, 1650.0, 0.004)
+        return _make_cameras_following_ball(play, times, MAIN, 0.7, 1650.0, 0.004)
     if part.kind == "replay":
-        return _cameras_following_ball(play, times, STANDS[part.stand], 0.45, 2300.0, -0.006)
+        return _make_cameras_following_ball(play, times, STANDS[part.stand], 0.45, 2300.0, -0.006)
     if part.kind == "other":
         across = np.linspace(-9.0, 9.0, len(times)) + 0.2 * (times[0] % 60)
         aims = np.column_stack(
@@ -280,7 +280,7 @@ def _cameras_of_shot(part: ShotPlan, play: Play, times: FloatArray) -> list[Came
     return aim_cameras(MAIN, aims, np.full(len(times), CLOSEUP_FOCAL), 0.0)
 
 
-def _cameras_following_ball(
+def _make_cameras_following_ball(
     play: Play, times: FloatArray, position: FloatArray, late: float, focal: float, roll: float
 ) -> list[Camera]:
     """Cameras that follow the ball, smoothly and a little late, and zoom in where play is near a goal."""
@@ -404,12 +404,14 @@ def draw_logo(picture: Image, share: float, turn: int = 0) -> Image:
     return picture
 
 
-def _recording_truth(play: Play, shots: list[_FilmedShot], since: float) -> dict[str, Any]:
+def _recording_truth_to_json(play: Play, shots: list[_FilmedShot], since: float) -> dict[str, Any]:
     """What is true of a recording, as JSON; times are seconds after its first frame."""
     frames, links = [], []
     for shot in shots:
         part = shot.part
-        frames += [_frame_truth(play, shot, frame) for frame in range(shot.first, shot.last + 1)]
+        frames += [
+            _frame_truth_to_json(play, shot, frame) for frame in range(shot.first, shot.last + 1)
+        ]
         if shot.source is not None:
             offset = shot.start - since - part.speed * shot.begin / FPS
             link = {"live": shot.source, "replay": shot.number}
@@ -429,7 +431,7 @@ def _recording_truth(play: Play, shots: list[_FilmedShot], since: float) -> dict
     }  # fmt: skip
 
 
-def _frame_truth(play: Play, shot: _FilmedShot, frame: int) -> dict[str, Any]:
+def _frame_truth_to_json(play: Play, shot: _FilmedShot, frame: int) -> dict[str, Any]:
     picture, is_mix = shot.shown(frame)
     low = math.floor(picture)
     seconds = max(shot.seconds(picture), 0.0)

@@ -64,22 +64,24 @@ def make_noise_tiles() -> tuple[Tile, Tile]:
     """Wrapping noise with unit spread: broad patches, and blades of grass."""
     rng = np.random.default_rng(20_260_101)
     coarse = sum(
-        weight * _smooth_noise(rng, sigma)
+        weight * _make_smooth_noise(rng, sigma)
         for sigma, weight in ((24.0, 0.6), (9.0, 0.5), (3.0, 0.6))
     )
-    fine = 0.8 * _smooth_noise(rng, 0.8) + 0.5 * _smooth_noise(rng, 2.2)
-    return _to_unit_spread(np.asarray(coarse)), _to_unit_spread(np.asarray(fine))
+    fine = 0.8 * _make_smooth_noise(rng, 0.8) + 0.5 * _make_smooth_noise(rng, 2.2)
+    return _normalise_to_unit_spread(np.asarray(coarse)), _normalise_to_unit_spread(
+        np.asarray(fine)
+    )
 
 
-def _smooth_noise(rng: np.random.Generator, sigma: float) -> Tile:
+def _make_smooth_noise(rng: np.random.Generator, sigma: float) -> Tile:
     noise = rng.standard_normal((TILE, TILE)).astype(np.float32)
     margin = int(4 * sigma) + 1
     wrapped = np.pad(noise, margin, mode="wrap")
     blurred = cv2.GaussianBlur(wrapped, (0, 0), sigma)[margin:-margin, margin:-margin]
-    return _to_unit_spread(blurred)
+    return _normalise_to_unit_spread(blurred)
 
 
-def _to_unit_spread(tile: npt.NDArray[Any]) -> Tile:
+def _normalise_to_unit_spread(tile: npt.NDArray[Any]) -> Tile:
     unit: Tile = ((tile - tile.mean()) / tile.std()).astype(np.float32)
     return unit
 
@@ -94,7 +96,7 @@ def make_board_mipmap(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     rng = np.random.default_rng([seed, 0xB0])
     order = rng.permutation(len(BRANDS))[:PANELS]
     width = int(PANEL_METRES / BOARD_HEIGHT * BOARD_PIXELS)
-    strip = np.hstack([_board_image(*BRANDS[index], width) for index in order])
+    strip = np.hstack([_draw_board_image(*BRANDS[index], width) for index in order])
     sizes, rows, top = [], [], 0
     for level in range(SIZES):
         height, length = BOARD_PIXELS >> level, strip.shape[1] >> level
@@ -107,7 +109,7 @@ def make_board_mipmap(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     return np.vstack(sizes), np.array(rows, dtype=np.float64)
 
 
-def _board_image(
+def _draw_board_image(
     text: str, ground: tuple[int, int, int], letters: tuple[int, int, int], width: int
 ) -> Image:
     panel = np.full((BOARD_PIXELS, width, 3), ground, np.uint8)
@@ -144,7 +146,7 @@ def make_shadow_mask(
         _draw_shadow_of_ball(layer, camera, instant.ball, lamp, ball_radius)
         sigma = float(np.clip(light.softness * scale / HALVED, 0.5, 7.0))
         left = _darken_by_layer(left, cv2.GaussianBlur(layer, (0, 0), sigma))
-    left = _darken_by_layer(left, _contact_shadows(left, camera, instant, scale))
+    left = _darken_by_layer(left, _draw_contact_shadows(left, camera, instant, scale))
     return np.asarray(cv2.resize(left, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
@@ -186,7 +188,7 @@ def _draw_shadow_of_ball(
         _fill_polygon(layer, pixels, int(255 * (1 - lamp.darkness)))
 
 
-def _contact_shadows(like: Image, camera: Camera, instant: Instant, scale: float) -> Image:
+def _draw_contact_shadows(like: Image, camera: Camera, instant: Instant, scale: float) -> Image:
     """The dark patch right below feet and ball, whatever the light."""
     layer = np.full_like(like, 255)
     for place in instant.feet:
@@ -230,8 +232,8 @@ def render_view(scene: Scene, view_key: str) -> Image:
     if truth is None:
         raise NotFoundError(f"scene {scene.truth.key} has no view {view_key}")
     camera, instant, look = truth.camera, scene.instants[view_key], scene.fixture.look
-    image = _empty_stadium(camera, instant, look)
-    _draw_movers(image, camera, instant, look)
+    image = _render_empty_stadium(camera, instant, look)
+    _draw_people_ball_and_goals(image, camera, instant, look)
     number = sum(map(ord, scene.truth.key + view_key))
     image = _apply_lens_and_sensor(image, np.random.default_rng([look.seed, number]))
     main = scene.group.views[0]
@@ -240,7 +242,7 @@ def render_view(scene: Scene, view_key: str) -> Image:
     return image
 
 
-def _empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
+def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
     shadow = make_shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
@@ -300,7 +302,9 @@ def make_shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
     )
 
 
-def _draw_movers(image: Image, camera: Camera, instant: Instant, look: MatchLook) -> None:
+def _draw_people_ball_and_goals(
+    image: Image, camera: Camera, instant: Instant, look: MatchLook
+) -> None:
     """Everything that stands on the grass, far things first."""
     side = light_direction_in_image(camera, look)
     gain = look.light.exposure
@@ -357,18 +361,18 @@ def _apply_lens_and_sensor(image: Image, rng: np.random.Generator) -> Image:
     """What lens and sensor add: softness, a darker border, grain."""
     soft = cv2.GaussianBlur(image, (0, 0), 0.6)
     row, column = (int(v) for v in rng.integers(0, (HEIGHT, WIDTH)))
-    noise = np.roll(_sensor_grain(), (-row, -column), axis=(0, 1))
-    return np.asarray(np.clip(soft * _vignette() + noise + 0.5, 0, 255), np.uint8)
+    noise = np.roll(_make_sensor_grain(), (-row, -column), axis=(0, 1))
+    return np.asarray(np.clip(soft * _make_vignette() + noise + 0.5, 0, 255), np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _vignette() -> npt.NDArray[np.float32]:
+def _make_vignette() -> npt.NDArray[np.float32]:
     """How much of the light the lens lets through, shape (720, 1280, 1)."""
     y, x = np.linspace(-1, 1, HEIGHT)[:, None], np.linspace(-1, 1, WIDTH)
     return (1.03 - 0.09 * (x * x + y * y))[..., None].astype(np.float32)
 
 
 @lru_cache(maxsize=1)
-def _sensor_grain() -> npt.NDArray[np.float32]:
+def _make_sensor_grain() -> npt.NDArray[np.float32]:
     rng = np.random.default_rng(7)
     return rng.normal(0, GRAIN, (HEIGHT, WIDTH, 1)).astype(np.float32)

@@ -130,8 +130,8 @@ def find_visible_paths(camera: Camera) -> VisiblePaths:
     first = np.flatnonzero(shown)
     a, b = pixels[first], pixels[first + 1]
     enters, leaves = ~seen[first], ~seen[first + 1]
-    a[enters] = _clip_to_border(b[enters], a[enters])
-    b[leaves] = _clip_to_border(a[leaves], b[leaves])
+    a[enters] = _find_border_crossings(b[enters], a[enters])
+    b[leaves] = _find_border_crossings(a[leaves], b[leaves])
     steps = b - a
     sizes = np.sqrt((steps**2).sum(axis=1))
     lengths = np.zeros(len(MARKINGS))
@@ -141,7 +141,7 @@ def find_visible_paths(camera: Camera) -> VisiblePaths:
     return VisiblePaths(a, steps, along, lengths, before)
 
 
-def _clip_to_border(inner: FloatArray, outer: FloatArray) -> FloatArray:
+def _find_border_crossings(inner: FloatArray, outer: FloatArray) -> FloatArray:
     """Where the ways from pixels in the image to pixels outside leave it, shape (N, 2)."""
     limit = np.array([WIDTH - 1.0, HEIGHT - 1.0])
     step = outer - inner
@@ -201,7 +201,7 @@ def make_person_boxes(
     rng: np.random.Generator, camera: Camera, instant: Instant, tags: tuple[str, ...]
 ) -> tuple[dict[str, Any], ...]:
     """Boxes of the people in view as SoccerNet-v3 keeps them, with class and ID."""
-    corners = camera.project(_person_corners(instant)).reshape(len(tags), -1, 2)
+    corners = camera.project(_compute_person_corners(instant)).reshape(len(tags), -1, 2)
     low, high = corners.min(axis=1), corners.max(axis=1)
     limit = np.array([WIDTH - 1.0, HEIGHT - 1.0])
     low, high = np.clip(low, 0, limit), np.clip(high, 0, limit)
@@ -219,7 +219,7 @@ def make_person_boxes(
     )
 
 
-def _person_corners(instant: Instant) -> FloatArray:
+def _compute_person_corners(instant: Instant) -> FloatArray:
     """Eight corners of an upright box around each person, shape (8 * people, 3)."""
     signs = np.array([(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]) * PLAYER_RADIUS
     ground = instant.feet[:, None] + signs
@@ -311,7 +311,7 @@ def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
     shots, planted = _film_moment(rng, stage, replays, plan)
     keys = [f"{number}.png"] + [f"{number}_{index}.png" for index in range(1, replays + 1)]
     tags = make_person_tags(rng, shots[0].instant)
-    metadata = {IMAGE: _image_metadata(rng, stage, number)}
+    metadata = {IMAGE: _make_image_metadata(rng, stage, number)}
     views = []
     truths = []
     for key, shot in zip(keys, shots, strict=True):
@@ -346,7 +346,7 @@ def _film_moment(
     rng: np.random.Generator, stage: MatchStage, replays: int, plan: FaultPlan | None
 ) -> tuple[list[CameraShot], float | None]:
     """Main camera and replays of a new moment, and the size of a fault of filming."""
-    instant, main = _main_shot(rng, stage)
+    instant, main = _make_main_shot(rng, stage)
     cameras = [main] + [_aim_replay(rng, stage, main, instant.ball) for _ in range(replays)]
     instants = [instant] * len(cameras)
     amount: float | None = None
@@ -365,7 +365,7 @@ def _film_moment(
     return [CameraShot(c, i) for c, i in zip(cameras, instants, strict=True)], amount
 
 
-def _main_shot(rng: np.random.Generator, stage: MatchStage) -> tuple[Instant, Camera]:
+def _make_main_shot(rng: np.random.Generator, stage: MatchStage) -> tuple[Instant, Camera]:
     while True:
         instant = make_instant(rng, stage.numbers)
         # The main camera turns about its tripod; its lens moves a little with it.
@@ -416,7 +416,9 @@ def _record_fault(
     return (PlantedFault(plan.kind, keys[plan.view_index], amount=amount),)
 
 
-def _image_metadata(rng: np.random.Generator, stage: MatchStage, number: int) -> dict[str, Any]:
+def _make_image_metadata(
+    rng: np.random.Generator, stage: MatchStage, number: int
+) -> dict[str, Any]:
     """What SoccerNet-v3 says of each image; a replay carries the time of its action."""
     seconds = (number + float(rng.uniform(0.1, 0.9))) / stage.groups * 2 * 45 * 60
     half = 1 if seconds < 45 * 60 else 2

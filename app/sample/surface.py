@@ -115,7 +115,7 @@ class ShadingGrass(NamedTuple):
     """The grass: its colour, and how it is mown.
 
     ``across``: in bands across the pitch, or along it; ``band`` is their width, metres. ``edge``
-    and ``slope`` are y at x = 0 and slope of the border of the stand's shadow, ``darkness`` is
+    and ``compute_slope`` are y at x = 0 and slope of the border of the stand's shadow, ``darkness`` is
     how dark it is (0: no shadow).
     """
 
@@ -157,7 +157,7 @@ class ShadingStadium(NamedTuple):
 
 
 @_jit
-def _cell_hash(i: int, j: int, k: int) -> float:
+def _hash_cell(i: int, j: int, k: int) -> float:
     """A number in [0, 1) that belongs to the cell (i, j) of layer k."""
     h = np.uint32(i * 374761393 + j * 668265263 + k * 2147483647 + 1013904223)
     h = np.uint32((h ^ (h >> np.uint32(13))) * np.uint32(1274126177))
@@ -180,7 +180,7 @@ def _sample_tile(tile: np.ndarray, x: float, y: float) -> float:
 
 
 @_jit
-def _mowing_bands(s: float, band: float, width: float) -> float:
+def _mowing_band_value(s: float, band: float, width: float) -> float:
     """-1 and +1 in turn along s, smoothed over a footprint of that width."""
     edge = min(max(width, 0.12), band)
     phase = s / band
@@ -195,7 +195,7 @@ def _mowing_bands(s: float, band: float, width: float) -> float:
 
 
 @_jit
-def _hit_side(
+def _intersect_side(
     s0: float, ds: float, h0: float, dh: float, board: float, along: float, dalong: float,
     reach: float, profile: np.ndarray,
 ) -> tuple[float, int, float]:  # fmt: skip
@@ -273,15 +273,15 @@ def _shade_crowd(
     if i % 24 == 0:
         _set_colour(out, seat, 0.0, 106.0 if lv > 0.5 else 80.0)
         return
-    if _cell_hash(i, j, layer) < empty:
+    if _hash_cell(i, j, layer) < empty:
         _set_colour(out, seat, 1.0 if 0.15 < lv < 0.7 else 0.55)
         return
-    clothes = crowd[int(_cell_hash(i, j, layer + 7) * crowd.shape[0])]
+    clothes = crowd[int(_hash_cell(i, j, layer + 7) * crowd.shape[0])]
     if lv < 0.68 and abs(lu - 0.5) < 0.42:
-        light = 0.62 + 0.5 * _cell_hash(i, j, layer + 13)
+        light = 0.62 + 0.5 * _hash_cell(i, j, layer + 13)
         _set_colour(out, clothes, light * (0.62 + 0.38 * min(1.0, lv / 0.4)))
     elif 0.5 < lv < 0.92 and abs(lu - 0.5) < 0.2:
-        tone = 0.4 + 0.5 * _cell_hash(i, j, layer + 5)
+        tone = 0.4 + 0.5 * _hash_cell(i, j, layer + 5)
         out[0], out[1], out[2] = 126.0 * tone, 158.0 * tone, 208.0 * tone
     else:
         _set_colour(out, clothes, 0.0, 43.0)
@@ -299,9 +299,9 @@ def _shade_grass(
     """Colour of the grass without lines and shadows."""
     # Mown grass bends: a band shines when one looks along the way the mower went.
     if turf.across:
-        tone = _mowing_bands(gx, turf.band, wx) * (0.3 + 0.7 * abs(view_y))
+        tone = _mowing_band_value(gx, turf.band, wx) * (0.3 + 0.7 * abs(view_y))
     else:
-        tone = _mowing_bands(gy + 0.5 * turf.band, turf.band, wy) * (0.3 + 0.7 * abs(view_x))
+        tone = _mowing_band_value(gy + 0.5 * turf.band, turf.band, wy) * (0.3 + 0.7 * abs(view_x))
     if abs(gx) > HALF_LENGTH + 2.5 or abs(gy) > HALF_WIDTH + 2.2:
         tone *= 0.15
     patches = _sample_tile(coarse, gx * 8.0, gy * 8.0)
@@ -346,7 +346,7 @@ def _shade_lawn(
 
 
 @_jit
-def _first_hit(
+def _find_first_hit(
     C: np.ndarray, ray: np.ndarray, ground: float,
     seen: np.ndarray, beyond: float, along: float, profile: np.ndarray,
 ) -> tuple[float, int, float, int]:  # fmt: skip
@@ -360,7 +360,9 @@ def _first_hit(
         if not seen[k] or ds <= 1e-9 or s0 + ds * best < board:
             continue
         reach += along if k < 2 else beyond
-        t, what, at = _hit_side(s0, ds, -C[2], -ray[2], board, C[other], ray[other], reach, profile)
+        t, what, at = _intersect_side(
+            s0, ds, -C[2], -ray[2], board, C[other], ray[other], reach, profile
+        )
         if what >= 0 and t < best:
             best, part, place, side = t, what, at, k
     return best, part, place, side
@@ -389,7 +391,7 @@ def _shade_stand(
 
 
 @_jit
-def _pixel_ray(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
+def _write_pixel_ray(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
     """Direction of the ray of a pixel, pitch frame; along the optical axis it has length 1."""
     d2, s = a * a + b * b, 1.0
     for _ in range(4):
@@ -426,9 +428,11 @@ def shade_frame(
     ray, colour = np.zeros(3), np.zeros(3)
     for row in range(image.shape[0]):
         for column in range(image.shape[1]):
-            _pixel_ray(ray, R, eye.k1, (column - eye.x0) / eye.focal, (row - eye.y0) / eye.focal)
+            _write_pixel_ray(
+                ray, R, eye.k1, (column - eye.x0) / eye.focal, (row - eye.y0) / eye.focal
+            )
             ground = -C[2] / ray[2] if ray[2] > 1e-9 else _FAR
-            t, part, place, side = _first_hit(
+            t, part, place, side = _find_first_hit(
                 C, ray, ground, seen, bowl.beyond, bowl.along, profile
             )
             x, y, foot, far = C[0] + t * ray[0], C[1] + t * ray[1], t / eye.focal, True

@@ -23,7 +23,7 @@ from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample import GROUPS, SEED
-from app.sample.fixture import group_counts, make_fixture
+from app.sample.fixture import group_counts_by_match, make_fixture
 from app.sample.render import render_view
 from app.sample.scene import TRUTH, TruthWriter, truth_to_json
 from app.sample.scenes import make_match
@@ -100,8 +100,8 @@ def write_sample(
         raise InputError("a sample needs at least one group and a seed from 0")
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; the sample needs a folder")
-    counts = group_counts(groups)
-    with _staging_folder(out) as folder:
+    counts = group_counts_by_match(groups)
+    with _open_staging_folder(out) as folder:
         whole = [_GroupsJob(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
         with _open_job_map(workers, len(whole) if labels_only else groups) as run:
             # With frames, drawing them is nearly all of the work, so it alone is reported.
@@ -112,7 +112,7 @@ def write_sample(
 
 
 @contextmanager
-def _staging_folder(out: Path) -> Iterator[Path]:
+def _open_staging_folder(out: Path) -> Iterator[Path]:
     """A folder beside ``out``, whose files go there when all are written; else nothing is left."""
     out = Path.cwd() / out
     above = [path for path in out.parents if not path.exists()]
@@ -136,7 +136,11 @@ def _staging_folder(out: Path) -> Iterator[Path]:
 
 
 def _write_labels(
-    out: Path, jobs: list[_GroupsJob], run: _OrderedMap, total: int, progress: ReportProgress | None
+    out: Path,
+    jobs: list[_GroupsJob],
+    run: _OrderedJobRunner,
+    total: int,
+    progress: ReportProgress | None,
 ) -> SampleReport:
     done = views = faults = 0
     temporary = out / f".{TRUTH}.part"
@@ -171,7 +175,7 @@ def _label_match(job: _GroupsJob) -> _LabelledMatch:
 def _write_frames(
     out: Path,
     matches: list[_GroupsJob],
-    run: _OrderedMap,
+    run: _OrderedJobRunner,
     total: int,
     progress: ReportProgress | None,
 ) -> None:
@@ -209,7 +213,7 @@ def _draw_groups(job: _GroupsJob) -> list[tuple[str, bytes]]:
     return members
 
 
-class _OrderedMap:
+class _OrderedJobRunner:
     """Runs a function over jobs in order, in this process or in several."""
 
     def __init__(self, pool: ProcessPoolExecutor | None) -> None:
@@ -220,13 +224,13 @@ class _OrderedMap:
 
 
 @contextmanager
-def _open_job_map(workers: int | None, jobs: int) -> Iterator[_OrderedMap]:
+def _open_job_map(workers: int | None, jobs: int) -> Iterator[_OrderedJobRunner]:
     count = min(workers or os.cpu_count() or 1, jobs)
     if count == 1:
-        yield _OrderedMap(None)
+        yield _OrderedJobRunner(None)
         return
     with open_spawned_pool(count, _use_one_thread) as pool:
-        yield _OrderedMap(pool)
+        yield _OrderedJobRunner(pool)
 
 
 def _use_one_thread() -> None:

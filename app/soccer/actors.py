@@ -15,7 +15,7 @@ TOKEN = " (token "
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._@+-]{0,59}")
 
 
-def with_token(name: str, token: str) -> str:
+def make_token_actor(name: str, token: str) -> str:
     """The name under which a script acts that asks with a person's token.
 
     Example:
@@ -25,7 +25,7 @@ def with_token(name: str, token: str) -> str:
     return f"{name}{TOKEN}{token})"
 
 
-def person_of(actor: str) -> str:
+def person_of_actor(actor: str) -> str:
     """The name of the person behind an actor; no name of a person has a bracket.
 
     Example:
@@ -42,7 +42,7 @@ def is_actor_of(actor: str, name: str) -> bool:
         >>> is_actor_of("anna (token deploy)", "anna"), is_actor_of("anna", "anna (token deploy)")
         (True, False)
     """
-    return name in (actor, person_of(actor))
+    return name in (actor, person_of_actor(actor))
 
 
 def parse_script_name(text: str, *, pointer: str | None = None) -> str:

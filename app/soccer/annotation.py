@@ -24,7 +24,7 @@ def make_lines(lines: Mapping[str, Any]) -> Lines:
     }
 
 
-def lines_without(lines: Lines, markings: Collection[str]) -> Lines:
+def remove_markings(lines: Lines, markings: Collection[str]) -> Lines:
     """The lines but for some markings."""
     return make_lines({name: points for name, points in lines.items() if name not in markings})
 
@@ -54,7 +54,7 @@ class BallAnnotation:
         return self.box.center if self.box is not None else self.point
 
 
-def followed_source(group: str) -> str:
+def make_followed_source(group: str) -> str:
     """What a ball says it comes from that was followed from one of another group, by its key."""
     return f"followed from {group}"
 

@@ -41,7 +41,7 @@ def _is_finite(box: Box) -> bool:
     return all(map(math.isfinite, (box.x, box.y, box.width, box.height)))
 
 
-def ball_fit(solution: Solution | None, view: View, everything: bool) -> BallFit | None:
+def find_ball_fit(solution: Solution | None, view: View, everything: bool) -> BallFit | None:
     """The 3D ball seen again in a view.
 
     In a view that annotates a ball and is in no valid pair it stands only when everything is

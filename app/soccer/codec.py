@@ -14,12 +14,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from app.geometry.camera import Camera, camera_covariance
+from app.geometry.camera import Camera, validate_camera_covariance
 from app.geometry.lens import BROWN_CONRADY
-from app.json_text import canonical_json_text, digest_of, prepare_msgspec_type
+from app.json_text import canonical_json_text, digest_content, prepare_msgspec_type
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
+from app.soccer.group import Group, Media, SharedPosition, Station, View, ViewExclusion
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
@@ -124,14 +124,16 @@ def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | N
     """Back from ``covariance_to_json``.
 
     Raises:
-        ValueError: As ``camera_covariance`` does.
+        ValueError: As ``validate_camera_covariance`` does.
     """
     if value is None:
         return None
-    return camera_covariance(value)
+    return validate_camera_covariance(value)
 
 
-def camera_of_log_entry(body: Mapping[str, Any]) -> tuple[Camera | None, tuple[float, ...] | None]:
+def camera_from_log_entry(
+    body: Mapping[str, Any],
+) -> tuple[Camera | None, tuple[float, ...] | None]:
     """The camera of an entry of the log, None where it was taken away, and its covariance where the entry has
     one."""
     given = body["given"]
@@ -231,14 +233,14 @@ def media_from_json(value: list[Any] | None) -> Media | None:
     return None if value is None else Media(*value)
 
 
-def left_out_to_json(why: LeftOut | None) -> dict[str, Json] | None:
+def view_exclusion_to_json(why: ViewExclusion | None) -> dict[str, Json] | None:
     """``{"reason": ..., "note": ...}`` or None."""
     return None if why is None else {"reason": why.reason, "note": why.note}
 
 
-def left_out_from_json(value: Mapping[str, Any] | None) -> LeftOut | None:
-    """Back from ``left_out_to_json``."""
-    return None if value is None else LeftOut(value["reason"], value["note"])
+def view_exclusion_from_json(value: Mapping[str, Any] | None) -> ViewExclusion | None:
+    """Back from ``view_exclusion_to_json``."""
+    return None if value is None else ViewExclusion(value["reason"], value["note"])
 
 
 def view_to_json(view: View, station: Json | None = None) -> Json:
@@ -247,7 +249,7 @@ def view_to_json(view: View, station: Json | None = None) -> Json:
     ``left_out`` and ``noise`` stand there only where they say something, so that digests of all
     other views are what they always were.
     """
-    why = left_out_to_json(view.left_out)
+    why = view_exclusion_to_json(view.left_out)
     return {
         "key": view.key,
         "station": station_to_json(view.station) if station is None else station,
@@ -269,7 +271,7 @@ def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> 
         media=media_from_json(value["media"]),
         included=value["included"],
         extras=extras_from_json(value["extras"]),
-        left_out=left_out_from_json(value.get("left_out")),
+        left_out=view_exclusion_from_json(value.get("left_out")),
         noise=float(value.get("noise", 1.0)),
     )
 
@@ -361,9 +363,9 @@ def _known_fields(
     return {name: item for name, item in value.items() if name in names}
 
 
-def digest(value: Json) -> str:
+def digest_json(value: Json) -> str:
     """Digest of a JSON value, 32 hexadecimal digits."""
-    return digest_of(canonical_json_text(value).encode())
+    return digest_content(canonical_json_text(value).encode())
 
 
 def station_digest(station: Station) -> str:
@@ -379,19 +381,19 @@ def station_digest(station: Station) -> str:
         parts.append(value["picture"])
     if station.proposed:
         parts.append({"proposed": value["proposed"]})
-    return digest(parts)
+    return digest_json(parts)
 
 
 def view_digest(view: View) -> str:
     """Digest of a view's key, its balls and whether it takes part; its station has its own.
 
     Why it was left out changes nothing that is computed, so it has no part in this. Nor has how
-    noisy its ball is, which is no word of a dataset's: ``inputs_hash`` has it.
+    noisy its ball is, which is no word of a dataset's: ``hash_solver_inputs`` has it.
     """
-    return digest([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
+    return digest_json([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
 
 
-def inputs_hash(
+def hash_solver_inputs(
     pitch: Pitch,
     views: Iterable[tuple[str, str]],
     positions: Mapping[str, SharedPosition],
@@ -417,15 +419,15 @@ def inputs_hash(
         parts.append(dict(paint))
     if noise:
         parts.append({"noise": dict(noise)})
-    return digest(parts)
+    return digest_json(parts)
 
 
-def group_inputs_hash(
+def hash_group_inputs(
     group: Group,
     paint: Mapping[str, str] | None = None,
     views: Iterable[tuple[str, str]] | None = None,
 ) -> str:
-    """``inputs_hash`` of a group at hand.
+    """``hash_solver_inputs`` of a group at hand.
 
     Args:
         group: The group.
@@ -434,7 +436,7 @@ def group_inputs_hash(
     """
     pairs = views or ((view_digest(view), station_digest(view.station)) for view in group.views)
     read = paint_to_json(group.paint) if paint is None else paint
-    return inputs_hash(group.pitch, pairs, group.positions, read, group.noise)
+    return hash_solver_inputs(group.pitch, pairs, group.positions, read, group.noise)
 
 
 def hash_imported_group(group: Group) -> str:
@@ -446,4 +448,4 @@ def hash_imported_group(group: Group) -> str:
         view_to_json(view, view.station.key if view.station.shared else None)
         for view in group.views
     ]
-    return digest([group_without_views_to_json(group), views])
+    return digest_json([group_without_views_to_json(group), views])

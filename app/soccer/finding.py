@@ -43,7 +43,7 @@ one of three groups."""
 
 
 @dataclass(frozen=True)
-class Fix:
+class SuggestedFix:
     """What a finding or a suggestion proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
@@ -71,7 +71,7 @@ class Finding:
     number: float | None = None
     threshold: float | None = None
     confidence: float | None = None
-    fix: Fix | None = None
+    fix: SuggestedFix | None = None
 
     @property
     def is_unusable_ball(self) -> bool:

@@ -70,7 +70,7 @@ HALF = 0.5
 """What a coordinate of theirs is larger than ours, in pixels, along x and y alike."""
 
 
-def box_from_corner(box: Box) -> Box:
+def box_from_corner_origin(box: Box) -> Box:
     """A box of COCO or YOLO in our pixel frame.
 
     Args:
@@ -82,6 +82,6 @@ def box_from_corner(box: Box) -> Box:
     return Box(box.x - HALF, box.y - HALF, box.width, box.height)
 
 
-def box_to_corner(box: Box) -> Box:
-    """The inverse of ``box_from_corner``."""
+def box_to_corner_origin(box: Box) -> Box:
+    """The inverse of ``box_from_corner_origin``."""
     return Box(box.x + HALF, box.y + HALF, box.width, box.height)

@@ -35,14 +35,14 @@ MAX_NOTE = 2000
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class ViewExclusion:
     """Why a person left a view out of its group; ``note`` says it in their own words."""
 
     reason: str
     note: str | None = None
 
 
-def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
+def make_view_exclusion(reason: str | None, note: str | None) -> ViewExclusion | None:
     """What a person says of a view that is left out; None when they say nothing.
 
     Raises:
@@ -57,8 +57,8 @@ def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
             "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
         )
         raise InputError(f"{problem}; reasons are {known}", pointer="/reason")
-    require_explanation(reason, note)
-    return LeftOut(reason, note)
+    require_exclusion_note(reason, note)
+    return ViewExclusion(reason, note)
 
 
 def strip_and_check_note(note: str | None) -> str | None:
@@ -76,7 +76,7 @@ def strip_and_check_note(note: str | None) -> str | None:
     return note
 
 
-def require_explanation(reason: str | None, note: str | None) -> None:
+def require_exclusion_note(reason: str | None, note: str | None) -> None:
     """Raise InputError where a reason says nothing by itself, and no note does."""
     if reason == "other" and note is None:
         raise InputError('the reason "other" needs a note', pointer="/note")
@@ -120,13 +120,13 @@ def split_frame_number(media: Media, group: str, static: bool) -> tuple[PurePath
     found = _NUMBERED.fullmatch(name.stem)
     if found is None:
         return None
-    by_frame = static and _last_number(group) == int(found[2])
+    by_frame = static and _find_last_number(group) == int(found[2])
     if not by_frame and name.parent.name != CLIP_FOLDER:
         return None
     return name, found[1], found[2]
 
 
-def _last_number(group: str) -> int | None:
+def _find_last_number(group: str) -> int | None:
     found = _LAST_NUMBER.search(group.rsplit("/", 1)[-1])
     return int(found[1]) if found else None
 
@@ -219,7 +219,7 @@ class View:
     included: bool = True
     """False when a person left this view out of the group."""
     extras: Extras = field(default_factory=Extras)
-    left_out: LeftOut | None = None
+    left_out: ViewExclusion | None = None
     """Why it was left out, where the person said so; None while it is included."""
     noise: float = 1.0
     """How noisy the place of its ball is: sigma beside that of the dataset's balls."""

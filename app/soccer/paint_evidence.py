@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 
 from app.errors import InputError
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImagePoint
@@ -52,7 +52,7 @@ class PaintEvidence:
         """Places in all."""
         return sum(map(len, self.points.values()))
 
-    def some_points(self) -> Lines:
+    def thin_points(self) -> Lines:
         """At most ``POINTS_PER_MARKING`` places of each marking, spread along it."""
         lines = {}
         for marking, points in self.points.items():
@@ -120,7 +120,7 @@ class PaintReading:
     @cached_property
     def digest(self) -> str:
         """Digest of all of it, 32 hexadecimal digits."""
-        return digest_of(self.text.encode())
+        return digest_content(self.text.encode())
 
 
 def reading_to_json(reading: PaintReading) -> dict[str, Any]:

@@ -62,7 +62,7 @@ class PictureGeometry:
         right, down = self.shift
         return (size.width - 1) / 2 + right * half, (size.height - 1) / 2 + down * half
 
-    def lines_as_taken(self, lines: Lines, size: ImageSize) -> Lines:
+    def lines_in_original_picture(self, lines: Lines, size: ImageSize) -> Lines:
         """Where the picture as it was taken, of the same size, shows annotated points.
 
         Args:
@@ -78,7 +78,7 @@ class PictureGeometry:
             }
         )
 
-    def camera_of_shown_picture(self, camera: Camera, size: ImageSize) -> Camera:
+    def camera_of_annotated_picture(self, camera: Camera, size: ImageSize) -> Camera:
         """The camera of the picture as it is, from that of the picture as it was taken.
 
         Args:
@@ -95,7 +95,7 @@ def camera_aspect(camera: Camera) -> float:
     return x / y
 
 
-def camera_as_taken(camera: Camera) -> Camera:
+def camera_of_original_picture(camera: Camera) -> Camera:
     """The camera of a picture as it was taken, from that of the picture as it is; its principal
     point stays where it is."""
     y = camera.focal_length[1]

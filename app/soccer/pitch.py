@@ -81,10 +81,10 @@ def find_marking_like(name: str) -> str | None:
         >>> find_marking_like("Big_rect_left_top"), find_marking_like("Line unknown")
         ('Big rect. left top', None)
     """
-    return _LOOSE.get(_letters_and_digits(name))
+    return _LOOSE.get(_keep_letters_and_digits(name))
 
 
-def _letters_and_digits(name: str) -> str:
+def _keep_letters_and_digits(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
@@ -103,7 +103,7 @@ def opposite_marking(marking: str) -> str:
 
 
 _KNOWN = frozenset(MARKINGS)
-_LOOSE = {_letters_and_digits(marking): marking for marking in MARKINGS}
+_LOOSE = {_keep_letters_and_digits(marking): marking for marking in MARKINGS}
 _SWAP = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 
 
@@ -167,7 +167,7 @@ class Pitch:
         """Geometry of each marking, by name."""
         half = FRAME_WIDTH / 2
         beside, inside = half * (self.goal != "inner"), half * (self.goal == "laws")
-        return _marking_shapes(self.length / 2, self.width / 2, beside, inside)
+        return _make_marking_shapes(self.length / 2, self.width / 2, beside, inside)
 
     def with_goal(self, goal: GoalEdge) -> Pitch:
         """The same pitch with that line of its goals, and of its lines."""
@@ -204,7 +204,7 @@ def _sample_arc(arc: Arc, spacing: float) -> FloatArray:
     return np.column_stack([x, y, np.zeros_like(x)])
 
 
-def _marking_shapes(
+def _make_marking_shapes(
     half_length: float, half_width: float, beside: float, inside: float
 ) -> dict[str, Segment | Arc]:
     """All shapes; those of goals lie ``beside`` their inner edges, lines ``inside`` the plan, metres.
@@ -213,11 +213,11 @@ def _marking_shapes(
     """
     end, side_line, radius = half_length - inside, half_width - inside, CIRCLE_RADIUS - inside
     shapes: dict[str, Segment | Arc] = {
-        "Side line top": _grass_segment((-end, -side_line), (end, -side_line)),
-        "Side line bottom": _grass_segment((-end, side_line), (end, side_line)),
-        "Side line left": _grass_segment((-end, -side_line), (-end, side_line)),
-        "Side line right": _grass_segment((end, -side_line), (end, side_line)),
-        "Middle line": _grass_segment((0.0, -side_line), (0.0, side_line)),
+        "Side line top": _make_grass_segment((-end, -side_line), (end, -side_line)),
+        "Side line bottom": _make_grass_segment((-end, side_line), (end, side_line)),
+        "Side line left": _make_grass_segment((-end, -side_line), (-end, side_line)),
+        "Side line right": _make_grass_segment((end, -side_line), (end, side_line)),
+        "Middle line": _make_grass_segment((0.0, -side_line), (0.0, side_line)),
         "Circle central": Arc((0.0, 0.0), radius, 0.0, 2 * math.pi),
     }
     # The penalty arc is what lies outside the penalty area.
@@ -231,9 +231,9 @@ def _marking_shapes(
             front = goal_line - sign * (depth - inside)
             left, right = sorted((sign * end, front))
             half = width / 2 - inside
-            shapes[f"{name} {side} top"] = _grass_segment((left, -half), (right, -half))
-            shapes[f"{name} {side} bottom"] = _grass_segment((left, half), (right, half))
-            shapes[f"{name} {side} main"] = _grass_segment((front, -half), (front, half))
+            shapes[f"{name} {side} top"] = _make_grass_segment((left, -half), (right, -half))
+            shapes[f"{name} {side} bottom"] = _make_grass_segment((left, half), (right, half))
+            shapes[f"{name} {side} main"] = _make_grass_segment((front, -half), (front, half))
         mark = goal_line - sign * PENALTY_MARK_DISTANCE
         facing = 0.0 if side == "left" else math.pi
         shapes[f"Circle {side}"] = Arc(
@@ -251,5 +251,5 @@ def _marking_shapes(
     return shapes
 
 
-def _grass_segment(start: tuple[float, float], end: tuple[float, float]) -> Segment:
+def _make_grass_segment(start: tuple[float, float], end: tuple[float, float]) -> Segment:
     return Segment((*start, 0.0), (*end, 0.0))

@@ -165,7 +165,7 @@ class CalibrationPolicy:
         return pitch.with_goal(self.goal) if self.goal == "laws" else pitch
 
     @cached_property
-    def spelling(self) -> str:
+    def cached_repr(self) -> str:
         """The ``repr``, which every key of a calibration has: spelt out once."""
         return repr(self)
 
@@ -264,15 +264,15 @@ class Policy:
     @cached_property
     def hash(self) -> str:
         """Digest of every value but the name."""
-        return _digest_of_values(digested_values(self))
+        return _digest_of_values(values_to_digest(self))
 
     @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
-        return _digest_of_values(digested_calibration(self.calibration))
+        return _digest_of_values(calibration_values_to_digest(self.calibration))
 
 
-def digested_values(policy: Policy) -> dict[str, Any]:
+def values_to_digest(policy: Policy) -> dict[str, Any]:
     """What the digests of a policy cover: every value but the name.
 
     A threshold that came later counts only where it asks for something else than before it came:
@@ -280,11 +280,11 @@ def digested_values(policy: Policy) -> dict[str, Any]:
     """
     values = _values_without_later_defaults(policy)
     del values["name"]
-    values["calibration"] = digested_calibration(policy.calibration)
+    values["calibration"] = calibration_values_to_digest(policy.calibration)
     return values
 
 
-def digested_calibration(policy: CalibrationPolicy) -> dict[str, Any]:
+def calibration_values_to_digest(policy: CalibrationPolicy) -> dict[str, Any]:
     """The same of its part for calibrations."""
     return _values_without_later_defaults(policy)
 
@@ -316,18 +316,18 @@ LINE_SIGMAS = ("line_sigma_px", "line_share")
 """What is estimated of a dataset: of its balls, and of the lines that cameras are made from."""
 
 
-def with_sigmas(policy: Policy, other: Policy) -> Policy:
+def copy_click_sigmas(policy: Policy, other: Policy) -> Policy:
     """A policy with the noise of clicks that another one has."""
     lines = {name: getattr(other.calibration, name) for name in LINE_SIGMAS}
     balls = {name: getattr(other, name) for name in SIGMAS}
     return replace(policy, **balls, calibration=replace(policy.calibration, **lines))
 
 
-def is_shipped(policy: Policy) -> bool:
+def is_builtin_policy(policy: Policy) -> bool:
     """Whether a policy is the shipped one of its name; what is estimated is every dataset's own."""
     shipped = POLICIES.get(policy.name)
     if shipped is not None and shipped.noise == ESTIMATED:
-        policy = with_sigmas(policy, shipped)
+        policy = copy_click_sigmas(policy, shipped)
     return policy == shipped
 
 
@@ -356,7 +356,7 @@ class Threshold:
         minimum: None, as ``maximum`` is, for a switch.
         choices: The values that forms offer where a range would promise too much; where they are
             words, there are no others.
-        later: It came after the first release, see ``digested_values``.
+        later: It came after the first release, see ``values_to_digest``.
     """
 
     name: str

@@ -62,7 +62,7 @@ class MarkingFit:
 
 
 @dataclass(frozen=True)
-class Suspect:
+class SuspectLabel:
     """A marking whose label looks wrong: the solver left it out and says what fits.
 
     ``suggested`` is the class that fits, or None when none does.
@@ -77,7 +77,7 @@ class Suspect:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureDistortion:
     """What seems to have been done to a picture since a camera took it.
 
     Attributes:
@@ -153,10 +153,10 @@ class Calibration:
     jac: tuple[float, ...] | None = None
     error_px: float | None = None
     markings: tuple[MarkingFit, ...] = ()
-    suspects: tuple[Suspect, ...] = ()
+    suspects: tuple[SuspectLabel, ...] = ()
     covariance: tuple[float, ...] | None = None
     unobservable: tuple[str, ...] = ()
-    picture: Picture | None = None
+    picture: PictureDistortion | None = None
     paint: PaintFit | None = field(default=None, metadata={"later": True})
     picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
     pitch_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
@@ -194,7 +194,7 @@ class Calibration:
 
 
 @dataclass(frozen=True)
-class Pair:
+class TriangulatedPair:
     """The ball triangulated from two views.
 
     Attributes:
@@ -388,7 +388,7 @@ class Solution:
     """
 
     views: tuple[ViewSolution, ...]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[TriangulatedPair, ...]
     ball: Ball3D | None
     gates: tuple[Gate, ...]
     findings: tuple[Finding, ...] = ()

@@ -96,16 +96,16 @@ class Splitter:
             return given
         if self.split.kind == "match":
             return TEST if match in self.tests else TRAIN
-        sides = {self._side_of_view(view) for view in views}
+        sides = {self._split_of_view(view) for view in views}
         return sides.pop() if len(sides) == 1 else ""
 
     def views(self, views: Sequence[str]) -> dict[str, str] | None:
         """Split by view; None where all views go with their group."""
-        if self.split.kind != "camera" or len({self._side_of_view(view) for view in views}) == 1:
+        if self.split.kind != "camera" or len({self._split_of_view(view) for view in views}) == 1:
             return None
-        return {view: self._side_of_view(view) for view in views}
+        return {view: self._split_of_view(view) for view in views}
 
-    def _side_of_view(self, view: str) -> str:
+    def _split_of_view(self, view: str) -> str:
         return TEST if view in self.split.test_cameras else TRAIN
 
 
@@ -117,9 +117,9 @@ def _draw_test_matches(split: Split, matches: set[str]) -> frozenset[str]:
             hint="Use the split that came with the data (given).",
         )
     count = min(max(1, round(split.test_share * len(matches))), len(matches) - 1)
-    ranked = sorted(matches, key=lambda match: (_seeded_digest(split.seed, match), match))
+    ranked = sorted(matches, key=lambda match: (_digest_with_seed(split.seed, match), match))
     return frozenset(ranked[:count])
 
 
-def _seeded_digest(seed: int, match: str) -> str:
+def _digest_with_seed(seed: int, match: str) -> str:
     return hashlib.sha256(f"{seed}:{match}".encode()).hexdigest()

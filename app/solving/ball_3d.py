@@ -9,15 +9,15 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtrc
 
-from app.geometry.arrays import FloatArray, IntArray, row_by_row
-from app.geometry.likely_point import CameraTable, likely_points
+from app.geometry.arrays import FloatArray, IntArray, flatten_covariance
+from app.geometry.likely_point import CameraTable, find_most_likely_points
 from app.soccer.frames import height_above_grass
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import GATES, Ball3D, BestBall, ChiSquare, Pair
+from app.soccer.solution import GATES, Ball3D, BestBall, ChiSquare, TriangulatedPair
 from app.solving.ball_covariance import MeanCovariance, major_axis_sigma, ray_covariances
 from app.solving.chi_square import group_sigma_widening
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 from app.solving.judgement import PASSES, Judgement
 from app.solving.triangulate import BallObservation, PairPoint
 from app.wording import format_metres
@@ -34,10 +34,10 @@ def is_plausible_position(point: tuple[float, float, float], pitch: Pitch, polic
         pitch: The pitch.
         policy: Holds the limits.
     """
-    return not list_implausible_reasons(point, pitch, policy)
+    return not explain_implausible_position(point, pitch, policy)
 
 
-def list_implausible_reasons(
+def explain_implausible_position(
     point: tuple[float, float, float], pitch: Pitch, policy: Policy
 ) -> list[tuple[float, float, str]]:
     """What is wrong with a place: number and limit, metres, and the words for it.
@@ -63,10 +63,12 @@ def list_implausible_reasons(
     ]
 
 
-def judge_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tuple[Pair, ...]:
+def judge_pairs(
+    pair_points: Sequence[PairPoint], judgement: Judgement
+) -> tuple[TriangulatedPair, ...]:
     """Every pair of views with its point, and the gate that makes it invalid."""
     return tuple(
-        Pair(
+        TriangulatedPair(
             a=item.a.view,
             b=item.b.view,
             point=item.place,
@@ -82,7 +84,7 @@ def judge_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tuple
 
 def compute_mean_ball(
     keys: Sequence[str],
-    facts: Facts,
+    facts: GroupFacts,
     judgement: Judgement,
     uncertainty: MeanCovariance,
     policy: Policy,
@@ -107,7 +109,7 @@ def compute_mean_ball(
     x, y, z = judgement.point[0].tolist()
     return Ball3D(
         point=(x, y, z),
-        covariance=row_by_row(covariance[0]),
+        covariance=flatten_covariance(covariance[0]),
         sigma_m=float(major_axis_sigma(covariance)[0]),
         parallax_degrees=float(judgement.parallax[0]),
         views=tuple(keys[place] for place in np.unique(facts.pair_view[judgement.valid]).tolist()),
@@ -152,7 +154,7 @@ class _BallEstimate:
 
 
 def find_best_ball(
-    pairs: Sequence[Pair], usable: Sequence[BallObservation], policy: Policy
+    pairs: Sequence[TriangulatedPair], usable: Sequence[BallObservation], policy: Policy
 ) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.
 
@@ -175,7 +177,7 @@ def find_best_ball(
     if not starts:
         return None
     views = _ViewSubsets(usable, policy)
-    estimate = _most_consistent(views, starts)
+    estimate = _find_most_consistent_estimate(views, starts)
     if estimate is None:
         return None
     freedom, total = 2 * len(estimate.numbers) - 3, float(estimate.distances.sum())
@@ -185,17 +187,17 @@ def find_best_ball(
     x, y, z = estimate.point.tolist()
     return BestBall(
         point=(x, y, z),
-        covariance=row_by_row(covariance),
+        covariance=flatten_covariance(covariance),
         sigma_m=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         views=used,
         contradicting=tuple(
             observation.view for observation in usable if observation.view not in used
         ),
-        influence_m=_leave_one_out_shifts(views, estimate),
+        influence_m=_compute_leave_one_out_shifts(views, estimate),
     )
 
 
-def _most_consistent(
+def _find_most_consistent_estimate(
     views: _ViewSubsets, starts: dict[frozenset[str], FloatArray]
 ) -> _BallEstimate | None:
     """The estimate from the largest set of views that agree, else from the best pair."""
@@ -216,7 +218,7 @@ def _most_consistent(
     return min(fallback, key=lambda item: float(item.distances.sum()), default=None)
 
 
-def _leave_one_out_shifts(
+def _compute_leave_one_out_shifts(
     views: _ViewSubsets, estimate: _BallEstimate
 ) -> tuple[tuple[str, float], ...]:
     """How far the point moves when one view is left out, metres; with three views or more."""
@@ -254,8 +256,12 @@ class _ViewSubsets:
             return []
         views, points = np.array(chosen), np.array(starts)
         # The uncertainties hardly change on the way.
-        made = likely_points(
-            self._cameras, self._centers, views, points, self._click_covariances(views, points)
+        made = find_most_likely_points(
+            self._cameras,
+            self._centers,
+            views,
+            points,
+            self._compute_click_covariances(views, points),
         )
         return [
             _BallEstimate(
@@ -266,14 +272,14 @@ class _ViewSubsets:
             for row, numbers in enumerate(chosen)
         ]
 
-    def _click_covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
+    def _compute_click_covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
         observations = [self.observations[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
         return ray_covariances(observations, places, self._policy).reshape(*chosen.shape, 2, 2)
 
 
-def _is_behind_a_camera(pair: Pair, observations: Sequence[BallObservation]) -> bool:
+def _is_behind_a_camera(pair: TriangulatedPair, observations: Sequence[BallObservation]) -> bool:
     point = np.array([pair.point])
     return any(
         observation.camera.pitch_to_camera(point)[0, 2] <= 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray, row_by_row
+from app.geometry.arrays import FloatArray, flatten_covariance
 from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
 from app.soccer.annotation import BallAnnotation
@@ -44,7 +44,7 @@ def fit_ball(
     diameter, off_ray = _optimal_diameter_or_none(camera, center, point, diameter_m)
     annotated = ball.box.diameter if ball.box is not None else None
     depth = float(camera.pitch_to_camera(point[None])[0, 2])
-    alone = _position_from_box(camera, ball, diameter_m)
+    alone = _compute_position_from_box(camera, ball, diameter_m)
     return BallFit(
         reprojected=ImagePoint(float(pixel[0]), float(pixel[1])) if seen else None,
         error_px=error,
@@ -52,7 +52,7 @@ def fit_ball(
         optimized_diameter_px=diameter,
         optimized_box=Box.square(center, diameter) if diameter is not None else None,
         optimized_error_m=off_ray,
-        exact_box=expected.box if expected else _exact_box(camera, point, diameter_m),
+        exact_box=expected.box if expected else _compute_tight_box(camera, point, diameter_m),
         size_ratio=annotated / diameter if annotated and diameter else None,
         depth_m=depth,
         monocular=(float(alone[0]), float(alone[1]), float(alone[2]))
@@ -86,12 +86,12 @@ def predict_ball_in_view(
     covariance = covariance + calibration_covariance(calibration, size, point)
     return ExpectedBall(
         place=ImagePoint(x, y),
-        covariance=row_by_row(covariance),
-        box=_exact_box(calibration.camera, point, diameter_m),
+        covariance=flatten_covariance(covariance),
+        box=_compute_tight_box(calibration.camera, point, diameter_m),
     )
 
 
-def _position_from_box(
+def _compute_position_from_box(
     camera: Camera, ball: BallAnnotation, diameter_m: float
 ) -> FloatArray | None:
     if ball.box is None or ball.box.diameter <= 0:
@@ -109,7 +109,7 @@ def _optimal_diameter_or_none(
         return None, None
 
 
-def _exact_box(camera: Camera, point: FloatArray, diameter_m: float) -> Box | None:
+def _compute_tight_box(camera: Camera, point: FloatArray, diameter_m: float) -> Box | None:
     try:
         left, top, right, bottom = tight_box(camera, point, diameter_m / 2).tolist()
     except DegenerateGeometryError:

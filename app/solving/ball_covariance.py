@@ -13,7 +13,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import camera_aspect
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.facts import STEP_PX, Facts
+from app.solving.facts import STEP_PX, GroupFacts
 from app.solving.triangulate import WHOLE, BallObservation, CameraNumbers
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
@@ -51,7 +51,7 @@ def ball_click_variance(
     return np.float_power(noise * sigma, 2)
 
 
-def projected_calibration_covariances(
+def project_calibration_covariances(
     parameters: FloatArray, covariances: FloatArray, points: FloatArray, diagonals: FloatArray
 ) -> FloatArray:
     """Covariance of the projected points due to that of the calibrations, square pixels, (N, 2, 2).
@@ -67,7 +67,7 @@ def projected_calibration_covariances(
     return carried
 
 
-def projected_picture_covariances(
+def project_picture_covariances(
     parameters: FloatArray,
     covariances: FloatArray,
     points: FloatArray,
@@ -75,7 +75,7 @@ def projected_picture_covariances(
     pictures: FloatArray,
     stretches: FloatArray,
 ) -> FloatArray:
-    """``projected_calibration_covariances`` where pictures may have been stretched or cropped, (N, 2, 2).
+    """``project_calibration_covariances`` where pictures may have been stretched or cropped, (N, 2, 2).
 
     A wider picture moves what is beside the axis, another axis moves everything: both go together
     with the camera, so neither is known as badly as it would be alone.
@@ -83,7 +83,7 @@ def projected_picture_covariances(
     Args:
         parameters: Of the cameras as the pictures were taken, shape (N, 8).
         covariances: Of the parameters, shape (N, 8, 8).
-        points: As in ``projected_calibration_covariances``.
+        points: As in ``project_calibration_covariances``.
         diagonals: As there.
         pictures: Covariances of aspect and shifts with all eleven numbers, shape (N, 3, 11).
         stretches: Aspect, and how far right of the axis the point is seen, pixels, shape (N, 2).
@@ -102,7 +102,9 @@ def projected_picture_covariances(
     return found
 
 
-def calibration_pixel_covariances(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
+def calibration_pixel_covariances(
+    facts: GroupFacts, views: IntArray, points: FloatArray
+) -> FloatArray:
     """Covariance of balls' pixels due to calibrations whose covariance is known, (N, 2, 2).
 
     Args:
@@ -112,10 +114,10 @@ def calibration_pixel_covariances(facts: Facts, views: IntArray, points: FloatAr
     """
     numbers = facts.rows("view_parameters", views), facts.rows("view_covariance", views)
     diagonals = facts.view_diagonal[views]
-    found = projected_calibration_covariances(*numbers, points, diagonals)
+    found = project_calibration_covariances(*numbers, points, diagonals)
     rows = np.flatnonzero(facts.view_changed[views])
     if len(rows):
-        found[rows] = projected_picture_covariances(
+        found[rows] = project_picture_covariances(
             numbers[0][rows],
             numbers[1][rows],
             points[rows],
@@ -126,7 +128,7 @@ def calibration_pixel_covariances(facts: Facts, views: IntArray, points: FloatAr
     return found
 
 
-def click_pixel_covariances(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
+def click_pixel_covariances(facts: GroupFacts, views: IntArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel by the click and by given cameras, square pixels, (N, 2, 2).
 
     Args:
@@ -146,7 +148,7 @@ def click_pixel_covariances(facts: Facts, views: IntArray, policy: Policy) -> Fl
 
 
 def pixel_covariances(
-    facts: Facts, views: IntArray, points: FloatArray, policy: Policy
+    facts: GroupFacts, views: IntArray, points: FloatArray, policy: Policy
 ) -> FloatArray:
     """``pixel_covariance`` of many views, square pixels, shape (N, 2, 2).
 
@@ -179,11 +181,11 @@ def calibration_covariance(
     known = numbers.parameters[None], numbers.covariance[None]
     where = point[None], np.array([size.diagonal])
     if numbers.picture is None:
-        found = projected_calibration_covariances(*known, *where)
+        found = project_calibration_covariances(*known, *where)
     else:
         right = camera.project(point[None])[0, 0] - camera.principal_point[0]
         stretch = np.array([[camera_aspect(camera), right]])
-        found = projected_picture_covariances(*known, *where, numbers.picture[None], stretch)
+        found = project_picture_covariances(*known, *where, numbers.picture[None], stretch)
     alone: FloatArray = found[0]
     return alone
 
@@ -229,7 +231,7 @@ def ray_covariances(
         rows = [*plain]
         parameters = np.array([item.parameters for item in plain.values()])
         covariances = np.array([item.covariance for item in plain.values()])
-        found[rows] += projected_calibration_covariances(
+        found[rows] += project_calibration_covariances(
             parameters, covariances, points[rows], diagonals[rows]
         )
     return found
@@ -280,7 +282,7 @@ class MeanCovariance:
     Source: Hartley & Zisserman, result 5.6.
     """
 
-    def __init__(self, facts: Facts):
+    def __init__(self, facts: GroupFacts):
         self._facts, self._lock = facts, Lock()
         starts = np.searchsorted(facts.pair_group, np.arange(facts.groups))
         place = np.arange(len(facts.pair_group)) - starts[facts.pair_group]
@@ -347,7 +349,7 @@ class MeanCovariance:
         )
 
 
-def _mean_point_derivatives(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
+def _mean_point_derivatives(facts: GroupFacts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
     """How far the mean of pairs moves with the pixel of each of their views.
 
     Args:

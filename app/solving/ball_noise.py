@@ -27,9 +27,9 @@ from app.solving.line_noise import (
     SPREAD,
     STUDENT,
     calibrated_log_sigma,
+    fit_cost_minimum,
     jackknife_variance,
-    lowest_cost_vertex,
-    posterior_variance,
+    log_sigma_posterior_variance,
     sigma_prior_cost,
 )
 from app.solving.triangulate import BallObservation
@@ -249,12 +249,12 @@ def _jackknife_sigma(
     rests = [rest for at in np.unique(block) if len(rest := rows[block != at])] or [rows]
     parts = np.array([_fit_sigma(rest, known)[:2] for rest in rests])
     scatter, of_share = jackknife_variance(parts).tolist()
-    kept = _without_outliers(rows, known)
+    kept = _find_inliers(rows, known)
     numbers = int(kept.sum())
-    variance = posterior_variance(scatter, numbers, known.spread)
+    variance = log_sigma_posterior_variance(scatter, numbers, known.spread)
     half = STUDENT * math.sqrt(variance)
     # Where neighbours err alike, there are fewer independent numbers than there seem to be.
-    weight = posterior_variance(0.0, numbers, known.spread) / variance
+    weight = log_sigma_posterior_variance(0.0, numbers, known.spread) / variance
     sigma = math.exp(
         calibrated_log_sigma(_LOGS, weight * _sigma_costs(rows[kept], found) + known.costs)
     )
@@ -267,14 +267,14 @@ def _jackknife_sigma(
 def _fit_sigma(rows: FloatArray, known: _NoisePrior) -> tuple[float, float, float]:
     """Logarithm of the most likely sigma, the share of the diameter, and half of the interval of the
     share by the likelihood."""
-    kept = rows[_without_outliers(rows, known)]
+    kept = rows[_find_inliers(rows, known)]
     if not kept[:, 2].any():
-        return _lowest_cost(_sigma_costs(kept, known.share) + known.costs)[1], known.share, 0.0
-    fits = [_lowest_cost(_sigma_costs(kept, share) + known.costs) for share in SHARES]
+        return _find_lowest_cost(_sigma_costs(kept, known.share) + known.costs)[1], known.share, 0.0
+    fits = [_find_lowest_cost(_sigma_costs(kept, share) + known.costs) for share in SHARES]
     prior = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
     costs = prior + [least for least, _ in fits]
     at = int(np.argmin(costs))
-    off = lowest_cost_vertex(costs, at)[0]
+    off = fit_cost_minimum(costs, at)[0]
     share = float(SHARES[at]) + _SHARE_STEP * off
     log = float(np.interp(share, SHARES, [log for _, log in fits]))
     inside = np.clip(at, 1, len(SHARES) - 2)
@@ -282,14 +282,14 @@ def _fit_sigma(rows: FloatArray, known: _NoisePrior) -> tuple[float, float, floa
     return log, share, NORMAL_95 / math.sqrt(max(bend, SHARE_SIGMA**-2))
 
 
-def _lowest_cost(costs: FloatArray) -> tuple[float, float]:
+def _find_lowest_cost(costs: FloatArray) -> tuple[float, float]:
     """The lowest cost and the logarithm of its sigma, between the points of the grid."""
     place = int(np.argmin(costs))
-    off, least = lowest_cost_vertex(costs, place)
+    off, least = fit_cost_minimum(costs, place)
     return least, float(_LOGS[place]) + off * _STEP
 
 
-def _without_outliers(rows: FloatArray, known: _NoisePrior) -> BoolArray:
+def _find_inliers(rows: FloatArray, known: _NoisePrior) -> BoolArray:
     """Numbers that are no mistakes, from the median outwards until no other one joins."""
     squared = rows[:, 0] ** 2
     kept: BoolArray = squared <= np.median(squared)

@@ -9,10 +9,10 @@ from types import MappingProxyType
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray, row_by_row
+from app.geometry.arrays import FloatArray, flatten_covariance
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
@@ -26,9 +26,9 @@ from app.soccer.solution import (
     Calibration,
     MarkingFit,
     PaintFit,
-    Suspect,
+    SuspectLabel,
 )
-from app.solving.camera_positions import PositionPrior, position_prior_of_match
+from app.solving.camera_positions import PositionPrior, make_match_position_prior
 from app.solving.jaccard import (
     classify_markings,
     find_unannotated_not_missing,
@@ -39,7 +39,7 @@ from app.solving.jaccard import (
 )
 from app.solving.labels import find_suspects
 from app.solving.lone_frame import LoneFrame, estimate_lone_frame
-from app.solving.observations import Observations, observations_of_lines
+from app.solving.observations import Observations, make_observations
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import (
     WIDTH,
@@ -85,7 +85,7 @@ def calibrate(
         policy: Robust scale, prior of the distortion, whether labels are checked.
     """
     pitch = policy.fitted(pitch)
-    observations = observations_of_lines(lines, pitch, size)
+    observations = make_observations(lines, pitch, size)
     measurements = count_measurements(observations)
     if measurements < MIN_MEASUREMENTS:
         count = len(observations.markings)
@@ -96,20 +96,20 @@ def calibrate(
         return Calibration("lines", None, reason=reason)
     problem = ResectionProblem.of(size, policy)
     fit = problem.resect(observations)
-    suspects: tuple[Suspect, ...] = ()
+    suspects: tuple[SuspectLabel, ...] = ()
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_with_main_prior(fit, observations)
     picture = find_picture(problem, fit.parameters, observations)
     found = replace(
-        _calibration_of_fit(problem, fit, observations), suspects=suspects, picture=picture
+        _make_calibration(problem, fit, observations), suspects=suspects, picture=picture
     )
     return measure_calibration(
-        found, lines, pitch, size, shortest_px=shortest_counted_marking_px(policy, size)
+        found, lines, pitch, size, shortest_px=min_counted_marking_px(policy, size)
     )
 
 
-def calibrate_near(
+def calibrate_near_position(
     alone: Calibration,
     near: PositionPrior,
     lines: Lines,
@@ -127,16 +127,16 @@ def calibrate_near(
         return alone
     problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
     left_out = [suspect.marking for suspect in alone.suspects]
-    observations = observations_of_lines(lines, pitch, size).without(*left_out)
+    observations = make_observations(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
     shared = problem.refine_with_match_position(fit, observations, near)
     if shared is fit:
         return alone
-    found = _calibration_of_fit(problem, shared, observations)
+    found = _make_calibration(problem, shared, observations)
     # Whether the picture was stretched or cropped its own lines say, to the camera that fits them.
     found = replace(found, suspects=alone.suspects, picture=alone.picture)
     return measure_calibration(
-        found, lines, pitch, size, shortest_px=shortest_counted_marking_px(policy, size)
+        found, lines, pitch, size, shortest_px=min_counted_marking_px(policy, size)
     )
 
 
@@ -153,17 +153,17 @@ def calibrate_picture(
         picture: What was done to it.
     """
     problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
-    observations = observations_of_lines(lines, pitch, size)
+    observations = make_observations(lines, pitch, size)
     if count_measurements(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
     try:
         found = estimate_picture(problem, observations, picture)
-        alone = calibrate(found.lines_as_taken(lines, size), pitch, size, policy)
+        alone = calibrate(found.lines_in_original_picture(lines, size), pitch, size, policy)
         left_out = [suspect.marking for suspect in alone.suspects]
         if left_out:
             observations = observations.without(*left_out)
             found = estimate_picture(problem, observations, picture)
-            alone = calibrate(found.lines_as_taken(lines, size), pitch, size, policy)
+            alone = calibrate(found.lines_in_original_picture(lines, size), pitch, size, policy)
     except DegenerateGeometryError as error:
         return Calibration("lines", None, reason=error.message)
     if alone.camera is None:
@@ -172,16 +172,16 @@ def calibrate_picture(
     return measure_calibration(
         replace(
             alone,
-            camera=found.camera_of_shown_picture(alone.camera, size),
-            covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
-            unobservable=_unobservable_parameters(covariance),
+            camera=found.camera_of_annotated_picture(alone.camera, size),
+            covariance=flatten_covariance(covariance) if np.isfinite(covariance).all() else None,
+            unobservable=_list_unobservable_parameters(covariance),
             picture=None,
-            picture_covariance=row_by_row(whole) if np.isfinite(whole).all() else None,
+            picture_covariance=flatten_covariance(whole) if np.isfinite(whole).all() else None,
         ),
         lines,
         pitch,
         size,
-        shortest_px=shortest_counted_marking_px(policy, size),
+        shortest_px=min_counted_marking_px(policy, size),
     )
 
 
@@ -202,14 +202,16 @@ def analyse_lone_frame(
     problem = ResectionProblem.of(size, policy)
     left_out = [suspect.marking for suspect in found.suspects]
     pitch = policy.fitted(pitch)
-    observations = observations_of_lines(lines, pitch, size)
+    observations = make_observations(lines, pitch, size)
     parameters = problem.parameters(found.camera)
     return estimate_lone_frame(problem, parameters, observations, pitch, policy, left_out)
 
 
-def with_lone_covariance(found: Calibration, alone: LoneFrame | None) -> Calibration:
+def add_lone_frame_covariance(found: Calibration, alone: LoneFrame | None) -> Calibration:
     """The calibration with that in its covariance; what the lines determine they still do."""
-    return found if alone is None else replace(found, covariance=row_by_row(alone.covariance))
+    return (
+        found if alone is None else replace(found, covariance=flatten_covariance(alone.covariance))
+    )
 
 
 def _picture_covariance(
@@ -227,10 +229,10 @@ def _picture_covariance(
         whole = search.covariance(unknowns)
     except DegenerateGeometryError:
         return np.full((PARAMETERS, PARAMETERS), np.inf), np.full((WIDTH, WIDTH), np.inf)
-    return search.carried(unknowns, whole), whole
+    return search.transfer_covariance(unknowns, whole), whole
 
 
-def _calibration_of_fit(
+def _make_calibration(
     problem: ResectionProblem, fit: Resection, observations: Observations
 ) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
@@ -241,8 +243,8 @@ def _calibration_of_fit(
     return Calibration(
         "lines",
         problem.camera(fit.parameters),
-        covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
-        unobservable=_unobservable_parameters(covariance),
+        covariance=flatten_covariance(covariance) if np.isfinite(covariance).all() else None,
+        unobservable=_list_unobservable_parameters(covariance),
     )
 
 
@@ -259,7 +261,7 @@ def calibrate_station(
     found = _calibrate_all_markings(station, pitch, policy, shared)
     if not station.not_visible:
         return found
-    return _measure_on_station(found, station, pitch, policy)
+    return _measure_against_station(found, station, pitch, policy)
 
 
 def _calibrate_all_markings(
@@ -268,26 +270,26 @@ def _calibrate_all_markings(
     """``calibrate_station`` as if every visible marking was one that people draw."""
     if station.given is not None and station.calibration == "given":
         given = Calibration("given", station.given, covariance=station.given_covariance)
-        return _measure_on_station(given, station, pitch, policy)
+        return _measure_against_station(given, station, pitch, policy)
     if station.picture is not None:
         return calibrate_picture(station.lines, pitch, station.size, policy, station.picture)
     alone = calibrate(station.lines, pitch, station.size, policy)
     if shared is None:
         return alone
-    near = position_prior_of_match(np.array(shared.mean), np.array(shared.sigma))
-    return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
+    near = make_match_position_prior(np.array(shared.mean), np.array(shared.sigma))
+    return calibrate_near_position(alone, near, station.lines, pitch, station.size, policy)
 
 
-def _measure_on_station(
+def _measure_against_station(
     found: Calibration, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> Calibration:
     """A calibration measured against the lines of its station, and what is said not to be visible."""
-    size, shortest = station.size, shortest_counted_marking_px(policy, station.size)
+    size, shortest = station.size, min_counted_marking_px(policy, station.size)
     fitted = policy.fitted(pitch)
     return measure_calibration(found, station.lines, fitted, size, station.not_visible, shortest)
 
 
-def calibrate_paint(
+def calibrate_from_paint(
     clicked: Calibration,
     reading: PaintReading,
     station: Station,
@@ -325,12 +327,12 @@ def calibrate_paint(
         clicked,
         source="paint",
         camera=resection.camera(found.parameters),
-        covariance=row_by_row(found.covariance),
-        pitch_covariance=row_by_row(pitch_covariance),
-        unobservable=_unobservable_parameters(found.covariance),
+        covariance=flatten_covariance(found.covariance),
+        pitch_covariance=flatten_covariance(pitch_covariance),
+        unobservable=_list_unobservable_parameters(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )
-    return _measure_on_station(painted, station, pitch, policy)
+    return _measure_against_station(painted, station, pitch, policy)
 
 
 def calibrate_view(
@@ -352,18 +354,18 @@ def calibrate_view(
     clicked = known.get(key) or calibrate_from_clicks(group, view, policy)
     reading = find_usable_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
-        if not is_lone(group, view, policy):
+        if not is_lone_frame(group, view, policy):
             return clicked
         station = view.station
         alone = analyse_lone_frame(clicked, station.lines, group.pitch, station.size, policy)
-        return with_lone_covariance(clicked, alone)
-    return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
+        return add_lone_frame_covariance(clicked, alone)
+    return calibrate_from_paint(clicked, reading, view.station, group.pitch, policy)
 
 
 def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
     """``calibrate_view`` without paint."""
     return calibrate_station(
-        view.station, group.pitch, policy, _usable_shared_position(group, view, policy)
+        view.station, group.pitch, policy, _find_usable_shared_position(group, view, policy)
     )
 
 
@@ -377,17 +379,17 @@ def compute_view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tu
     key = compute_click_calibration_key(group, view, policy)
     reading = find_usable_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
-        if not is_lone(group, view, policy):
+        if not is_lone_frame(group, view, policy):
             return (key,)
-        return digest_of(f"{key} lone {policy.lone_frames}".encode()), key
-    painted = digest_of(f"{key} {reading.digest}".encode())
+        return digest_content(f"{key} lone {policy.lone_frames}".encode()), key
+    painted = digest_content(f"{key} {reading.digest}".encode())
     return painted, key
 
 
 def compute_click_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """``compute_calibration_key`` of what ``calibrate_from_clicks`` makes."""
     return compute_calibration_key(
-        view.station, group.pitch, policy, _usable_shared_position(group, view, policy)
+        view.station, group.pitch, policy, _find_usable_shared_position(group, view, policy)
     )
 
 
@@ -397,14 +399,14 @@ def compute_paint_search_key(group: Group, view: View, policy: CalibrationPolicy
     How that camera is measured has no part in it, nor how noisy its clicks are: neither what counts
     as missing nor the estimated noise of a dataset moves a camera.
     """
-    shared = _usable_shared_position(group, view, policy)
+    shared = _find_usable_shared_position(group, view, policy)
     quiet = replace(policy, line_sigma_px=None, line_share=None)
     return _digest_of_parts(
-        _camera_key_parts(START_VERSION, view.station, group.pitch, quiet, shared)
+        _collect_camera_key_parts(START_VERSION, view.station, group.pitch, quiet, shared)
     )
 
 
-def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:
+def is_lone_frame(group: Group, view: View, policy: CalibrationPolicy) -> bool:
     """Whether nobody but its own lines says anything of the pitch and the picture of a view.
 
     Several views of one instant share their pitch: each by itself would be too uncertain.
@@ -425,7 +427,7 @@ def find_usable_paint_reading(
     return group.paint.get(view.key)
 
 
-def _usable_shared_position(
+def _find_usable_shared_position(
     group: Group, view: View, policy: CalibrationPolicy
 ) -> SharedPosition | None:
     """The position of a view's match as far as the policy wants it and the camera moves."""
@@ -434,7 +436,7 @@ def _usable_shared_position(
     return group.positions.get(view.key)
 
 
-def shortest_counted_marking_px(policy: CalibrationPolicy, size: ImageSize) -> float:
+def min_counted_marking_px(policy: CalibrationPolicy, size: ImageSize) -> float:
     """Length below which an undrawn marking does not count as missing, pixels; 0: none is."""
     return policy.shortest_marking_px * size.diagonal / REFERENCE_DIAGONAL
 
@@ -494,7 +496,7 @@ def compute_calibration_key(
     shared: SharedPosition | None = None,
 ) -> str:
     """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
-    parts = _camera_key_parts(SOLVER_VERSION, station, pitch, policy, shared)
+    parts = _collect_camera_key_parts(SOLVER_VERSION, station, pitch, policy, shared)
     if station.not_visible:
         parts.append(repr(("not visible", station.not_visible)))
     if policy.shortest_marking_px:
@@ -502,7 +504,7 @@ def compute_calibration_key(
     return _digest_of_parts(parts)
 
 
-def _camera_key_parts(
+def _collect_camera_key_parts(
     version: str,
     station: Station,
     pitch: Pitch,
@@ -512,7 +514,7 @@ def _camera_key_parts(
     """All that the camera of a station depends on; ``version`` is that of the code."""
     # Plain tuples are spelt out in half the time.
     lines = [(marking, [*map(tuple, points)]) for marking, points in sorted(station.lines.items())]
-    parts = [*map(repr, (version, station.size, pitch)), policy.spelling, repr(lines)]
+    parts = [*map(repr, (version, station.size, pitch)), policy.cached_repr, repr(lines)]
     if policy.goal != "inner":
         parts.append(repr(("goal", policy.goal)))
     if policy.weighed != "points":
@@ -534,10 +536,10 @@ def _camera_key_parts(
 
 
 def _digest_of_parts(parts: list[str]) -> str:
-    return digest_of(f"[{', '.join(parts)}]".encode())
+    return digest_content(f"[{', '.join(parts)}]".encode())
 
 
-def _unobservable_parameters(covariance: FloatArray) -> tuple[str, ...]:
+def _list_unobservable_parameters(covariance: FloatArray) -> tuple[str, ...]:
     """Names of what the lines leave open, from the covariance of the parameters."""
     deviations = np.sqrt(np.diag(covariance))
     words = []

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from app.soccer.finding import PITCH_SIZE, Finding, Fix
+from app.soccer.finding import PITCH_SIZE, Finding, SuggestedFix
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
@@ -43,17 +43,17 @@ def find_calibration_findings(
         size: Annotated size.
         view: Key of the view, for findings of a group.
     """
-    slips = _misplaced_points(calibration, size)
-    yield from _wrong_label_findings(calibration, slips, view)
-    yield from _bad_point_findings(slips, size, view)
-    yield from _not_annotated_findings(calibration, size, view)
-    yield from _under_constrained_findings(calibration, view)
-    yield from _picture_geometry_findings(calibration, size, view)
-    yield from _camera_size_findings(calibration, size, view)
-    yield from _implausible_camera_findings(calibration, view)
+    slips = _find_misplaced_points(calibration, size)
+    yield from _find_wrong_labels(calibration, slips, view)
+    yield from _make_bad_point_findings(slips, size, view)
+    yield from _find_unannotated_markings(calibration, size, view)
+    yield from _find_unconstrained_parameters(calibration, view)
+    yield from _find_picture_distortions(calibration, size, view)
+    yield from _find_camera_size_mismatch(calibration, size, view)
+    yield from _find_implausible_camera(calibration, view)
 
 
-def _wrong_label_findings(
+def _find_wrong_labels(
     calibration: Calibration, slips: Mapping[str, tuple[int, float]], view: str | None
 ) -> Iterator[Finding]:
     for suspect in calibration.suspects:
@@ -65,12 +65,12 @@ def _wrong_label_findings(
                 f"“{suspect.marking}” contradicts all other lines and fits no other marking. Delete "
                 "it, or draw it again."
             )
-            fix = Fix("drop_marking", view, suspect.marking)
+            fix = SuggestedFix("drop_marking", view, suspect.marking)
         else:
             sentence = (
                 f"“{suspect.marking}” has the wrong label: its points lie on “{suspect.suggested}”."
             )
-            fix = Fix("relabel", view, suspect.marking, to=suspect.suggested)
+            fix = SuggestedFix("relabel", view, suspect.marking, to=suspect.suggested)
         yield Finding(
             "wrong_label",
             sentence,
@@ -84,7 +84,9 @@ def _wrong_label_findings(
         )
 
 
-def _misplaced_points(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, float]]:
+def _find_misplaced_points(
+    calibration: Calibration, size: ImageSize
+) -> dict[str, tuple[int, float]]:
     """Single points off their line while all others of the line fit: a slip of the hand.
 
     Returns:
@@ -105,7 +107,7 @@ def _misplaced_points(calibration: Calibration, size: ImageSize) -> dict[str, tu
     return found
 
 
-def _bad_point_findings(
+def _make_bad_point_findings(
     slips: Mapping[str, tuple[int, float]], size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     for marking, (index, worst) in sorted(slips.items(), key=lambda slip: -slip[1][1]):
@@ -117,11 +119,11 @@ def _bad_point_findings(
             marking,
             number=worst,
             threshold=BAD_POINT_GAMMA * GAMMA_PERCENT / 100 * size.diagonal,
-            fix=Fix("drop_point", view, marking, index=index),
+            fix=SuggestedFix("drop_point", view, marking, index=index),
         )
 
 
-def _not_annotated_findings(
+def _find_unannotated_markings(
     calibration: Calibration, size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     if calibration.jac is None or calibration.unobservable:
@@ -144,7 +146,7 @@ def _not_annotated_findings(
             )
 
 
-def _under_constrained_findings(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+def _find_unconstrained_parameters(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     if calibration.camera is None:
         yield Finding(
             "under_constrained",
@@ -164,7 +166,7 @@ def _under_constrained_findings(calibration: Calibration, view: str | None) -> I
         )
 
 
-def _picture_geometry_findings(
+def _find_picture_distortions(
     calibration: Calibration, size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     """A stretched picture, or one with a middle that is not the camera's, by what is larger."""
@@ -194,7 +196,7 @@ def _picture_geometry_findings(
         view,
         number=number,
         threshold=threshold,
-        fix=None if view is None else Fix("free_picture", view),
+        fix=None if view is None else SuggestedFix("free_picture", view),
     )
 
 
@@ -205,7 +207,7 @@ def find_pitch_findings_of_lone_frame(alone: LoneFrame | None, pitch: Pitch) -> 
         alone: What nobody else says of it; None where it is said.
         pitch: The one that it was calibrated on.
     """
-    other = None if alone is None else alone.other_pitch(pitch)
+    other = None if alone is None else alone.clearly_different_pitch(pitch)
     if alone is None or other is None:
         return
     off = np.abs([other.length - pitch.length, other.width - pitch.width])
@@ -221,7 +223,7 @@ def find_pitch_findings_of_lone_frame(alone: LoneFrame | None, pitch: Pitch) -> 
     )
 
 
-def _camera_size_findings(
+def _find_camera_size_mismatch(
     calibration: Calibration, size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     """A given camera whose principal point is the middle of another size."""
@@ -243,7 +245,7 @@ def _camera_size_findings(
     )
 
 
-def _implausible_camera_findings(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+def _find_implausible_camera(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
     if calibration.camera is None:
         return
@@ -315,9 +317,9 @@ def find_paint_findings(
     if find_usable_paint_reading(group, view, policy) is None:
         return
     if fit is None:
-        yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=Fix(READ_PAINT, view.key))
+        yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=SuggestedFix(READ_PAINT, view.key))
     elif fit.reason is not None:
         kind = PAINT_DISAGREES if fit.reason == PAINT_DISAGREES else NO_PAINT
         # To read again what shows no paint would show as little; a picture may have come back.
-        fix = Fix(READ_PAINT, view.key) if fit.reason == NO_FRAME else None
+        fix = SuggestedFix(READ_PAINT, view.key) if fit.reason == NO_FRAME else None
         yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported, fix=fix)

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import PARAMETERS
-from app.geometry.resection_kernels import aim_starts
+from app.geometry.resection_kernels import aim_starting_cameras
 from app.solving.observations import Observations
 
 MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M = (-20.0, 20.0), (38.0, 110.0), (-30.0, -6.0)
@@ -44,7 +44,7 @@ STADIUM = PositionPrior(MAIN_MEAN[1:], MAIN_SIGMA[1:], MAIN_FREEDOM)
 """What is known of any main camera."""
 
 
-def position_prior_of_match(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
+def make_match_position_prior(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
     """What the other frames of a match say of a main camera's position, metres, shapes (3,)."""
     return PositionPrior(mean, sigma, MATCH_FREEDOM, MATCH_CLICKS)
 
@@ -77,7 +77,7 @@ LEAST_SPREAD = 0.1
 """Markings are taken to be seen at least so far apart, as a share of the diagonal."""
 
 
-def make_starts_from_stands(observations: Observations, diagonal: float) -> FloatArray:
+def make_starts_from_known_positions(observations: Observations, diagonal: float) -> FloatArray:
     """One start for each stand, aimed and zoomed so that the seen markings lie where they are.
 
     Args:
@@ -88,7 +88,7 @@ def make_starts_from_stands(observations: Observations, diagonal: float) -> Floa
         Parameters of ``geometry.resection``, shape (S, 8).
     """
     starts = np.empty((len(STANDS), PARAMETERS))
-    aim_starts(
+    aim_starting_cameras(
         STANDS,
         observations.curves.kinds,
         observations.curves.shapes,

@@ -11,7 +11,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray, cross
 from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
 from app.solving.ball_covariance import pixel_covariances
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 
 LOW_P_VALUE = 0.002
 """Below it views contradict each other. Chance alone makes one in five hundred groups."""
@@ -74,7 +74,7 @@ def group_sigma_widening(found: ChiSquare | None) -> float:
 
 
 def chi_square_residuals(
-    facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+    facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> ChiSquareResiduals:
     """Fit one ball to all clicks of each group, and test what is left.
 
@@ -93,8 +93,8 @@ def chi_square_residuals(
     return _test_residuals(facts, views, facts.view_group[views], start, policy)
 
 
-def chi_square_residuals_without_each_view(
-    facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+def compute_leave_one_out_chi_square(
+    facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> ChiSquareResiduals:
     """``chi_square_residuals`` one group without one of its views, a row for each that counts, in order.
 
@@ -110,7 +110,7 @@ def chi_square_residuals_without_each_view(
 
 
 def _test_residuals(
-    facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
+    facts: GroupFacts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
 ) -> ChiSquareResiduals:
     """Residuals of sets of views, whose numbers are their owners, increasing, shape (N,)."""
     sets, begun = len(start), np.isfinite(start[owner, 0])
@@ -127,14 +127,14 @@ def _test_residuals(
     return ChiSquareResiduals(point, total, np.maximum(freedom, 0), p_value)
 
 
-def p_values(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> FloatArray:
-    """p-value of each group as of ``chi_square_residuals``, infinite where it is ``untestable_groups``, (G,)."""
+def p_values(facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy) -> FloatArray:
+    """p-value of each group as of ``chi_square_residuals``, infinite where it is ``find_untestable_groups``, (G,)."""
     found = chi_square_residuals(facts, used, start, policy).p_value
-    found[untestable_groups(facts, used, policy)] = np.inf
+    found[find_untestable_groups(facts, used, policy)] = np.inf
     return found
 
 
-def untestable_groups(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
+def find_untestable_groups(facts: GroupFacts, used: BoolArray, policy: Policy) -> BoolArray:
     """Groups whose residuals say nothing: nobody says how exact one of their cameras is, (G,).
 
     Args:
@@ -151,7 +151,7 @@ def untestable_groups(facts: Facts, used: BoolArray, policy: Policy) -> BoolArra
 
 
 def _fit_points(
-    facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
+    facts: GroupFacts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
 ) -> tuple[FloatArray, FloatArray]:
     """The most likely points, (G, 3), and each view's squared residual in units of sigma, (N,)."""
     slope, axis, position = (
@@ -181,7 +181,7 @@ def _fit_points(
 
 
 def _inverse_covariances(
-    facts: Facts, views: IntArray, points: FloatArray, policy: Policy
+    facts: GroupFacts, views: IntArray, points: FloatArray, policy: Policy
 ) -> FloatArray:
     """Inverse covariance of each view's click and calibration, at a point each, (N, 2, 2)."""
     covariances = pixel_covariances(facts, views, points, policy)

@@ -14,11 +14,11 @@ from app.soccer.solution import ChiSquare
 from app.solving.chi_square import (
     LOW_P_VALUE,
     chi_square_residuals,
-    chi_square_residuals_without_each_view,
+    compute_leave_one_out_chi_square,
+    find_untestable_groups,
     group_sigma_widening,
-    untestable_groups,
 )
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 from app.solving.judgement import Judgement, find_views_in_pairs
 from app.solving.triangulate import BallObservation
 
@@ -70,7 +70,7 @@ class Contradiction:
 
 
 def compute_chi_square(
-    keys: Sequence[str], facts: Facts, judgement: Judgement, policy: Policy
+    keys: Sequence[str], facts: GroupFacts, judgement: Judgement, policy: Policy
 ) -> ChiSquare | None:
     """The test of a group's residuals; None where no ball lies in front of all views.
 
@@ -95,7 +95,7 @@ def compute_chi_square(
 def find_contradiction(
     chi_square: ChiSquare | None,
     keys: Sequence[str],
-    facts: Facts,
+    facts: GroupFacts,
     judgement: Judgement,
     observations: Sequence[BallObservation],
     policy: Policy,
@@ -115,29 +115,29 @@ def find_contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
-    known = not untestable_groups(facts, used, policy)[0]
+    known = not find_untestable_groups(facts, used, policy)[0]
     chosen = [observation for observation in observations if observation.view in chi_square.views]
     if len(chosen) == 2:
         one, other = chosen
-        gap, moved = _distance_between_rays_or_balls(one, other, judgement.point[0], policy)
+        gap, moved = _measure_ray_and_ball_distance(one, other, judgement.point[0], policy)
         return Contradiction(chi_square, None, None, gap, moved, known)
-    view, confidence, point = _outlier_view(keys, facts, used, judgement.point, policy)
+    view, confidence, point = _find_outlier_view(keys, facts, used, judgement.point, policy)
     if view is None:
         return Contradiction(chi_square, None, None, is_known=known)
     observation = next(observation for observation in chosen if observation.view == view)
-    place = _ray_at_height(observation, float(point[2]))
+    place = _intersect_ray_with_height(observation, float(point[2]))
     level = None if place is None else float(np.linalg.norm(place - point))
     return Contradiction(
         chi_square, view, confidence, _distance_from_ray(observation, point), level, known
     )
 
 
-def _outlier_view(
-    keys: Sequence[str], facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+def _find_outlier_view(
+    keys: Sequence[str], facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> tuple[str | None, float, FloatArray]:
     """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
     places = np.flatnonzero(used)
-    left = chi_square_residuals_without_each_view(facts, used, start, policy)
+    left = compute_leave_one_out_chi_square(facts, used, start, policy)
     squares = np.where(np.isnan(left.chi_square), np.inf, left.chi_square)
     best = int(squares.argmin())
     confidence = 1.0 / float(np.exp((squares[best] - squares) / 2).sum())
@@ -145,19 +145,19 @@ def _outlier_view(
     return keys[places[best]] if agree else None, confidence, left.point[best]
 
 
-def _distance_between_rays_or_balls(
+def _measure_ray_and_ball_distance(
     a: BallObservation, b: BallObservation, point: FloatArray, policy: Policy
 ) -> tuple[float, float | None]:
     """How far two rays miss each other, and their balls if both lie on the grass, metres."""
     gap = _smallest_ray_distance(a, b)
     grass = -policy.ball_diameter_m / 2
-    ends = _ray_at_height(a, grass), _ray_at_height(b, grass)
+    ends = _intersect_ray_with_height(a, grass), _intersect_ray_with_height(b, grass)
     if height_above_grass(float(point[2])) > LOW_BALL_M or ends[0] is None or ends[1] is None:
         return gap, None
     return gap, float(np.linalg.norm(ends[0] - ends[1]))
 
 
-def _ray_at_height(observation: BallObservation, z: float) -> FloatArray | None:
+def _intersect_ray_with_height(observation: BallObservation, z: float) -> FloatArray | None:
     """Where a ray meets a level of the pitch frame, shape (3,); None where it is nearly level."""
     direction, position = _ray_direction(observation), observation.camera.position
     if direction[2] < STEEP or z < position[2]:

@@ -26,7 +26,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import BoolArray, FloatArray, IntArray, row_by_row
+from app.geometry.arrays import BoolArray, FloatArray, IntArray, flatten_covariance
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
@@ -50,12 +50,12 @@ from app.solving.line_noise import (
     collect_line_evidence,
     estimate_line_noise,
 )
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from app.solving.triangulate import BallObservation, collect_ball_observations
 
 
-def view_line_noise(
+def estimate_view_line_noise(
     calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> LineNoise:
     """Noise of the clicks of a view that is calibrated from them.
@@ -63,11 +63,11 @@ def view_line_noise(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _resection_at_calibration(calibration, size, policy)
-    return problem.line_noise(parameters, observations_of_lines(lines, policy.fitted(pitch), size))
+    problem, parameters = _make_resection_problem(calibration, size, policy)
+    return problem.line_noise(parameters, make_observations(lines, policy.fitted(pitch), size))
 
 
-def view_line_evidence(
+def collect_view_line_evidence(
     calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> LineEvidence:
     """What the clicks of a view say of the noise of its dataset, pixels at 960 x 540.
@@ -75,23 +75,25 @@ def view_line_evidence(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _resection_at_calibration(calibration, size, policy)
-    rows = problem.noise_rows(parameters, observations_of_lines(lines, policy.fitted(pitch), size))
+    problem, parameters = _make_resection_problem(calibration, size, policy)
+    rows = problem.compute_noise_rows(
+        parameters, make_observations(lines, policy.fitted(pitch), size)
+    )
     return collect_line_evidence(*rows).rescaled_to_pixels(problem.unit)
 
 
-def view_line_covariance(
+def compute_view_line_covariance(
     calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> tuple[float, ...]:
     """Covariance of the parameters of a view's camera under a policy's noise of lines, row by row, (64,).
 
     Noise moves no camera: the calibration may be that of a policy with another one.
     """
-    noise = view_line_noise(calibration, lines, pitch, size, policy)
-    return row_by_row(noise.parameters)
+    noise = estimate_view_line_noise(calibration, lines, pitch, size, policy)
+    return flatten_covariance(noise.parameters)
 
 
-def _resection_at_calibration(
+def _make_resection_problem(
     calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
 ) -> tuple[ResectionProblem, FloatArray]:
     if calibration.camera is None:
@@ -129,7 +131,7 @@ class NoiseGroup:
     def of(group: Group, solution: Solution, policy: Policy) -> NoiseGroup:
         """What a group and its solution under a policy say."""
         views = (
-            _noise_view(group, view, solved.calibration_key, solved.calibration, policy)
+            _make_noise_view(group, view, solved.calibration_key, solved.calibration, policy)
             for view, solved in zip(group.views, solution.views, strict=True)
         )
         return NoiseGroup(group, solution.ball, tuple(views))
@@ -139,18 +141,18 @@ class NoiseGroup:
         return (
             ()
             if self.ball is None
-            else compute_ray_residuals(self.ball, self._observations(policy))
+            else compute_ray_residuals(self.ball, self._make_observations(policy))
         )
 
-    def _observations(self, policy: Policy) -> list[BallObservation]:
-        found = [self._calibration(view, policy) for view in self.views]
+    def _make_observations(self, policy: Policy) -> list[BallObservation]:
+        found = [self._recompute_calibration(view, policy) for view in self.views]
         return collect_ball_observations(self.group.views, found)
 
-    def _calibration(self, seen: NoiseView, policy: Policy) -> Calibration:
+    def _recompute_calibration(self, seen: NoiseView, policy: Policy) -> Calibration:
         # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.
         if seen.evidence is None or seen.calibration.source != "lines":
             return seen.calibration
-        covariance = view_line_covariance(
+        covariance = compute_view_line_covariance(
             seen.calibration, seen.lines, self.group.pitch, seen.view.size, policy.calibration
         )
         return replace(seen.calibration, covariance=covariance)
@@ -186,19 +188,19 @@ def estimate_noise(groups: Sequence[NoiseGroup], policy: Policy) -> DatasetNoise
     }
     lines = estimate_line_noise([*evidence.values()])
     if lines is not None:
-        policy = _policy_with_line_noise(policy, lines)
+        policy = _replace_line_noise(policy, lines)
     misses = tuple(group.misses(policy) for group in groups)
     ball = estimate_ball_noise([miss for some in misses for miss in some], policy)
     return DatasetNoise(lines, ball, misses)
 
 
-def _policy_with_line_noise(policy: Policy, lines: LineEstimate) -> Policy:
+def _replace_line_noise(policy: Policy, lines: LineEstimate) -> Policy:
     sigma, share = lines.sigma.value, lines.share.value
     known = replace(policy.calibration, line_sigma_px=sigma, line_share=share)
     return replace(policy, calibration=known)
 
 
-def _noise_view(
+def _make_noise_view(
     group: Group, view: View, key: str, calibration: Calibration, policy: Policy
 ) -> NoiseView:
     left_out = {suspect.marking for suspect in calibration.suspects}
@@ -209,7 +211,7 @@ def _noise_view(
         arguments = calibration, lines, group.pitch, view.size, policy.calibration
         # Lines that leave the camera open say nothing of their noise.
         with suppress(DegenerateGeometryError, np.linalg.LinAlgError):
-            evidence = view_line_evidence(*arguments)
+            evidence = collect_view_line_evidence(*arguments)
     return NoiseView(key, view, replace(calibration, markings=()), lines, evidence)
 
 
@@ -323,7 +325,7 @@ class _SourceVariances:
         own: FloatArray = self.added * np.exp(2 * self.of @ logs)
         return own
 
-    def miss_variances(self, own: FloatArray) -> FloatArray:
+    def residual_variances(self, own: FloatArray) -> FloatArray:
         """Of the misses, shape (M,)."""
         variance: FloatArray = self.known + np.bincount(self.row, own, len(self.known))
         return variance
@@ -334,15 +336,15 @@ class _SourceVariances:
         np.add.at(total, self.row, own[:, None] * self.of)
         return total
 
-    def without_outliers(self, logs: FloatArray) -> BoolArray:
+    def find_inliers(self, logs: FloatArray) -> BoolArray:
         """Misses that are no mistakes, shape (M,)."""
-        kept: BoolArray = self.squares <= LIMIT * self.miss_variances(self.view_variances(logs))
+        kept: BoolArray = self.squares <= LIMIT * self.residual_variances(self.view_variances(logs))
         return kept
 
     def log_variance_derivatives(self, logs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of the variances' logarithms by those of the factors, (M, S), and the variances, (M,)."""
         own = self.view_variances(logs)
-        variance = self.miss_variances(own)
+        variance = self.residual_variances(own)
         return 2 * self.variances_by_source(own) / variance[:, None], variance
 
 
@@ -360,7 +362,7 @@ def estimate_sources(
         share: What the ball's diameter adds to it.
         given: What a given camera adds to it, pixels at 1920 x 1080.
     """
-    sources = _distinct_sources(
+    sources = _list_distinct_sources(
         [of.get(view[0], ()) for miss, of in misses for view in miss.by_view]
     )
     if not sources:
@@ -377,7 +379,7 @@ def estimate_sources(
     )
 
 
-def _distinct_sources(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
+def _list_distinct_sources(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
     """The sources, without those that all views have: one alone is the dataset."""
     every = sorted({source for sources in seen for source in sources})
     return [one for one in every if not all(one in sources for sources in seen)]
@@ -409,14 +411,14 @@ def _fit_factors(parts: _SourceVariances) -> tuple[FloatArray, FloatArray, Float
     """Logarithms of the factors, their covariance, and how much speaks of each."""
     logs = np.zeros(parts.of.shape[1])
     for _ in range(_ROUNDS):
-        kept = parts.without_outliers(logs)
+        kept = parts.find_inliers(logs)
         slopes, variance = (array[kept] for array in parts.log_variance_derivatives(logs))
         pull = 0.5 * slopes.T @ (parts.squares[kept] / TRIMMED / variance - 1) - logs / SPREAD**2
         step = np.linalg.solve(_fisher_information(slopes), pull)
         logs = logs + np.clip(step, -_LONGEST, _LONGEST)
         if np.abs(step).max() < _SETTLED:
             break
-    kept = parts.without_outliers(logs)
+    kept = parts.find_inliers(logs)
     slopes = parts.log_variance_derivatives(logs)[0][kept]
     covariance = np.linalg.inv(_fisher_information(slopes)).astype(np.float64)
     return logs, covariance, slopes.sum(axis=0) / 2

@@ -30,7 +30,7 @@ from app.solving.triangulate import (
     CameraNumbers,
     PairPoint,
     collect_ball_observations,
-    stack_pairs,
+    stack_pair_arrays,
     triangulate_observation_pairs,
 )
 
@@ -39,7 +39,7 @@ STEP_PX = 0.5
 
 
 @dataclass(frozen=True)
-class Facts:
+class GroupFacts:
     """Groups (G), their views (V), the views' markings (M) and pairs of views (P).
 
     Attributes:
@@ -129,23 +129,23 @@ class Facts:
         """Some rows of a column; of large ones, cheaper than all of it where this is a part."""
         return getattr(self, name)[rows]
 
-    def only(self, kept: BoolArray) -> Facts:
+    def only(self, kept: BoolArray) -> GroupFacts:
         """The facts of some of the groups, in the same order."""
         part = self.part(kept)
-        return Facts(part.groups, **{name: getattr(part, name) for name in COLUMNS})
+        return GroupFacts(part.groups, **{name: getattr(part, name) for name in COLUMNS})
 
-    def part(self, kept: BoolArray) -> Facts:
+    def part(self, kept: BoolArray) -> GroupFacts:
         """``only`` whose columns are gathered when they are first read.
 
         The gates read a tenth of what is known of a group.
         """
-        return cast(Facts, _FactsSubset(self, kept))
+        return cast(GroupFacts, _FactsSubset(self, kept))
 
 
 class _FactsSubset:
     """Some of the groups of facts, a column of which is made when somebody reads it."""
 
-    def __init__(self, whole: Facts, kept: BoolArray):
+    def __init__(self, whole: GroupFacts, kept: BoolArray):
         self.groups = int(kept.sum())
         views = kept[whole.view_group]
         self._whole = whole
@@ -160,9 +160,9 @@ class _FactsSubset:
         """``Facts.rows``; of a column that holds no rows of something else."""
         if name in self.__dict__:
             return self.__dict__[name][rows]
-        return getattr(self._whole, name)[self._own_rows(name)[rows]]
+        return getattr(self._whole, name)[self._rows_of_column(name)[rows]]
 
-    def _own_rows(self, name: str) -> IntArray:
+    def _rows_of_column(self, name: str) -> IntArray:
         """Rows of a column that are its own."""
         per = name.partition("_")[0]
         if per not in self._rows:
@@ -170,7 +170,7 @@ class _FactsSubset:
         return self._rows[per]
 
     def __getattr__(self, name: str) -> Any:
-        array = getattr(self._whole, name)[self._own_rows(name)]
+        array = getattr(self._whole, name)[self._rows_of_column(name)]
         if name in _POINTS_TO:
             array = self._places[_POINTS_TO[name]][array]
         self.__dict__[name] = array
@@ -216,28 +216,32 @@ COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 }
 """Type of each array, and shape of one row of it; what came later stands last."""
 
-NOTHING = Facts(0, **{name: np.empty((0, *shape), kind) for name, (kind, shape) in COLUMNS.items()})
+NOTHING = GroupFacts(
+    0, **{name: np.empty((0, *shape), kind) for name, (kind, shape) in COLUMNS.items()}
+)
 """The facts of no group."""
 
 
-def join_facts(parts: Sequence[Facts]) -> Facts:
+def join_facts(parts: Sequence[GroupFacts]) -> GroupFacts:
     """The groups of several facts, one after the other."""
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     groups = [part.groups for part in parts]
     views = [len(part.view_group) for part in parts]
     for name, sizes in (("view_group", groups), ("pair_group", groups), ("mark_view", views)):
-        arrays[name] += _row_offsets(parts, name, sizes)
-    arrays["pair_view"] += _row_offsets(parts, "pair_view", views)[:, None]
-    return Facts(sum(groups), **arrays)
+        arrays[name] += _compute_row_offsets(parts, name, sizes)
+    arrays["pair_view"] += _compute_row_offsets(parts, "pair_view", views)[:, None]
+    return GroupFacts(sum(groups), **arrays)
 
 
-def _row_offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArray:
+def _compute_row_offsets(parts: Sequence[GroupFacts], name: str, sizes: Sequence[int]) -> IntArray:
     """For each row of ``name``: how many rows the parts before its own have."""
     starts = np.cumsum([0, *sizes[:-1]])
     return np.repeat(starts, [len(getattr(part, name)) for part in parts])
 
 
-def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> Facts:
+def collect_facts_of_views(
+    views: Sequence[View], calibrations: Sequence[Calibration]
+) -> GroupFacts:
     """The facts of one group, from what was said of its views and the calibration of each."""
     pair_points = triangulate_observation_pairs(
         combinations(collect_ball_observations(views, calibrations), 2)
@@ -247,7 +251,7 @@ def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> F
 
 def collect_facts(
     views: Sequence[View], calibrations: Sequence[Calibration], pair_points: Sequence[PairPoint]
-) -> Facts:
+) -> GroupFacts:
     """The facts of one group.
 
     Args:
@@ -273,8 +277,8 @@ def collect_facts(
             parameters[place], covariances[place] = known.parameters, known.covariance
             pictures[place] = 0.0 if known.picture is None else known.picture
     places = {view.key: place for place, view in enumerate(views)}
-    slopes, axes = _view_rays(pair_points, places)
-    return Facts(
+    slopes, axes = _collect_view_rays(pair_points, places)
+    return GroupFacts(
         groups=1,
         view_group=np.zeros(len(views), np.int64),
         view_included=np.array([view.included for view in views], bool),
@@ -303,14 +307,14 @@ def collect_facts(
         pair_baseline=np.array([item.baseline_m for item in pair_points], float),
         pair_parallax=np.array([item.parallax_degrees for item in pair_points], float),
         pair_point=_to_table([item.point for item in pair_points], 3),
-        pair_moved=_moved_pair_points(pair_points),
+        pair_moved=_perturb_pair_points(pair_points),
         view_picture=pictures,
-        view_stretch=_view_stretches(views, calibrations, numbers),
+        view_stretch=_collect_view_stretches(views, calibrations, numbers),
         view_noise=np.array([view.noise for view in views], float),
     )
 
 
-def _view_stretches(
+def _collect_view_stretches(
     views: Sequence[View],
     calibrations: Sequence[Calibration],
     numbers: Sequence[CameraNumbers | None],
@@ -326,7 +330,7 @@ def _view_stretches(
     return stretches
 
 
-def _view_rays(
+def _collect_view_rays(
     pair_points: Sequence[PairPoint], places: Mapping[str, int]
 ) -> tuple[FloatArray, FloatArray]:
     """Slope and axis of the views that meet others, NaN for those that do not."""
@@ -345,14 +349,17 @@ def _camera_position(calibration: Calibration) -> Sequence[float] | FloatArray:
     return (np.nan,) * 3 if calibration.camera is None else calibration.camera.position
 
 
-def _moved_pair_points(pair_points: Sequence[PairPoint]) -> FloatArray:
+def _perturb_pair_points(pair_points: Sequence[PairPoint]) -> FloatArray:
     if not pair_points:
         return NOTHING.pair_moved
     a, b = [item.a for item in pair_points], [item.b for item in pair_points]
     slopes = None
     if any(observation.camera.is_wide for observation in (*a, *b)):
-        slopes = np.array([s.ideal_slope for s in a]), np.array([s.ideal_slope for s in b])
-    return triangulation_shifts(*stack_pairs(a, b), STEP_PX, slopes)
+        slopes = (
+            np.array([s.undistortion_jacobian for s in a]),
+            np.array([s.undistortion_jacobian for s in b]),
+        )
+    return triangulation_shifts(*stack_pair_arrays(a, b), STEP_PX, slopes)
 
 
 def _to_table(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:
@@ -370,7 +377,7 @@ LATER: dict[str, tuple[float, ...]] = {
 """Columns that facts of before do not have, and what stands there then."""
 
 
-def facts_to_bytes(facts: Facts) -> bytes:
+def facts_to_bytes(facts: GroupFacts) -> bytes:
     """Compressed little-endian doubles: how many views, markings and pairs, then each column.
 
     Of the columns that came later the last ones that say nothing are left out: the bytes are those
@@ -384,7 +391,7 @@ def facts_to_bytes(facts: Facts) -> bytes:
     return zlib_ng.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
 
 
-def facts_from_bytes(contents: Sequence[bytes]) -> Facts:
+def facts_from_bytes(contents: Sequence[bytes]) -> GroupFacts:
     """Back from ``facts_to_bytes``: the facts of groups, one after the other.
 
     Groups of the same size are read together: a thousand cost little more than one.
@@ -403,7 +410,7 @@ def facts_from_bytes(contents: Sequence[bytes]) -> Facts:
         raise DamagedError(sentence, hint=EXAMINE) from error
 
 
-def _facts_from_numbers(groups: Sequence[FloatArray]) -> Facts:
+def _facts_from_numbers(groups: Sequence[FloatArray]) -> GroupFacts:
     """The facts of groups from the numbers of each."""
     heads = np.array([[len(numbers), *numbers[: len(_ROWS)]] for numbers in groups]).astype(int)
     ends = np.cumsum(heads[:, 1:], axis=0)
@@ -428,7 +435,7 @@ def _facts_from_numbers(groups: Sequence[FloatArray]) -> Facts:
     arrays["pair_group"] += np.repeat(owner, heads[:, 3])
     arrays["mark_view"] += np.repeat(starts["view"], heads[:, 2])
     arrays["pair_view"] += np.repeat(starts["view"], heads[:, 3])[:, None]
-    return Facts(len(groups), **arrays)
+    return GroupFacts(len(groups), **arrays)
 
 
 def _scatter_columns(
@@ -457,7 +464,7 @@ def _column_owner(name: str) -> str:
     return name.partition("_")[0]
 
 
-def _is_default_column(facts: Facts, name: str) -> bool:
+def _is_default_column(facts: GroupFacts, name: str) -> bool:
     """Whether the column says nothing that its absence would not."""
     if name == "view_stretch":
         return not facts.view_picture.any()

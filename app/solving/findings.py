@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
+from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, SuggestedFix
 from app.soccer.group import Group, View, make_view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Pair, ViewSolution
-from app.solving.ball_3d import list_implausible_reasons
+from app.soccer.solution import Ball3D, TriangulatedPair, ViewSolution
+from app.solving.ball_3d import explain_implausible_position
 from app.solving.calibration_findings import find_calibration_findings, find_paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import describe_odds
-from app.solving.sides import SwappedView, find_swaps
+from app.solving.sides import SwappedView, find_swapped_views
 from app.solving.triangulate import BallObservation
 from app.wording import format_degrees, format_metres, format_pixels, plural
 
@@ -50,13 +50,13 @@ def find_group_findings(
     group: Group,
     views: Sequence[ViewSolution],
     observations: Sequence[BallObservation],
-    pairs: Sequence[Pair],
+    pairs: Sequence[TriangulatedPair],
     ball: Ball3D | None,
     policy: Policy,
     contradicted: Contradiction | None = None,
 ) -> tuple[Finding, ...]:
     """All findings of a group: what makes its ball unusable first, then what explains most."""
-    swaps = {swap.view: swap for swap in _swapped_views(group, views, observations, policy)}
+    swaps = {swap.view: swap for swap in _find_swapped_views(group, views, observations, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
         noticed = find_calibration_findings(solved.calibration, view.size, view.key)
@@ -67,31 +67,31 @@ def find_group_findings(
             if not (view.station.shared and item.kind == "visible_not_annotated")
         )
         found.extend(find_paint_findings(group, view, solved, policy.calibration))
-        found.extend(_several_balls_findings(view))
+        found.extend(_find_several_balls(view))
         if view.key in swaps:
-            found.append(_sides_swapped_finding(swaps[view.key]))
+            found.append(_make_sides_swapped_finding(swaps[view.key]))
         else:
-            found.extend(_view_disagrees_findings(group, view, solved, pairs, policy))
-            found.extend(_misses_ball_findings(solved, policy.tau_px(view.size.diagonal)))
-        found.extend(_ball_size_findings(solved))
+            found.extend(_find_view_disagreement(group, view, solved, pairs, policy))
+            found.extend(_find_missed_ball(solved, policy.tau_px(view.size.diagonal)))
+        found.extend(_find_wrong_ball_size(solved))
     if ball is None and not swaps:
-        found.extend(_not_synchronous_findings(pairs, policy, group))
+        found.extend(_find_unsynchronised_views(pairs, policy, group))
     if contradicted is not None and not swaps:
-        found.append(_views_contradict_finding(contradicted, group, ball))
+        found.append(_make_contradiction_finding(contradicted, group, ball))
     if ball is not None:
-        found.extend(_low_parallax_findings(ball, policy))
-        found.extend(_high_uncertainty_findings(ball, contradicted))
-        found.extend(_implausible_ball_findings(ball, group.pitch, policy))
-    return tuple(sorted(found, key=_finding_order))
+        found.extend(_find_low_parallax(ball, policy))
+        found.extend(_find_high_uncertainty(ball, contradicted))
+        found.extend(_find_implausible_ball(ball, group.pitch, policy))
+    return tuple(sorted(found, key=_finding_sort_key))
 
 
-def _finding_order(finding: Finding) -> tuple[bool, int, float]:
+def _finding_sort_key(finding: Finding) -> tuple[bool, int, float]:
     """What comes first; of views that disagree the one that is farther off."""
     far = (finding.number or 0.0) if finding.kind == "view_disagrees" else 0.0
     return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind), -far
 
 
-def _swapped_views(
+def _find_swapped_views(
     group: Group,
     views: Sequence[ViewSolution],
     observations: Sequence[BallObservation],
@@ -105,10 +105,10 @@ def _swapped_views(
     usable = [observation for observation in observations if observation.view in left]
     badly = {solved.view for solved in views if solved.failed == "jac"}
     doubtful = [observation for observation in observations if observation.view in badly]
-    return find_swaps(first, usable, group.pitch, policy, doubtful)
+    return find_swapped_views(first, usable, group.pitch, policy, doubtful)
 
 
-def _several_balls_findings(view: View) -> Iterator[Finding]:
+def _find_several_balls(view: View) -> Iterator[Finding]:
     count = sum(not ball.out_of_view for ball in view.balls)
     if count > 1:
         yield Finding(
@@ -118,11 +118,11 @@ def _several_balls_findings(view: View) -> Iterator[Finding]:
             view.key,
             number=float(count),
             threshold=1.0,
-            fix=Fix("pick_ball", view.key),
+            fix=SuggestedFix("pick_ball", view.key),
         )
 
 
-def _sides_swapped_finding(swap: SwappedView) -> Finding:
+def _make_sides_swapped_finding(swap: SwappedView) -> Finding:
     if swap.turned_error_px is None:
         sentence = (
             "The lines put the main camera on the far side of the pitch, where no main camera "
@@ -140,12 +140,16 @@ def _sides_swapped_finding(swap: SwappedView) -> Finding:
         number=swap.error_px,
         threshold=swap.turned_error_px,
         confidence=swap.confidence,
-        fix=Fix("swap_sides", swap.view),
+        fix=SuggestedFix("swap_sides", swap.view),
     )
 
 
-def _view_disagrees_findings(
-    group: Group, view: View, solved: ViewSolution, pairs: Sequence[Pair], policy: Policy
+def _find_view_disagreement(
+    group: Group,
+    view: View,
+    solved: ViewSolution,
+    pairs: Sequence[TriangulatedPair],
+    policy: Policy,
 ) -> Iterator[Finding]:
     """A view in no valid pair, though it was judged and others agree."""
     judged = [
@@ -160,7 +164,7 @@ def _view_disagrees_findings(
 
 
 def make_view_disagrees_finding(
-    view: str, best: Pair, letters: Mapping[str, str], tau_px: float
+    view: str, best: TriangulatedPair, letters: Mapping[str, str], tau_px: float
 ) -> Finding:
     """What is said of a view that misses the others' ball in its closest pair.
 
@@ -172,7 +176,7 @@ def make_view_disagrees_finding(
         letters: What people call the views, by key.
         tau_px: Largest error of a valid pair in the view, pixels.
     """
-    fix = Fix("exclude_view", view)
+    fix = SuggestedFix("exclude_view", view)
     apart_px = max(best.errors_px)
     if apart_px <= tau_px:
         return Finding(
@@ -196,7 +200,7 @@ def make_view_disagrees_finding(
     )
 
 
-def _misses_ball_findings(solved: ViewSolution, tau_px: float) -> Iterator[Finding]:
+def _find_missed_ball(solved: ViewSolution, tau_px: float) -> Iterator[Finding]:
     """A view in a valid pair that the 3D ball does not fit: it is the mean of several pairs."""
     error_px = solved.ball.error_px if solved.ball is not None and solved.included else None
     if error_px is not None and error_px > tau_px:
@@ -213,11 +217,11 @@ def make_misses_ball_finding(view: str, error_px: float, tau_px: float) -> Findi
         view,
         number=error_px,
         threshold=tau_px,
-        fix=Fix("exclude_view", view),
+        fix=SuggestedFix("exclude_view", view),
     )
 
 
-def _ball_size_findings(solved: ViewSolution) -> Iterator[Finding]:
+def _find_wrong_ball_size(solved: ViewSolution) -> Iterator[Finding]:
     ratio = solved.ball.size_ratio if solved.ball is not None and solved.included else None
     if ratio is None or 1 / MAX_SIZE_RATIO <= ratio <= MAX_SIZE_RATIO:
         return
@@ -231,8 +235,8 @@ def _ball_size_findings(solved: ViewSolution) -> Iterator[Finding]:
     )
 
 
-def _not_synchronous_findings(
-    pairs: Sequence[Pair], policy: Policy, group: Group
+def _find_unsynchronised_views(
+    pairs: Sequence[TriangulatedPair], policy: Policy, group: Group
 ) -> Iterator[Finding]:
     """Well calibrated views whose balls do not meet, from either side: another instant.
 
@@ -261,12 +265,12 @@ def _not_synchronous_findings(
     )
 
 
-def find_closest_pair(pairs: Sequence[Pair]) -> Pair:
+def find_closest_pair(pairs: Sequence[TriangulatedPair]) -> TriangulatedPair:
     """The pair whose larger error is the smallest."""
     return min(pairs, key=lambda pair: max(pair.errors_px))
 
 
-def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:
+def _make_contradiction_finding(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
@@ -286,7 +290,7 @@ def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | 
         )
     if item.view is not None:
         sentences.append("Without this view the others agree.")
-    if item.gap_m is not None and item.is_motion and not _have_one_clock(group):
+    if item.gap_m is not None and item.is_motion and not _has_common_clock(group):
         sentences.append(_describe_time_gap(item.gap_m, item.moved_m))
     if item.view is not None:
         sentences.append("If its ball is drawn on the ball, leave the view out.")
@@ -301,7 +305,7 @@ def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | 
         number=found.p_value,
         threshold=LOW_P_VALUE,
         confidence=item.confidence,
-        fix=None if item.view is None else Fix("exclude_view", item.view),
+        fix=None if item.view is None else SuggestedFix("exclude_view", item.view),
     )
 
 
@@ -327,12 +331,12 @@ def _round_milliseconds(seconds: float) -> int:
     return int(float(f"{1000 * seconds:.2g}"))
 
 
-def _have_one_clock(group: Group) -> bool:
+def _has_common_clock(group: Group) -> bool:
     """Static cameras run on one clock."""
     return all(view.station.shared for view in group.views)
 
 
-def _low_parallax_findings(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
+def _find_low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
             "low_parallax",
@@ -343,9 +347,7 @@ def _low_parallax_findings(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
         )
 
 
-def _high_uncertainty_findings(
-    ball: Ball3D, contradicted: Contradiction | None
-) -> Iterator[Finding]:
+def _find_high_uncertainty(ball: Ball3D, contradicted: Contradiction | None) -> Iterator[Finding]:
     """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball."""
     if not ball.sigma_m > HIGH_SIGMA_M:
         return
@@ -378,9 +380,9 @@ def _describe_sigma(ball: Ball3D) -> str:
     )
 
 
-def _implausible_ball_findings(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
+def _find_implausible_ball(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
-    wrong = list_implausible_reasons(ball.point, pitch, policy)
+    wrong = explain_implausible_position(ball.point, pitch, policy)
     if wrong:
         number, threshold, _ = wrong[0]
         sentence = (

@@ -16,7 +16,7 @@ from app.soccer.solution import (
     Calibration,
     ChiSquare,
     Gate,
-    Pair,
+    TriangulatedPair,
     compute_margin,
 )
 from app.solving.chi_square import LOW_P_VALUE
@@ -79,7 +79,7 @@ class _JudgedGroup:
 def describe_gates(
     views: Sequence[JudgedView],
     left_out: Sequence[str],
-    pairs: Sequence[Pair],
+    pairs: Sequence[TriangulatedPair],
     ball: Ball3D | None,
     judgement: Judgement,
     policy: Policy,
@@ -101,25 +101,25 @@ def describe_gates(
     failed = zip(GATES, judgement.failed[:, 0].tolist(), strict=True)
     group = _JudgedGroup(views, left_out, frozenset(name for name, fails in failed if fails))
     return (
-        _calibratable_gate(group),
-        _jac_gate(group, policy),
-        *_agreement_gates(group, policy),
-        _two_views_gate(group),
-        _ball_gate(group),
-        _baseline_gate(group, pairs, float(judgement.baseline[0]), policy),
-        _reprojection_gate(group, pairs, policy),
-        _parallax_gate(group, ball, policy),
-        _sigma_gate(group, ball, policy),
-        _chi_square_gate(group, chi_square, policy),
+        _make_calibratable_gate(group),
+        _make_jac_gate(group, policy),
+        *_make_agreement_gates(group, policy),
+        _make_two_views_gate(group),
+        _make_ball_gate(group),
+        _make_baseline_gate(group, pairs, float(judgement.baseline[0]), policy),
+        _make_tau_gate(group, pairs, policy),
+        _make_parallax_gate(group, ball, policy),
+        _make_sigma_gate(group, ball, policy),
+        _make_chi_square_gate(group, chi_square, policy),
     )
 
 
-def _calibratable_gate(group: _JudgedGroup) -> Gate:
+def _make_calibratable_gate(group: _JudgedGroup) -> Gate:
     fallen, views = group.views_failing("calibratable"), group.views
     count = len(views) - len(fallen)
     blamed = "calibratable" in group.failed
     sentence = f"in {count} of {len(views)} views"
-    if guessed := [view for view in views if _is_partly_guessed(view.calibration)]:
+    if guessed := [view for view in views if _has_undetermined_parameters(view.calibration)]:
         sentence += f", {_list_letters(guessed)} uncertain"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
@@ -133,21 +133,21 @@ def _calibratable_gate(group: _JudgedGroup) -> Gate:
     )
 
 
-def _is_partly_guessed(calibration: Calibration) -> bool:
+def _has_undetermined_parameters(calibration: Calibration) -> bool:
     """Whether the lines leave open a part of the camera that was found."""
     return calibration.camera is not None and bool(calibration.unobservable)
 
 
-def _jac_gate(group: _JudgedGroup, policy: Policy) -> Gate:
+def _make_jac_gate(group: _JudgedGroup, policy: Policy) -> Gate:
     measured = [(view.jac, view) for view in group.views if view.jac is not None]
     if not measured:
         given = any(view.calibration.source == "given" for view in group.views)
         sentence = "not measured, the cameras were given" if given else "nothing to measure"
         return Gate("jac", True, None, policy.min_jac, None, sentence)
-    return _gate_of_worst_view("jac", group, measured, policy.min_jac)
+    return _make_worst_view_gate("jac", group, measured, policy.min_jac)
 
 
-def _agreement_gates(group: _JudgedGroup, policy: Policy) -> Iterator[Gate]:
+def _make_agreement_gates(group: _JudgedGroup, policy: Policy) -> Iterator[Gate]:
     threshold = policy.min_agreement
     if threshold is None:
         return
@@ -156,10 +156,10 @@ def _agreement_gates(group: _JudgedGroup, policy: Policy) -> Iterator[Gate]:
     if not measured:
         yield Gate("agreement", True, None, threshold, None, "no paint was read")
         return
-    yield _gate_of_worst_view("agreement", group, measured, threshold)
+    yield _make_worst_view_gate("agreement", group, measured, threshold)
 
 
-def _gate_of_worst_view(
+def _make_worst_view_gate(
     name: str, group: _JudgedGroup, measured: Sequence[tuple[float, JudgedView]], threshold: float
 ) -> Gate:
     """A gate of views, by the smallest number of those that it judges."""
@@ -200,7 +200,7 @@ def _format_beside_limit(value: float, limit: float) -> str:
     return f"{value:.4f}" if same else f"{value:.2f}"
 
 
-def _two_views_gate(group: _JudgedGroup) -> Gate:
+def _make_two_views_gate(group: _JudgedGroup) -> Gate:
     count, passed = len(group.remaining_views), "two_views" not in group.failed
     sentence = f"{count} of {len(group.views) + len(group.left_out)}"
     if not passed:
@@ -211,7 +211,7 @@ def _two_views_gate(group: _JudgedGroup) -> Gate:
     return _make_gate("two_views", passed, count, MIN_VIEWS, sentence)
 
 
-def _ball_gate(group: _JudgedGroup) -> Gate:
+def _make_ball_gate(group: _JudgedGroup) -> Gate:
     without = [view for view in group.remaining_views if not view.has_ball]
     count = len(group.remaining_views) - len(without)
     passed = "ball" not in group.failed
@@ -238,11 +238,11 @@ def _describe_failed_views(views: Sequence[JudgedView]) -> list[str]:
     ]
 
 
-def _baseline_gate(
-    group: _JudgedGroup, pairs: Sequence[Pair], widest: float, policy: Policy
+def _make_baseline_gate(
+    group: _JudgedGroup, pairs: Sequence[TriangulatedPair], widest: float, policy: Policy
 ) -> Gate:
     if isnan(widest):
-        return _unjudged_gate("baseline", policy.min_baseline_m)
+        return _make_unjudged_gate("baseline", policy.min_baseline_m)
     passed = "baseline" not in group.failed
     letters = "–".join(view.letter for view in group.remaining_views if view.has_ball)
     sentence = f"{widest:.1f} m" if passed else f"{letters} {widest:.1f} m apart"
@@ -250,7 +250,7 @@ def _baseline_gate(
     close = [pair for pair in pairs if pair.failed == "baseline"]
     if passed and close:
         unused = ", ".join(
-            f"{_pair_letters(pair, named)} {pair.baseline_m:.1f} m" for pair in close
+            f"{_format_pair_letters(pair, named)} {pair.baseline_m:.1f} m" for pair in close
         )
         sentence += f"; {unused} not used"
     return _make_gate("baseline", passed, widest, policy.min_baseline_m, sentence)
@@ -260,13 +260,13 @@ def _letters_by_view(group: _JudgedGroup) -> dict[str, str]:
     return {view.key: view.letter for view in group.views}
 
 
-def _reprojection_gate(group: _JudgedGroup, pairs: Sequence[Pair], policy: Policy) -> Gate:
+def _make_tau_gate(group: _JudgedGroup, pairs: Sequence[TriangulatedPair], policy: Policy) -> Gate:
     tau_px = {view.key: view.tau_px for view in group.remaining_views}
     return make_reprojection_gate(pairs, _letters_by_view(group), tau_px, policy.tau_percent)
 
 
 def make_reprojection_gate(
-    pairs: Sequence[Pair],
+    pairs: Sequence[TriangulatedPair],
     letters: Mapping[str, str],
     tau_px: Mapping[str, float],
     tau_percent: float,
@@ -280,27 +280,32 @@ def make_reprojection_gate(
         tau_percent: The same, of the image diagonal of each view.
     """
     judged = [
-        (max(_errors_in_tau(pair, tau_px), key=lambda share: share[0]), pair)
+        (max(_compute_errors_in_tau(pair, tau_px), key=lambda share: share[0]), pair)
         for pair in pairs
         if pair.failed in (None, "reprojection")
     ]
     if not judged:
-        return _unjudged_gate("reprojection", None)
+        return _make_unjudged_gate("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
-    sentence = f"{_pair_letters(best, letters)} {format_pixels(error)}, {_percent_of_limit(error / tau, tau_percent)}"
+    sentence = f"{_format_pair_letters(best, letters)} {format_pixels(error)}, {_format_percent_of_limit(error / tau, tau_percent)}"
     if len(judged) > 1:
         sentence += " (best pair)"
     margin = compute_margin(error, tau, at_most=True)
     if not best.valid and error <= tau:
         # Its pixels are near enough, and there is no ball: no share of tau says how far it is off.
-        sentence, margin = f"the rays of {_pair_letters(best, letters)} meet behind a camera", None
+        sentence, margin = (
+            f"the rays of {_format_pair_letters(best, letters)} meet behind a camera",
+            None,
+        )
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
-        sentence += f"; {', '.join(_pair_letters(pair, letters) for pair in left_out)} not used"
+        sentence += (
+            f"; {', '.join(_format_pair_letters(pair, letters) for pair in left_out)} not used"
+        )
     return Gate("reprojection", best.valid, error, tau, margin, sentence)
 
 
-def _percent_of_limit(share: float, limit: float) -> str:
+def _format_percent_of_limit(share: float, limit: float) -> str:
     """A share of a limit as per cent, in as many digits as it takes to tell it from the limit.
 
     Example:
@@ -311,8 +316,8 @@ def _percent_of_limit(share: float, limit: float) -> str:
     return f"{_format_beside_limit(value, limit) if round(value, 2) == round(limit, 2) else format_percent(value)} %"
 
 
-def _errors_in_tau(
-    pair: Pair, tau_px: Mapping[str, float]
+def _compute_errors_in_tau(
+    pair: TriangulatedPair, tau_px: Mapping[str, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """For both views: error in units of tau, error, tau."""
     first, second = tau_px[pair.a], tau_px[pair.b]
@@ -322,31 +327,31 @@ def _errors_in_tau(
     )
 
 
-def _pair_letters(pair: Pair, letters: Mapping[str, str]) -> str:
+def _format_pair_letters(pair: TriangulatedPair, letters: Mapping[str, str]) -> str:
     return f"{letters[pair.a]}–{letters[pair.b]}"
 
 
-def _parallax_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
+def _make_parallax_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.min_parallax_degrees, policy.min_parallax_degrees is not None
     if ball is None:
-        return _unjudged_gate("parallax", threshold, active=active)
+        return _make_unjudged_gate("parallax", threshold, active=active)
     value, passed = ball.parallax_degrees, "parallax" not in group.failed
     return _make_gate("parallax", passed, value, threshold, format_degrees(value), active=active)
 
 
-def _sigma_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
+def _make_sigma_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.max_sigma_m, policy.max_sigma_m is not None
     if ball is None:
-        return _unjudged_gate("sigma", threshold, active=active)
+        return _make_unjudged_gate("sigma", threshold, active=active)
     value, passed = ball.sigma_m, "sigma" not in group.failed
     margin = compute_margin(value, threshold, at_most=True)
     return Gate("sigma", passed, value, threshold, margin, format_metres(value), active=active)
 
 
-def _chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Policy) -> Gate:
+def _make_chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Policy) -> Gate:
     threshold, active = policy.min_p_value, policy.min_p_value is not None
     if found is None:
-        return _unjudged_gate("chi_square", threshold, active=active)
+        return _make_unjudged_gate("chi_square", threshold, active=active)
     passed = "chi_square" not in group.failed
     cameras = [view.calibration for view in group.views if view.key in found.views]
     if active and not all(
@@ -415,7 +420,7 @@ def _make_gate(
     return Gate(name, passed, float(value), threshold, margin, sentence, view, active)
 
 
-def _unjudged_gate(name: str, threshold: float | None, *, active: bool = True) -> Gate:
+def _make_unjudged_gate(name: str, threshold: float | None, *, active: bool = True) -> Gate:
     return Gate(name, False, None, threshold, None, "not judged", active=active)
 
 

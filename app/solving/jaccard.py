@@ -17,7 +17,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.polyline import clip_polyline, distance_to_polyline, inside_image
+from app.geometry.polyline import clip_polyline, distance_to_polyline, is_inside_image
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch, opposite_marking
@@ -64,7 +64,7 @@ def project_markings(
     """
     samples, limits = _sample_markings(pitch, names)
     pixels = camera.project(samples, folded=True)
-    seen = inside_image(pixels, size.width, size.height)
+    seen = is_inside_image(pixels, size.width, size.height)
     return {
         marking: clip_polyline(pixels[first:last], size.width, size.height)
         for marking, first, last in limits

@@ -14,7 +14,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import MeanCovariance, is_covariance_within, is_sigma_within
 from app.solving.chi_square import chi_square_residuals, p_values
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 
 MIN_VIEWS = 2
 PASSES = len(GATES)
@@ -80,7 +80,7 @@ class Judgement:
 
 
 def judge_groups(
-    facts: Facts, policy: Policy, uncertainty: MeanCovariance, jac: FloatArray | None = None
+    facts: GroupFacts, policy: Policy, uncertainty: MeanCovariance, jac: FloatArray | None = None
 ) -> Judgement:
     """Judge every group by the thresholds of a policy.
 
@@ -98,7 +98,7 @@ def judge_groups(
 
 
 def judge_known_failures(
-    facts: Facts,
+    facts: GroupFacts,
     policy: Policy,
     uncertainty: MeanCovariance,
     jac: FloatArray,
@@ -123,7 +123,7 @@ def judge_known_failures(
     point, parallax, distance = _mean_pair_points(facts, valid)
     baseline = _widest_baselines(facts, left)
     failed = np.zeros((PASSES, facts.groups), bool)
-    failed[_CALIBRATABLE : _BALL + 1] = _groups_failing_view_gates(facts, view_failed, left)
+    failed[_CALIBRATABLE : _BALL + 1] = _find_groups_failing_view_gates(facts, view_failed, left)
     failed[_REPROJECTION] = np.isnan(point[:, 0])
 
     def fails_earlier_gate() -> BoolArray:
@@ -209,7 +209,7 @@ def _apply_group_gates(
 
 
 def widen_covariances(
-    facts: Facts,
+    facts: GroupFacts,
     valid: BoolArray,
     groups: IntArray,
     covariances: FloatArray,
@@ -235,21 +235,21 @@ def widen_covariances(
 
 
 def find_first_failed_gates(
-    facts: Facts, jac: FloatArray, policy: Policy
+    facts: GroupFacts, jac: FloatArray, policy: Policy
 ) -> tuple[IntArray, IntArray]:
     """First gate that drops each view, shape (V,), and each pair, (P,), or ``PASSES``."""
-    view_failed = _first_failed_view_gates(facts, jac, policy)
-    return view_failed, _first_failed_pair_gates(facts, view_failed, policy)
+    view_failed = _find_first_failed_view_gates(facts, jac, policy)
+    return view_failed, _find_first_failed_pair_gates(facts, view_failed, policy)
 
 
-def find_views_in_pairs(facts: Facts, pairs: BoolArray) -> BoolArray:
+def find_views_in_pairs(facts: GroupFacts, pairs: BoolArray) -> BoolArray:
     """Views in any of the pairs, shape (V,)."""
     found = np.zeros(len(facts.view_group), bool)
     found[facts.pair_view[pairs]] = True
     return found
 
 
-def compute_view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
+def compute_view_jac(facts: GroupFacts, gamma_percent: float) -> FloatArray:
     """JaC of each view, NaN where it cannot be measured, shape (V,)."""
     gamma_px = gamma_percent / 100 * facts.view_diagonal
     close = facts.mark_px < gamma_px[facts.mark_view]
@@ -259,7 +259,7 @@ def compute_view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
     return np.where(facts.view_measured, hits / np.maximum(marks, 1), np.nan)
 
 
-def _first_failed_view_gates(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
+def _find_first_failed_view_gates(facts: GroupFacts, jac: FloatArray, policy: Policy) -> IntArray:
     failed: IntArray = np.full(len(facts.view_group), PASSES).astype(np.int8)
     # NaN where there is nothing to measure, and then nothing falls.
     if policy.min_agreement is not None:
@@ -270,7 +270,9 @@ def _first_failed_view_gates(facts: Facts, jac: FloatArray, policy: Policy) -> I
     return failed
 
 
-def _first_failed_pair_gates(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
+def _find_first_failed_pair_gates(
+    facts: GroupFacts, view_failed: IntArray, policy: Policy
+) -> IntArray:
     tau_px = policy.tau_px(facts.view_diagonal)
     a, b = (facts.pair_errors <= tau_px[facts.pair_view]).T
     failed = np.where(a & b & facts.pair_front, np.int8(PASSES), np.int8(_REPROJECTION))
@@ -280,7 +282,9 @@ def _first_failed_pair_gates(facts: Facts, view_failed: IntArray, policy: Policy
     return first
 
 
-def _groups_failing_view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArray:
+def _find_groups_failing_view_gates(
+    facts: GroupFacts, view_failed: IntArray, left: BoolArray
+) -> BoolArray:
     """The gates that are judged from views: which groups fail them, shape (5, G)."""
     included, bare, fallen, apart, remaining, shown = (
         np.bincount(facts.view_group[chosen], minlength=facts.groups)
@@ -306,7 +310,7 @@ def _groups_failing_view_gates(facts: Facts, view_failed: IntArray, left: BoolAr
     )
 
 
-def _widest_baselines(facts: Facts, left: BoolArray) -> FloatArray:
+def _widest_baselines(facts: GroupFacts, left: BoolArray) -> FloatArray:
     shown = np.bincount(facts.view_group[left & facts.view_ball], minlength=facts.groups)
     widest = np.where(shown >= MIN_VIEWS, 0.0, np.nan)
     a, b = left[facts.pair_view].T
@@ -316,7 +320,9 @@ def _widest_baselines(facts: Facts, left: BoolArray) -> FloatArray:
     return widest
 
 
-def _mean_pair_points(facts: Facts, valid: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _mean_pair_points(
+    facts: GroupFacts, valid: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean point of the valid pairs, its largest parallax in degrees, and its distance."""
     pairs = np.flatnonzero(valid)
     owner = facts.pair_group[pairs]

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.soccer.pitch import CIRCLES, MARKINGS
-from app.soccer.solution import Suspect
+from app.soccer.solution import SuspectLabel
 from app.solving.observations import Observations
 from app.solving.resect import Resection, ResectionProblem, count_measurements
 
@@ -50,11 +50,11 @@ class _SuspectMarking:
     suggested_error: float
 
     @property
-    def is_off(self) -> bool:
-        return self.error > (MISFIT if self.fits else NAMELESS_MISFIT)
+    def is_outlier(self) -> bool:
+        return self.error > (MISFIT if self.has_fitting_label else NAMELESS_MISFIT)
 
     @property
-    def fits(self) -> bool:
+    def has_fitting_label(self) -> bool:
         """Whether the class that it is nearest to fits."""
         return self.suggested is not None and self.suggested_error <= RELABELLED
 
@@ -69,19 +69,19 @@ class _RemovalTrial:
     worst: float
 
     @property
-    def is_sound(self) -> bool:
+    def removes_only_outliers(self) -> bool:
         """Whether all that was left out is off."""
-        return all(doubt.is_off for doubt in self.doubts)
+        return all(doubt.is_outlier for doubt in self.doubts)
 
     @property
     def explains(self) -> bool:
         """Whether all others fit, and what was left out fits another class."""
-        return self.worst <= FITS and all(doubt.fits for doubt in self.doubts)
+        return self.worst <= FITS and all(doubt.has_fitting_label for doubt in self.doubts)
 
 
 def find_suspects(
     problem: ResectionProblem, observations: Observations, fit: Resection
-) -> tuple[Resection, Observations, tuple[Suspect, ...]]:
+) -> tuple[Resection, Observations, tuple[SuspectLabel, ...]]:
     """The camera, the observations it rests on, and the markings left out of them.
 
     Args:
@@ -93,7 +93,7 @@ def find_suspects(
         The arguments themselves and no suspect where every marking fits.
     """
     search = _LabelSearch(problem, GAMMA_SHARE * problem.size.diagonal)
-    if search.all_fit(observations, fit):
+    if search.has_no_outliers(observations, fit):
         return fit, observations, ()
     found = search.find_explanation(observations, fit)
     if found is None:
@@ -105,7 +105,7 @@ def find_suspects(
         search.compare_with_other_labels(observations, trial.rest, trial.fit, name)
         for name in names
     ]
-    suspects = [doubt for doubt in final if doubt.is_off]
+    suspects = [doubt for doubt in final if doubt.is_outlier]
     fit, rest = trial.fit, trial.rest
     if len(suspects) < len(final):
         rest = observations.without(*(doubt.marking for doubt in suspects))
@@ -120,21 +120,23 @@ class _LabelSearch:
     problem: ResectionProblem
     gamma: float
 
-    def all_fit(self, observations: Observations, fit: Resection) -> bool:
+    def has_no_outliers(self, observations: Observations, fit: Resection) -> bool:
         """Whether no marking is off."""
-        return max(self.largest_distances(observations, fit).values(), default=0.0) <= MISFIT
+        return (
+            max(self.measure_largest_distances(observations, fit).values(), default=0.0) <= MISFIT
+        )
 
     def find_explanation(
         self, observations: Observations, fit: Resection
     ) -> tuple[_RemovalTrial, list[str]] | None:
         """The trial to believe with all that is left out on the way to it, or None."""
-        trial = self.without_minority(observations)
+        trial = self.try_without_minority_half(observations)
         if trial is not None and self.is_convincing(trial, fit.cost):
             return trial, [doubt.marking for doubt in trial.doubts]
         names: list[str] = []
         rest, now = observations, fit
         for _ in range(MAX_SUSPECTS):
-            trial = self.best_single_removal(rest, now)
+            trial = self.find_best_single_removal(rest, now)
             if trial is None:
                 return None
             names += [doubt.marking for doubt in trial.doubts]
@@ -147,29 +149,33 @@ class _LabelSearch:
         """Whether a trial is good enough to believe, against the cost with all markings."""
         return trial.explains or (trial.fit.cost < DECISIVE * cost and trial.worst <= SETTLES)
 
-    def without_minority(self, observations: Observations) -> _RemovalTrial | None:
+    def try_without_minority_half(self, observations: Observations) -> _RemovalTrial | None:
         """The trial without the few markings of the other side, if that settles everything."""
-        minority = _markings_on_minority_half(observations.markings)
+        minority = _find_markings_on_minority_half(observations.markings)
         if not 2 <= len(minority) <= MAX_SUSPECTS:
             return None
-        trial = self.try_without(observations, minority)
-        return trial if trial is not None and trial.is_sound and trial.worst <= FITS else None
+        trial = self.try_without_markings(observations, minority)
+        return (
+            trial
+            if trial is not None and trial.removes_only_outliers and trial.worst <= FITS
+            else None
+        )
 
-    def best_single_removal(
+    def find_best_single_removal(
         self, observations: Observations, fit: Resection
     ) -> _RemovalTrial | None:
         """The first marking whose removal explains everything, else the one that helps most."""
         trials = []
-        for marking in _order_by_suspicion(self.largest_distances(observations, fit)):
-            trial = self.try_without(observations, [marking])
-            if trial is None or not trial.is_sound:
+        for marking in _order_by_suspicion(self.measure_largest_distances(observations, fit)):
+            trial = self.try_without_markings(observations, [marking])
+            if trial is None or not trial.removes_only_outliers:
                 continue
             if trial.explains:
                 return trial
             trials.append(trial)
         return min(trials, key=lambda item: item.fit.cost, default=None)
 
-    def try_without(
+    def try_without_markings(
         self, observations: Observations, markings: Sequence[str]
     ) -> _RemovalTrial | None:
         """The camera without some markings; None when too little would be left."""
@@ -180,16 +186,21 @@ class _LabelSearch:
         doubts = tuple(
             self.compare_with_other_labels(observations, rest, fit, marking) for marking in markings
         )
-        return _RemovalTrial(doubts, rest, fit, max(self.largest_distances(rest, fit).values()))
+        return _RemovalTrial(
+            doubts, rest, fit, max(self.measure_largest_distances(rest, fit).values())
+        )
 
     def compare_with_other_labels(
         self, observations: Observations, rest: Observations, fit: Resection, marking: str
     ) -> _SuspectMarking:
         """A marking against the camera from the rest, under its label and those not in use."""
-        error = self.largest_distance(fit.parameters, observations.only(marking))
+        error = self.measure_largest_distance(fit.parameters, observations.only(marking))
         taken = {*rest.markings, marking}
         ranked = sorted(
-            (self.largest_distance(fit.parameters, observations.only(marking, other)), other)
+            (
+                self.measure_largest_distance(fit.parameters, observations.only(marking, other)),
+                other,
+            )
             for other in MARKINGS
             if other not in taken and (other in CIRCLES) == (marking in CIRCLES)
         )
@@ -200,7 +211,9 @@ class _LabelSearch:
         plausible = nearest <= RELABELLED or (nearest <= NEAREST and 2 * nearest < rival)
         return _SuspectMarking(marking, error, best if plausible else None, nearest)
 
-    def largest_distances(self, observations: Observations, fit: Resection) -> dict[str, float]:
+    def measure_largest_distances(
+        self, observations: Observations, fit: Resection
+    ) -> dict[str, float]:
         """Largest distance of each marking's points."""
         apart = self.problem.distances(fit.parameters, observations) / self.gamma
         return {
@@ -208,14 +221,14 @@ class _LabelSearch:
             for index in np.unique(observations.marking)
         }
 
-    def largest_distance(self, parameters: FloatArray, observations: Observations) -> float:
+    def measure_largest_distance(self, parameters: FloatArray, observations: Observations) -> float:
         """Largest distance of all points."""
         return float(self.problem.distances(parameters, observations).max()) / self.gamma
 
-    def to_suspect(self, doubt: _SuspectMarking) -> Suspect:
+    def to_suspect(self, doubt: _SuspectMarking) -> SuspectLabel:
         """The doubt as people are told of it; a class that fits as badly is worth nothing."""
         named = doubt.suggested is not None
-        return Suspect(
+        return SuspectLabel(
             marking=doubt.marking,
             suggested=doubt.suggested,
             confidence=1 - doubt.suggested_error / doubt.error if named else 0.5,
@@ -229,11 +242,11 @@ def _order_by_suspicion(largest: dict[str, float]) -> list[str]:
 
     Those on the other side of the pitch than most come first, then what fits worst.
     """
-    minority = _markings_on_minority_half(tuple(largest))
+    minority = _find_markings_on_minority_half(tuple(largest))
     return sorted(largest, key=lambda name: (name not in minority, -largest[name], name))
 
 
-def _markings_on_minority_half(markings: Sequence[str]) -> list[str]:
+def _find_markings_on_minority_half(markings: Sequence[str]) -> list[str]:
     """The markings of that half of the pitch which fewer of them belong to."""
     halves = (
         [name for name in markings if _pitch_half(name) == half] for half in ("left", "right")

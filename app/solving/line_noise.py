@@ -47,7 +47,7 @@ def sigma_prior_cost(log_sigmas: FloatArray, expected: float, spread: float = SP
     return cost
 
 
-def posterior_variance(scatter: float, numbers: float, spread: float = SPREAD) -> float:
+def log_sigma_posterior_variance(scatter: float, numbers: float, spread: float = SPREAD) -> float:
     """Variance of the logarithm of an estimated sigma.
 
     No sample of independent numbers says more about its sigma than half of one for each.
@@ -90,7 +90,7 @@ def interpolate_cost(cost: FloatArray, places: FloatArray) -> FloatArray:
     return found
 
 
-def lowest_cost_vertex(cost: FloatArray, at: int) -> tuple[float, float]:
+def fit_cost_minimum(cost: FloatArray, at: int) -> tuple[float, float]:
     """How far the lowest point lies from the lowest one of the grid, in steps, and its cost.
 
     By the parabola through three costs; at an end of the grid, that end.
@@ -247,12 +247,12 @@ def collect_line_evidence(
 ) -> LineEvidence:
     """What a least-squares fit leaves says of the noise, for each of ``SHARES``.
 
-    The arguments are those of ``line_noise``.
+    The arguments are those of ``compute_line_noise``.
     """
     return _ScaledFit.of(residuals, jacobian, marking, prior).evidence(SHARES)
 
 
-def line_noise(
+def compute_line_noise(
     residuals: FloatArray,
     jacobian: FloatArray,
     marking: IntArray,
@@ -301,7 +301,7 @@ def line_noise(
 
 
 @dataclass(frozen=True)
-class Interval:
+class ConfidenceInterval:
     """A number with the ends of its 95 % interval."""
 
     value: float
@@ -319,8 +319,8 @@ class LineEstimate:
         views: Images that it rests on.
     """
 
-    sigma: Interval
-    share: Interval
+    sigma: ConfidenceInterval
+    share: ConfidenceInterval
     views: int
 
 
@@ -344,17 +344,17 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
     # How alike the images are decides little: the likeliest holds for all blocks.
     blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
     whole = blocks.sum(axis=0)
-    log_sigma, share, known = _sigma_and_share_posterior(whole)
+    log_sigma, share, known = _compute_sigma_posterior(whole)
     if not _LOGS[0] < log_sigma < _LOGS[-1]:
         return None
-    parts = np.array([_sigma_and_share_posterior(whole - part)[:2] for part in blocks])
+    parts = np.array([_compute_sigma_posterior(whole - part)[:2] for part in blocks])
     scatter, of_share = jackknife_variance(parts).tolist()
     numbers = sum(item.freedom for item in found)
-    half = STUDENT * np.sqrt(posterior_variance(scatter, numbers))
+    half = STUDENT * np.sqrt(log_sigma_posterior_variance(scatter, numbers))
     wide = max(STUDENT * np.sqrt(of_share), NORMAL_95 * known, _SHARE_STEP / 4)
-    sigma = Interval(*np.exp([log_sigma, log_sigma - half, log_sigma + half]).tolist())
+    sigma = ConfidenceInterval(*np.exp([log_sigma, log_sigma - half, log_sigma + half]).tolist())
     ends = max(share - wide, 0.0), min(share + wide, 1.0)
-    return LineEstimate(sigma, Interval(share, *ends), len(found))
+    return LineEstimate(sigma, ConfidenceInterval(share, *ends), len(found))
 
 
 _FINE = 20
@@ -364,11 +364,11 @@ _SHARE_STEP = float(SHARES[1] - SHARES[0])
 _SIGMA_STEP = float(_LOGS[1] - _LOGS[0])
 
 
-def _sigma_and_share_posterior(cost: FloatArray) -> tuple[float, float, float]:
+def _compute_sigma_posterior(cost: FloatArray) -> tuple[float, float, float]:
     """Logarithm of sigma, share and its standard deviation from costs, shape (S, R)."""
     cost = cost + sigma_prior_cost(_LOGS, EXPECTED_PX)[:, None]
     places = cost.argmin(axis=0).tolist()
-    vertices = [lowest_cost_vertex(cost[:, share], at) for share, at in enumerate(places)]
+    vertices = [fit_cost_minimum(cost[:, share], at) for share, at in enumerate(places)]
     off, least = np.transpose(vertices)
     # Few images leave the share open: its mean, not the likeliest one, is at no end by chance.
     steps = np.linspace(0, len(SHARES) - 1, _FINE * (len(SHARES) - 1) + 1)

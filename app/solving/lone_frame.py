@@ -34,7 +34,7 @@ from app.soccer.picture import ASPECTS, MAX_SHIFT
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.labels import GAMMA_SHARE, RELABELLED
-from app.solving.line_noise import line_noise
+from app.solving.line_noise import compute_line_noise
 from app.solving.observations import Observations, pitch_curves
 from app.solving.picture_camera import undo_warp
 from app.solving.pitch_size import derive_points_by_pitch_size
@@ -101,7 +101,7 @@ class LoneFrame:
     sizes_sigma: FloatArray
     explains: tuple[str, ...] = ()
 
-    def other_pitch(self, pitch: Pitch) -> Pitch | None:
+    def clearly_different_pitch(self, pitch: Pitch) -> Pitch | None:
         """The size that the lines show, to a decimetre, where it certainly is another one."""
         found = np.array([self.pitch.length, self.pitch.width])
         used = np.array([pitch.length, pitch.width])
@@ -139,17 +139,17 @@ def estimate_lone_frame(
     try:
         if left_out:
             # What looks mislabelled on the pitch in use may lie where another pitch has it.
-            whole = _Frame(problem, observations, pitch, sigma).fit(parameters)
+            whole = _LoneFrameProblem(problem, observations, pitch, sigma).fit(parameters)
             if whole.worst_px(left_out) <= RELABELLED * GAMMA_SHARE * problem.size.diagonal:
                 return replace(whole.information(), explains=tuple(left_out))
         kept = observations.without(*left_out)
-        return _Frame(problem, kept, pitch, sigma).fit(parameters).information()
+        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).information()
     except np.linalg.LinAlgError:
         return None
 
 
 @dataclass(frozen=True)
-class _Rows:
+class _WeightedResiduals:
     """Weighted residuals at some unknowns, their slopes, and the points' distances, pixels."""
 
     apart: FloatArray
@@ -159,13 +159,13 @@ class _Rows:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _LoneFrameFit:
     """Where the thirteen fit best, and how far that is from the camera in use, shapes (13,)."""
 
-    frame: _Frame
+    frame: _LoneFrameProblem
     unknowns: FloatArray
     off: FloatArray
-    rows: _Rows
+    rows: _WeightedResiduals
 
     def worst_px(self, markings: Collection[str]) -> float:
         """Largest distance of a point of some markings."""
@@ -187,7 +187,7 @@ class _Fit:
 
 
 @dataclass(frozen=True)
-class _Frame:
+class _LoneFrameProblem:
     problem: ResectionProblem
     observations: Observations
     pitch: Pitch
@@ -200,19 +200,19 @@ class _Frame:
             self.pitch, length=self.pitch.length + length, width=self.pitch.width + width
         )
 
-    def fit(self, parameters: FloatArray) -> _Fit:
+    def fit(self, parameters: FloatArray) -> _LoneFrameFit:
         """From the camera in use to where the thirteen fit best; linear where that is near."""
         start = np.append(parameters, np.zeros(WIDTH - PARAMETERS))
-        rows = self._rows(start)
-        step = self._step(start, rows)
+        rows = self._compute_residuals(start)
+        step = self._compute_step(start, rows)
         if (np.abs(step[PARAMETERS:]) > LINEAR).any():
-            unknowns, rows = self._descend(start, rows)
-            return _Fit(self, unknowns, unknowns - start, rows)
+            unknowns, rows = self._minimize_cost(start, rows)
+            return _LoneFrameFit(self, unknowns, unknowns - start, rows)
         # Without what pulls the camera aside besides: priors, and the scale of the loss.
-        off = step - self._step(start, rows, PARAMETERS)
-        return _Fit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
+        off = step - self._compute_step(start, rows, PARAMETERS)
+        return _LoneFrameFit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
 
-    def noise(self, rows: _Rows) -> FloatArray:
+    def noise(self, rows: _WeightedResiduals) -> FloatArray:
         """Covariance of the thirteen, shape (13, 13)."""
         # Residuals in units of a click, so that the prior weighs what it says.
         freedom = max(len(rows.apart) - PARAMETERS, 1)
@@ -220,48 +220,52 @@ class _Frame:
         click = max(float(np.sqrt(rows.apart @ rows.apart / freedom)), least)
         known = self.problem.noise
         known = replace(known, sigma_px=known.sigma_px / click, floor_px=known.floor_px / click)
-        return line_noise(
+        return compute_line_noise(
             rows.apart / click,
             rows.jacobian / click,
             rows.marking,
-            self._prior(),
+            self._prior_information(),
             known,
-            self._weights(rows),
+            self._point_weights(rows),
         ).parameters
 
-    def _weights(self, rows: _Rows) -> FloatArray:
+    def _point_weights(self, rows: _WeightedResiduals) -> FloatArray:
         return self.problem.row_weights(self.observations, rows.marking)
 
-    def _prior(self) -> FloatArray:
+    def _prior_information(self) -> FloatArray:
         prior = np.zeros(WIDTH)
         prior[KAPPA] = self.problem.distortion_sigma**-2
         prior[PARAMETERS:] = self.sigma**-2
         return prior
 
-    def _step(self, unknowns: FloatArray, rows: _Rows, width: int = WIDTH) -> FloatArray:
+    def _compute_step(
+        self, unknowns: FloatArray, rows: _WeightedResiduals, width: int = WIDTH
+    ) -> FloatArray:
         """To the minimum about some unknowns, the first ``width`` of them free, shape (13,)."""
-        prior = self._prior() * CLICK_SIGMA_PX**2 * self.problem.unit**2
+        prior = self._prior_information() * CLICK_SIGMA_PX**2 * self.problem.unit**2
         pull = prior * unknowns
         pull[KAPPA] -= prior[KAPPA] * self.problem.distortion_mean
         free = rows.jacobian[:, :width]
         length = np.sqrt((free**2).sum(axis=0) + prior[:width])
         free = free / length
-        weighted = free.T * self._weights(rows)
+        weighted = free.T * self._point_weights(rows)
         normal = weighted @ free + np.diag(prior[:width] / length**2)
         right = weighted @ rows.apart + pull[:width] / length
         step = np.zeros(WIDTH)
         step[:width] = -np.linalg.solve(normal, right) / length
         return step
 
-    def _descend(self, unknowns: FloatArray, rows: _Rows) -> tuple[FloatArray, _Rows]:
+    def _minimize_cost(
+        self, unknowns: FloatArray, rows: _WeightedResiduals
+    ) -> tuple[FloatArray, _WeightedResiduals]:
         """Where the fit ends, shape (13,), and the rows there."""
         cost = self._cost(unknowns, rows)
         for _ in range(ROUNDS):
-            step = self._step(unknowns, rows)
+            step = self._compute_step(unknowns, rows)
             step /= max(1.0, float((np.abs(step[PARAMETERS:]) / LONGEST).max()))
             for share in HALVINGS:
                 to = _clip_to_plausible(unknowns + share * step, self.pitch)
-                there = self._rows(to)
+                there = self._compute_residuals(to)
                 lower = self._cost(to, there)
                 if lower < cost:
                     break
@@ -273,7 +277,7 @@ class _Frame:
                 break
         return unknowns, rows
 
-    def _cost(self, unknowns: FloatArray, rows: _Rows) -> float:
+    def _cost(self, unknowns: FloatArray, rows: _WeightedResiduals) -> float:
         """Robust cost of the points and of the prior, in variances of a click."""
         click, scale = (
             CLICK_SIGMA_PX * self.problem.unit,
@@ -282,22 +286,25 @@ class _Frame:
         robust = np.sqrt(1 + (rows.distance / scale) ** 2) - 1
         cost = 2 * (scale / click) ** 2 * float(self.problem.weights(self.observations) @ robust)
         off = unknowns - np.append(np.zeros(KAPPA), [self.problem.distortion_mean, *np.zeros(5)])
-        cost += (self._prior() * off**2).sum()
+        cost += (self._prior_information() * off**2).sum()
         return float(cost) if np.isfinite(cost) else np.inf
 
-    def _rows(self, unknowns: FloatArray) -> _Rows:
+    def _compute_residuals(self, unknowns: FloatArray) -> _WeightedResiduals:
         camera, warp = unknowns[:PARAMETERS], unknowns[WARP]
         seen = undo_warp(self.problem, self.observations, warp)
         seen = Observations(pitch_curves(self.on(unknowns)), seen.pixels, seen.marking)
         half = self.problem.size.diagonal / 2
 
-        def at(pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def residuals_at(pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
             moved = Observations(seen.curves, pixels, seen.marking)
             return curve_residuals(camera, moved.curves, moved.curve_points(), half)
 
-        offsets, by_camera = at(seen.pixels)
+        offsets, by_camera = residuals_at(seen.pixels)
         slopes = np.stack(
-            [(at(seen.pixels + step)[0] - offsets) / _PROBE_PX for step in np.eye(2) * _PROBE_PX],
+            [
+                (residuals_at(seen.pixels + step)[0] - offsets) / _PROBE_PX
+                for step in np.eye(2) * _PROBE_PX
+            ],
             axis=-1,
         )
         slopes[:, :, 0] /= np.exp(warp[0])
@@ -326,10 +333,10 @@ class _Frame:
         rows = np.append(np.arange(len(offsets)), beyond)
         jacobian = np.vstack([jacobian[:, 0], jacobian[beyond, 1]]) * weight[rows, None]
         apart = np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows]
-        return _Rows(apart, jacobian, np.append(seen.marking, -1 - beyond), distance)
+        return _WeightedResiduals(apart, jacobian, np.append(seen.marking, -1 - beyond), distance)
 
 
-def _camera_jacobian(rows: _Rows) -> FloatArray:
+def _camera_jacobian(rows: _WeightedResiduals) -> FloatArray:
     """From the thirteen to the camera's eight, shape (8, 13).
 
     What a picture does is carried by rotation and lens, never by the position, as in

@@ -21,7 +21,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import Observations, observations_of_lines
+from app.solving.observations import Observations, make_observations
 from app.solving.picture_camera import PictureProblem, undo_warp, warp_to_picture
 from app.solving.pitch_size import (
     CERTAIN_SIGMAS,
@@ -90,7 +90,7 @@ def estimate_match_picture(
     Raises:
         DegenerateGeometryError: Too few frames show enough markings.
     """
-    seen = [_FittedFrame.of(frames[index], policy) for index in choose_frames(frames)]
+    seen = [_FittedFrame.of(frames[index], policy) for index in select_informative_frames(frames)]
     if len(seen) < MIN_FRAMES:
         raise DegenerateGeometryError(
             f"only {len(seen)} frames show enough markings; estimating the picture geometry"
@@ -102,10 +102,10 @@ def estimate_match_picture(
     return PictureEstimate(warp_to_picture(warp, (aspect, right, down)), len(seen))
 
 
-def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
+def select_informative_frames(frames: Sequence[PictureFrame]) -> list[int]:
     """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
     order = find_frames_with_enough_measurements(
-        observations_of_lines(frame.lines, frame.pitch, frame.size) for frame in frames
+        make_observations(frame.lines, frame.pitch, frame.size) for frame in frames
     )
     return sorted(order[:MAX_FRAMES])
 
@@ -122,7 +122,7 @@ class _FittedFrame:
     def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
         # What markings have in common is in FRAME_SIGMA.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
-        observations = observations_of_lines(frame.lines, policy.fitted(frame.pitch), frame.size)
+        observations = make_observations(frame.lines, policy.fitted(frame.pitch), frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
     def at(self, warp: FloatArray) -> _FittedFrame:

@@ -17,8 +17,8 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate_near
-from app.solving.camera_positions import PositionPrior, is_main_position, position_prior_of_match
+from app.solving.calibrate import calibrate_near_position
+from app.solving.camera_positions import PositionPrior, is_main_position, make_match_position_prior
 
 UNKNOWNS = 6
 """Place at pan 0, metres, and how much it moves with the pan, metres a radian."""
@@ -169,19 +169,19 @@ class FramePlaces:
 
     def prior(self, pan: float) -> PositionPrior | None:
         """Prior of a frame of the same match that looks that way; None where too few are known."""
-        model = self._model
+        model = self._fitted_model
         if model is None:
             return None
         scatter = float(np.median(model.chi_square))
         if scatter > GIVE_UP:
             return None
         mean, variance = model.at(pan)
-        return position_prior_of_match(
+        return make_match_position_prior(
             mean, np.sqrt((variance + WANDER_M**2) * max(1.0, scatter / SCATTER))
         )
 
     @cached_property
-    def _model(self) -> MatchModel | None:
+    def _fitted_model(self) -> MatchModel | None:
         rest = np.arange(len(self._equations)) != self._left_out
         return self._equations.fit(rest) if rest.sum() >= MIN_OTHERS else None
 
@@ -189,7 +189,7 @@ class FramePlaces:
 NO_PLACES = FramePlaces(())
 
 
-def share_position(
+def calibrate_with_match_position(
     alone: Calibration,
     others: FramePlaces,
     lines: Lines,
@@ -207,7 +207,9 @@ def share_position(
         return alone
     pan = parameters_from_camera(alone.camera, size.diagonal / 2)[PAN]
     near = others.prior(float(pan))
-    return alone if near is None else calibrate_near(alone, near, lines, pitch, size, policy)
+    return (
+        alone if near is None else calibrate_near_position(alone, near, lines, pitch, size, policy)
+    )
 
 
 WANDER_IN_RUN_M = np.array([0.3, 0.3, 0.18])
@@ -222,53 +224,53 @@ def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
             before.
     """
     known = [(index, place) for index, place in enumerate(places) if place is not None]
-    runs = _Runs([place for _, place in known])
+    runs = _MatchRuns([place for _, place in known])
     runs.join()
-    run = {known[at][0]: number for number, at in enumerate(runs.firsts)}
+    run = {known[at][0]: number for number, at in enumerate(runs.first_places)}
     return _fill_runs(run, len(places))
 
 
-class _Runs:
+class _MatchRuns:
     """Runs of places side by side, each known by its first place."""
 
     def __init__(self, places: Sequence[FramePlace]):
         self._equations = PlaceEquations(places, WANDER_IN_RUN_M)
         self._end = {at: at + 1 for at in range(len(places))}
         self._begin = {at + 1: at for at in range(len(places))}
-        self._cost = {at: self._cost_of(at, at + 1) for at in range(len(places))}
+        self._cost = {at: self._compute_run_cost(at, at + 1) for at in range(len(places))}
         self._gains: list[tuple[float, int, int, int, float]] = []
 
     @property
-    def firsts(self) -> list[int]:
+    def first_places(self) -> list[int]:
         """The first place of each run."""
         return sorted(self._end)
 
     def join(self) -> None:
         """Join neighbours until none gains by it."""
-        for first in self.firsts:
-            self._consider(first)
+        for first in self.first_places:
+            self._queue_join(first)
         while self._gains:
             _, first, second, end, cost = heappop(self._gains)
             if self._end.get(first) != second or self._end.get(second) != end:
                 continue
             del self._end[second]
             self._end[first], self._begin[end], self._cost[first] = end, first, cost
-            self._consider(first)
+            self._queue_join(first)
             if first in self._begin:
-                self._consider(self._begin[first])
+                self._queue_join(self._begin[first])
 
-    def _consider(self, first: int) -> None:
+    def _queue_join(self, first: int) -> None:
         """Note what a run and the one behind it gain when they are joined."""
         second = self._end[first]
         if second not in self._end:
             return
         end = self._end[second]
-        cost = self._cost_of(first, end)
+        cost = self._compute_run_cost(first, end)
         gain = self._cost[first] + self._cost[second] - cost
         if gain > 0:
             heappush(self._gains, (-gain, first, second, end, cost))
 
-    def _cost_of(self, first: int, end: int) -> float:
+    def _compute_run_cost(self, first: int, end: int) -> float:
         return self._equations.fit(slice(first, end)).cost
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.geometry.arrays import FloatArray, row_by_row
+from app.geometry.arrays import FloatArray, flatten_covariance
 from app.geometry.resection import X, Z
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
@@ -40,12 +40,12 @@ class _MainFrame:
     def position(self) -> FloatArray:
         return self.frame.parameters[X : Z + 1]
 
-    def sigmas_from(self, place: FloatArray) -> float:
+    def distance_in_sigmas(self, place: FloatArray) -> float:
         off = self.position - place
         return float(np.sqrt(off @ np.linalg.solve(self.covariance[X : Z + 1, X : Z + 1], off)))
 
 
-def solve_readings_of_one_tripod(
+def solve_match_tripod(
     groups: Mapping[int, Group], policy: CalibrationPolicy
 ) -> dict[int, PaintReading]:
     """What was read of main cameras, each with what the frames of its match know together.
@@ -81,19 +81,19 @@ def solve_readings_of_one_tripod(
         at = (view.size, policy.fitted(group.pitch))
         frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))
     for (size, pitch), some in frames.items():
-        for number, tripod in _shared_cameras(some, size, pitch, policy).items():
+        for number, tripod in _solve_tripod_cameras(some, size, pitch, policy).items():
             found[number] = replace(found[number], tripod=tripod)
     return found
 
 
-def _shared_cameras(
+def _solve_tripod_cameras(
     some: Mapping[int, _MainFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
 ) -> dict[int, TripodCamera]:
     if len(some) < LEAST_FRAMES:
         return {}
     middle = np.median([one.position for one in some.values()], axis=0)
     # The farthest first: where no tripod is found it goes.
-    left = sorted(some, key=lambda number: -some[number].sigmas_from(middle))
+    left = sorted(some, key=lambda number: -some[number].distance_in_sigmas(middle))
     least = max(LEAST_FRAMES, len(left) * LEAST_SHARE)
     while len(left) >= least:
         frames = {number: some[number].frame for number in sorted(left)}
@@ -108,7 +108,7 @@ def _shared_cameras(
         ]
         if len(fitting) == len(left):
             return {
-                number: TripodCamera(tuple(parameters.tolist()), row_by_row(covariance))
+                number: TripodCamera(tuple(parameters.tolist()), flatten_covariance(covariance))
                 for number, (parameters, covariance) in cameras.items()
             }
         left = fitting

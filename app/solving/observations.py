@@ -9,7 +9,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import ARC, SEGMENT, CurvePoints, Curves, IntArray
-from app.geometry.resection_kernels import keep_farthest_points
+from app.geometry.resection_kernels import select_farthest_points
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment
@@ -41,7 +41,7 @@ class Observations:
     def curve_points(self, share: float = 0.0) -> CurvePoints:
         """All points, with the weight of each where the points of a marking have so much of their variance
         in common: n of them count as n / (1 + share (n - 1)). Without a share each has weight one."""
-        return CurvePoints(self.pixels, self.marking, weights_of_points(self.marking, share))
+        return CurvePoints(self.pixels, self.marking, compute_point_weights(self.marking, share))
 
     def without(self, *markings: str) -> Observations:
         """The same without the points of some markings."""
@@ -54,24 +54,24 @@ class Observations:
         label = MARKINGS.index(as_marking or marking)
         return Observations(self.curves, self.pixels[keep], np.full(int(keep.sum()), label))
 
-    def thinned(self, straight: int, circular: int) -> Observations:
+    def thin_points(self, straight: int, circular: int) -> Observations:
         """At most so many points of each straight marking and of each circle.
 
         The points farthest apart are kept: they say nearly all there is.
         """
         limits = np.where(self.curves.kinds == ARC, circular, straight)
         keep = np.empty(len(self.pixels), dtype=np.bool_)
-        keep_farthest_points(self.pixels, self.marking, limits, keep)
+        select_farthest_points(self.pixels, self.marking, limits, keep)
         return Observations(self.curves, self.pixels[keep], self.marking[keep])
 
 
-def weights_of_points(marking: IntArray, share: float) -> FloatArray:
+def compute_point_weights(marking: IntArray, share: float) -> FloatArray:
     """Weight of each point beside those of its marking, shape (N,) (``Observations.curve_points``)."""
     count = np.bincount(marking, minlength=len(MARKINGS))[marking]
     return np.asarray(1 / (1 + share * (count - 1)))
 
 
-def observations_of_lines(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
+def make_observations(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
     """Observations of annotated lines; points far outside the image are kept.
 
     Args:
@@ -103,11 +103,11 @@ def pitch_curves(pitch: Pitch) -> Curves:
     shapes = [pitch.shapes[marking] for marking in MARKINGS]
     kinds = [ARC if isinstance(shape, Arc) else SEGMENT for shape in shapes]
     return Curves(
-        np.array(kinds, dtype=np.int64), np.array([_shape_numbers(item) for item in shapes])
+        np.array(kinds, dtype=np.int64), np.array([_shape_to_numbers(item) for item in shapes])
     )
 
 
-def _shape_numbers(shape: Segment | Arc) -> tuple[float, ...]:
+def _shape_to_numbers(shape: Segment | Arc) -> tuple[float, ...]:
     if isinstance(shape, Arc):
         return (*shape.center, shape.radius, shape.first, shape.last, 0.0)
     return (*shape.start, *shape.end)

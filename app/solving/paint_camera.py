@@ -16,7 +16,7 @@ from app.geometry.resection import (
     PARAMETERS,
     ROLL,
     CurvePoints,
-    Prior,
+    GaussianPrior,
     X,
     Z,
     curve_residuals,
@@ -104,7 +104,7 @@ class PaintProblem:
         moved: FloatArray = np.empty(PARAMETERS)
         # In one layout: the kernel would be compiled for each, which takes ten seconds.
         offsets, sigmas = np.ascontiguousarray(seen.offsets), np.ascontiguousarray(seen.sigmas)
-        step_to_paint(
+        write_paint_step(
             offsets, sigmas, base, np.ascontiguousarray(seen.jacobian), information, pull, INNER_STEPS,
             DAMPING, strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
         )  # fmt: skip
@@ -138,11 +138,11 @@ class PaintProblem:
         terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
         return estimate_paint_noise(seen, robust, prior, self.information, terms)
 
-    def prior(self, parameters: FloatArray) -> Prior:
+    def prior(self, parameters: FloatArray) -> GaussianPrior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
         if not is_main_position(parameters[X : Z + 1]):
             return self.resection.prior()
-        return self.resection.main_prior(STADIUM, parameters[ROLL : Z + 1] - MAIN_MEAN)
+        return self.resection.main_camera_prior(STADIUM, parameters[ROLL : Z + 1] - MAIN_MEAN)
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
             break
     seen = measure_offsets(problem, parameters, curve_points, sigmas, pitch)
     camera = problem.resection.camera(parameters)
-    places = camera.on_ground(curve_points.pixels + np.array(camera.principal_point))
+    places = camera.project_to_ground(curve_points.pixels + np.array(camera.principal_point))
     noise = problem.noise(parameters, seen, np.nan_to_num(places), pitch)
     error = float(np.median(np.abs(seen.offsets)))
     if (
@@ -259,7 +259,7 @@ def robust_weight(rest, sigma, strict, soft_px, strict_sigmas, strict_px):
 
 
 @compiled
-def step_to_paint(
+def write_paint_step(
     offsets, sigmas, base, jacobian, information, pull, rounds, damping,
     strict, soft_px, strict_sigmas, strict_px, moved,
 ):  # fmt: skip

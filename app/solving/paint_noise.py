@@ -15,10 +15,10 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, IntArray
-from app.geometry.least_squares import require_determined
+from app.geometry.least_squares import require_determined_parameters
 from app.geometry.resection import ARC, KAPPA, X, Z
 from app.soccer.pitch import MARKINGS, Pitch
-from app.solving.line_noise import LinePrior, line_noise
+from app.solving.line_noise import LinePrior, compute_line_noise
 from app.solving.lone_frame import (
     CROWN_SIGMA_M,
     INWARD_SIGMA_M,
@@ -89,19 +89,19 @@ def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
         sigmas: Standard deviation of each, pixels, shape (N,).
     """
     counts = np.bincount(marking)
-    weights: FloatArray = 1 / (1 + _shares_in_common(sigmas) * (counts[marking] - 1))
+    weights: FloatArray = 1 / (1 + _common_variance_fractions(sigmas) * (counts[marking] - 1))
     return weights
 
 
 def cautious_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     """``marking_weights`` with at least what the points of a marking share where covariances are told."""
     counts = np.bincount(marking)
-    shares = np.maximum(_shares_in_common(sigmas), LEAST_SHARE)
+    shares = np.maximum(_common_variance_fractions(sigmas), LEAST_SHARE)
     weights: FloatArray = 1 / (1 + shares * (counts[marking] - 1))
     return weights
 
 
-def _shares_in_common(sigmas: FloatArray) -> FloatArray:
+def _common_variance_fractions(sigmas: FloatArray) -> FloatArray:
     """What each point has in common with its marking, as a share of its variance, shape (N,)."""
     shares: FloatArray = SHARE + THIN_SHARE * np.minimum(sigmas / THIN_SIGMA_PX, 1.0) ** 2
     return shares
@@ -122,19 +122,21 @@ def estimate_paint_noise(
         prior: Information of the parameters' own prior, a diagonal, shape (8,).
         information: What the start knew of the parameters, shape (8, 8).
         terms: How far one standard deviation of each number of the pitch moves the paint
-            (``shifted_offsets``), pixels, shape (N, M).
+            (``shift_offsets``), pixels, shape (N, M).
     """
     root = np.sqrt(robust) / seen.sigmas
     rows, rest = seen.jacobian * root[:, None], seen.offsets * root
     known = np.diag(prior) + (0.0 if information is None else information)
     try:
-        require_determined(rows.T @ rows + known)
-        noise = line_noise(rest, rows, seen.marking, prior, LinePrior(EXPECTED, LEAST))
+        require_determined_parameters(rows.T @ rows + known)
+        noise = compute_line_noise(rest, rows, seen.marking, prior, LinePrior(EXPECTED, LEAST))
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         return None
     weighted = rows * marking_weights(seen.marking, seen.sigmas)[:, None]
     bread = np.linalg.inv(weighted.T @ rows + known)
-    shares = np.maximum(_shares_in_common(seen.sigmas), max(noise.share, LEAST_SHARE))[:, None]
+    shares = np.maximum(_common_variance_fractions(seen.sigmas), max(noise.share, LEAST_SHARE))[
+        :, None
+    ]
     sums = np.zeros((int(seen.marking.max()) + 1, rows.shape[1]))
     np.add.at(sums, seen.marking, np.sqrt(shares) * weighted)
     meat = ((1 - shares) * weighted).T @ weighted + sums.T @ sums
@@ -150,10 +152,10 @@ def estimate_paint_noise(
 CROWN, INWARD, LINES = 0, 1, slice(2, 2 + len(MARKINGS))
 SIZES = slice(2 + len(MARKINGS), 4 + len(MARKINGS))
 TERMS = 4 + len(MARKINGS)
-"""Columns of ``all_terms``: crown, inward, each marking, length and width."""
+"""Columns of ``pitch_and_marking_terms``: crown, inward, each marking, length and width."""
 
 
-def all_terms(
+def pitch_and_marking_terms(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:
     """``pitch_terms`` with a column for each marking, seen or not, shape (N, TERMS)."""
@@ -163,7 +165,7 @@ def all_terms(
     return terms
 
 
-def painted_shift(
+def compute_paint_shift(
     places: FloatArray, marking: IntArray, values: FloatArray, pitch: Pitch
 ) -> FloatArray:
     """How far paint lies off the plan of a pitch of its size, metres, shape (N, 3).
@@ -171,22 +173,22 @@ def painted_shift(
     Args:
         places: Of the paint, pitch frame, metres, shape (N, 2).
         marking: Index into ``MARKINGS``, shape (N,).
-        values: Of the columns of ``all_terms``, in their standard deviations, shape (TERMS,).
+        values: Of the columns of ``pitch_and_marking_terms``, in their standard deviations, shape (TERMS,).
         pitch: The pitch, of the size that it has.
     """
     inside = INWARD_SIGMA_M * values[INWARD] * (marking != _MIDDLE)
     inside = inside + LINE_SIGMA_M * values[LINES][marking]
-    raised = CROWN_SIGMA_M * values[CROWN] * _grass_height(places, pitch)
+    raised = CROWN_SIGMA_M * values[CROWN] * _relative_grass_height(places, pitch)
     return np.column_stack([inside[:, None] * _inward_directions(places, marking, pitch), -raised])
 
 
-def shifted_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray) -> FloatArray:
+def shift_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray) -> FloatArray:
     """Offsets of paint from markings that lie off their plan, pixels, shape (N,).
 
     Args:
         offsets: From the markings of the plan, along their normals, shape (N,).
         jacobian: Derivative of the marking's place along the normal, shape (N, 8).
-        shift: ``painted_shift``, shape (N, 3).
+        shift: ``compute_paint_shift``, shape (N, 3).
     """
     return np.asarray(offsets - (_derivatives_by_place(jacobian) * shift).sum(axis=1))
 
@@ -215,7 +217,7 @@ def painted_terms(
         pitch: The pitch.
     """
     by_place = _derivatives_by_place(jacobian)
-    raised = _grass_height(places, pitch)
+    raised = _relative_grass_height(places, pitch)
     across = (by_place[:, :2] * _inward_directions(places, marking, pitch)).sum(axis=1)
     seen = np.unique(marking)
     return np.column_stack(
@@ -235,7 +237,11 @@ def size_terms(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatAr
     usual = Pitch()
     if (pitch.length, pitch.width) != (usual.length, usual.width):
         return np.zeros((len(marking), 2))
-    return PAINT_SIZE_SIGMA_M * _derivatives_by_place(jacobian)[:, :2] * _size_moves()[marking]
+    return (
+        PAINT_SIZE_SIGMA_M
+        * _derivatives_by_place(jacobian)[:, :2]
+        * _marking_derivatives_by_size()[marking]
+    )
 
 
 def _derivatives_by_place(jacobian: FloatArray) -> FloatArray:
@@ -243,7 +249,7 @@ def _derivatives_by_place(jacobian: FloatArray) -> FloatArray:
     return -jacobian[:, X : Z + 1]
 
 
-def _grass_height(places: FloatArray, pitch: Pitch) -> FloatArray:
+def _relative_grass_height(places: FloatArray, pitch: Pitch) -> FloatArray:
     """Height of the grass as a share of its crown, which runs along the middle, shape (N,)."""
     return np.asarray(np.maximum(1 - (2 * places[:, 1] / pitch.width) ** 2, 0.0))
 
@@ -252,7 +258,7 @@ _MIDDLE = MARKINGS.index("Middle line")
 
 
 @lru_cache(maxsize=1)
-def _size_moves() -> FloatArray:
+def _marking_derivatives_by_size() -> FloatArray:
     """How far each marking moves along x with a metre of length, along y with one of width, (M, 2)."""
     usual = Pitch()
     curves, other = pitch_curves(usual), pitch_curves(Pitch(usual.length + 1, usual.width + 1))

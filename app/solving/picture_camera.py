@@ -19,7 +19,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import BoolArray, FloatArray
-from app.geometry.least_squares import levenberg_marquardt, require_determined
+from app.geometry.least_squares import levenberg_marquardt, require_determined_parameters
 from app.geometry.resection import (
     KAPPA,
     LOG_FOCAL,
@@ -30,8 +30,8 @@ from app.geometry.resection import (
     curve_residuals,
 )
 from app.soccer.picture import ASPECTS, MAX_SHIFT, PictureGeometry
-from app.soccer.solution import Picture
-from app.solving.line_noise import line_noise
+from app.soccer.solution import PictureDistortion
+from app.solving.line_noise import compute_line_noise
 from app.solving.observations import Observations
 from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
 
@@ -57,7 +57,7 @@ def warp_to_picture(warp: FloatArray, sigma: tuple[float, float, float]) -> Pict
     return PictureGeometry(float(np.exp(stretch)), (right, down), sigma)
 
 
-def is_open(picture: PictureGeometry) -> bool:
+def is_picture_estimated(picture: PictureGeometry) -> bool:
     """Whether the lines of the view are asked what the picture is."""
     return bool((np.array(picture.sigma) > KNOWN_SIGMA).any())
 
@@ -119,12 +119,14 @@ class PictureProblem:
         camera, warp = unknowns[:PARAMETERS], unknowns[PARAMETERS:]
         seen = undo_warp(self.problem, self.observations, warp)
         half = self.problem.size.diagonal / 2
-        apart, by_camera = self._across(camera, seen, np.zeros(2), with_slopes=True)
+        apart, by_camera = self._cross_marking_distances(
+            camera, seen, np.zeros(2), with_slopes=True
+        )
         aspect = np.exp(warp[0])
         normal = np.empty((len(apart), 2))
         for axis, unit in enumerate(np.eye(2) * _PROBE_PX):
-            ahead = self._across(camera, seen, unit)[0]
-            behind = self._across(camera, seen, -unit)[0]
+            ahead = self._cross_marking_distances(camera, seen, unit)[0]
+            behind = self._cross_marking_distances(camera, seen, -unit)[0]
             normal[:, axis] = (ahead - behind) / (2 * _PROBE_PX)
         # A line's normal turns and shrinks when the picture is stretched.
         normal[:, 0] /= aspect
@@ -151,7 +153,7 @@ class PictureProblem:
             starts.append(np.append(self.problem.refine(seen, camera[None]).parameters, start))
         best, variance = np.array(starts), (CLICK_SIGMA_PX * self.problem.unit) ** 2
         for _ in range(_ROUNDS):
-            found = levenberg_marquardt(self._equations(variance), best, _STEPS)
+            found = levenberg_marquardt(self._make_normal_equations(variance), best, _STEPS)
             best = found.parameters[np.argmin(found.cost)][None]
             variance = self.click_variance(best[0])
         unknowns: FloatArray = best[0]
@@ -160,7 +162,7 @@ class PictureProblem:
     def click_variance(self, unknowns: FloatArray) -> float:
         """Variance of the clicks' distances, robustly, pixels squared."""
         apart, _ = self.rows(unknowns)
-        scale = self._scale
+        scale = self._robust_scale
         robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
         freedom = max(len(apart) - WIDTH + 2, 1)
         return max(float(robust.sum()) / freedom, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
@@ -173,15 +175,15 @@ class PictureProblem:
             DegenerateGeometryError: The lines leave a combination open.
         """
         apart, jacobian = self.rows(unknowns)
-        weight = (1 + (apart / (WIDE * self._scale)) ** 2) ** -0.25
+        weight = (1 + (apart / (WIDE * self._robust_scale)) ** 2) ** -0.25
         click_px = np.sqrt(self.click_variance(unknowns))
         prior = np.zeros(WIDTH)
         prior[KAPPA] = self.problem.distortion_sigma**-2
         prior[PARAMETERS:] = self.sigma**-2
         rows = jacobian * (weight / click_px)[:, None]
-        require_determined(rows.T @ rows + np.diag(prior))
+        require_determined_parameters(rows.T @ rows + np.diag(prior))
         known = self.problem.noise
-        noise = line_noise(
+        noise = compute_line_noise(
             apart * weight / click_px,
             rows,
             self.observations.marking,
@@ -192,7 +194,7 @@ class PictureProblem:
         return noise.parameters
 
     @_ABSURD_IS_INFINITE
-    def carried(self, unknowns: FloatArray, covariance: FloatArray) -> FloatArray:
+    def transfer_covariance(self, unknowns: FloatArray, covariance: FloatArray) -> FloatArray:
         """Covariance of a camera's parameters that says for picture and camera where pixels lie.
 
         What an uncertain axis does to pixels, another direction of view does as well: the
@@ -216,10 +218,10 @@ class PictureProblem:
         return carry @ covariance @ carry.T
 
     @property
-    def _scale(self) -> float:
+    def _robust_scale(self) -> float:
         return self.problem.robust_scale_px * self.problem.unit
 
-    def _across(
+    def _cross_marking_distances(
         self, camera: FloatArray, seen: Observations, moved: FloatArray, with_slopes: bool = False
     ) -> tuple[FloatArray, FloatArray]:
         """Distances of moved points across their markings, and derivatives by the camera."""
@@ -229,7 +231,7 @@ class PictureProblem:
         )
         return offsets[:, 0], jacobians[:, 0] if with_slopes else jacobians[:0, 0]
 
-    def _equations(self, variance: float):  # type: ignore[no-untyped-def]
+    def _make_normal_equations(self, variance: float):  # type: ignore[no-untyped-def]
         camera = self.problem.prior()
         mean = np.append(camera.mean, self.mean)
         # The cost counts pixels, so a prior weighs as much as its clicks are noisy.
@@ -237,9 +239,9 @@ class PictureProblem:
         information[KAPPA] *= variance
         weights = self.problem.weights(self.observations)
 
-        def one(unknowns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        def equations_of_row(unknowns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
             apart, jacobian = self.rows(unknowns)
-            scale = self._scale
+            scale = self._robust_scale
             root = np.sqrt(1 + (apart / scale) ** 2)
             off = unknowns - mean
             cost = float(scale**2 * (weights @ (root - 1)) + 0.5 * (information * off**2).sum())
@@ -250,11 +252,11 @@ class PictureProblem:
                 weighted.T @ jacobian + np.diag(information),
             )
 
-        def equations(batch: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            costs, gradients, normals = zip(*map(one, batch), strict=True)
+        def equations_of_batch(batch: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            costs, gradients, normals = zip(*map(equations_of_row, batch), strict=True)
             return np.array(costs), np.array(gradients), np.array(normals)
 
-        return equations
+        return equations_of_batch
 
 
 def estimate_picture(
@@ -270,7 +272,7 @@ def estimate_picture(
     Raises:
         DegenerateGeometryError: The lines do not determine the camera.
     """
-    if not is_open(picture):
+    if not is_picture_estimated(picture):
         return picture
     seen = undo_warp(problem, observations, picture_to_warp(picture))
     search = PictureProblem.of(problem, observations, picture)
@@ -300,7 +302,7 @@ _WIDTH = PARAMETERS + 3
 
 
 @dataclass(frozen=True)
-class _Linear:
+class _LinearizedProblem:
     """Normal equations of camera and picture together, with correlated errors."""
 
     normal: FloatArray
@@ -320,7 +322,7 @@ class _Linear:
 
 def find_picture(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
-) -> Picture | None:
+) -> PictureDistortion | None:
     """How the picture was stretched or cropped; None where its lines do not say so.
 
     Args:
@@ -336,7 +338,7 @@ def find_picture(
 
 def _fit_picture(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
-) -> Picture | None:
+) -> PictureDistortion | None:
     warp = np.zeros(3)
     floor = (MIN_CLICK_SIGMA_PX * problem.unit) ** 2
     first = _linearize(problem, parameters, observations, warp)
@@ -372,13 +374,15 @@ def _fit_picture(
     ratio = (before - left) / left * freedom / 3
     prior[PARAMETERS:] = variance / PRIOR**2
     sigma = np.sqrt(variance * np.diag(_invert_normal(linear.normal + np.diag(prior)))[PARAMETERS:])
-    if ratio < BELIEVED or not _is_large(warp, sigma).any():
+    if ratio < BELIEVED or not _is_significant(warp, sigma).any():
         return None
     stretch, x, y = warp.tolist()
-    return Picture(float(np.exp(stretch)) - 1, (x, y), tuple(sigma.tolist()), float(ratio))
+    return PictureDistortion(
+        float(np.exp(stretch)) - 1, (x, y), tuple(sigma.tolist()), float(ratio)
+    )
 
 
-def _is_large(warp: FloatArray, sigma: FloatArray) -> BoolArray:
+def _is_significant(warp: FloatArray, sigma: FloatArray) -> BoolArray:
     """Which of the three numbers are too large for chance, and large enough to matter."""
     least = np.array([MIN_STRETCH, MIN_SHIFT, MIN_SHIFT])
     size = np.abs(warp)
@@ -388,18 +392,21 @@ def _is_large(warp: FloatArray, sigma: FloatArray) -> BoolArray:
 
 def _linearize(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations, warp: FloatArray
-) -> _Linear:
+) -> _LinearizedProblem:
     """The least-squares problem about a camera and a picture; points beyond an end are left out."""
 
-    def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def residuals_at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
         seen = undo_warp(problem, observations, place)
         return curve_residuals(
             parameters, seen.curves, seen.curve_points(), problem.size.diagonal / 2
         )
 
-    offsets, jacobians = at(warp)
+    offsets, jacobians = residuals_at(warp)
     steps = _STEP * np.eye(3)
-    by_warp = [(at(warp + step)[0] - at(warp - step)[0])[:, 0] / (2 * _STEP) for step in steps]
+    by_warp = [
+        (residuals_at(warp + step)[0] - residuals_at(warp - step)[0])[:, 0] / (2 * _STEP)
+        for step in steps
+    ]
     inside = offsets[:, 1] == 0
     scale = 4 * problem.robust_scale_px * problem.unit
     weight = (1 + (offsets[:, 0] / scale) ** 2) ** -0.25
@@ -413,7 +420,7 @@ def _linearize(
     totals = np.bincount(place, errors, len(size))
     share = SHARE if problem.line_share is None else min(problem.line_share, MOST_SHARE)
     common = share / (1 - share + share * size)
-    return _Linear(
+    return _LinearizedProblem(
         (rows.T @ rows - (sums.T * common) @ sums) / (1 - share),
         (rows.T @ errors - sums.T @ (common * totals)) / (1 - share),
         float(errors @ errors - common @ totals**2) / (1 - share),

@@ -30,7 +30,7 @@ from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import (
     Observations,
-    observations_of_lines,
+    make_observations,
     pitch_curves,
     principal_point,
 )
@@ -125,7 +125,7 @@ _LOOSE_M = 20.0
 """Standard deviation of the step: keeps a size that no frame shows where it is."""
 
 
-def _shares_of(marking: str) -> tuple[float, float]:
+def _marking_motion_by_size(marking: str) -> tuple[float, float]:
     """How far a marking moves along x with each metre of length, along y with each of width."""
     words = marking.split(" ")[1:3]
     length = -0.5 if "left" in words else 0.5 if "right" in words else 0.0
@@ -133,7 +133,7 @@ def _shares_of(marking: str) -> tuple[float, float]:
     return length, width
 
 
-_SHARES = np.array([_shares_of(marking) for marking in MARKINGS])
+_SHARES = np.array([_marking_motion_by_size(marking) for marking in MARKINGS])
 
 _CROSSING = np.array([name.startswith(("Side line", "Middle line")) for name in MARKINGS])
 
@@ -168,8 +168,8 @@ class PitchEstimate:
 
         A length or width that is unknown, or agrees within its uncertainty, stays as it is.
         """
-        length = _certainly_other(pitch.length, self.length, self.length_sigma_m)
-        width = _certainly_other(pitch.width, self.width, self.width_sigma_m)
+        length = _significantly_different_size(pitch.length, self.length, self.length_sigma_m)
+        width = _significantly_different_size(pitch.width, self.width, self.width_sigma_m)
         if length is None and width is None:
             return None
         return Pitch(length or pitch.length, width or pitch.width)
@@ -195,7 +195,9 @@ def estimate_pitch(
             are of one match show pitches of several sizes.
     """
     pitch = policy.fitted(Pitch())
-    seen = [_FittedFrame.of(frames[index], pitch, policy) for index in choose_frames(frames)]
+    seen = [
+        _FittedFrame.of(frames[index], pitch, policy) for index in select_informative_frames(frames)
+    ]
     if len(seen) < least:
         raise DegenerateGeometryError(
             f"only {len(seen)} frames show enough markings; estimating the pitch size needs {least}"
@@ -208,13 +210,13 @@ def estimate_pitch(
     pitch, seen, shares = _adjust_size(
         pitch, [item for item, kept in zip(seen, fits, strict=True) if kept]
     )
-    if not one_match and _frames_disagree(shares):
+    if not one_match and _do_frames_disagree(shares):
         raise DegenerateGeometryError(
             f"{len(seen)} frames show pitches of several sizes; import them with their matches"
         )
-    sigma = _sigmas_of_size(shares)
-    heard = (_effective_frames(shares) >= MIN_VOICES) | _is_confirmed(shares)
-    known = (sigma <= UNKNOWN_SIGMA_M) & heard & _is_inside(pitch)
+    sigma = _compute_size_sigmas(shares)
+    heard = (_count_effective_frames(shares) >= MIN_VOICES) | _is_confirmed_by_other_frames(shares)
+    known = (sigma <= UNKNOWN_SIGMA_M) & heard & _is_within_laws(pitch)
     return PitchEstimate(
         length=pitch.length if known[0] else None,
         width=pitch.width if known[1] else None,
@@ -224,14 +226,14 @@ def estimate_pitch(
     )
 
 
-def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
+def select_informative_frames(frames: Sequence[PitchFrame]) -> list[int]:
     """Indices of the ``MAX_FRAMES`` frames that say most of length and width, half of them for each.
 
     A frame tells the length when it shows something of the middle and something of an end, and
     the width when it shows a touchline and something whose width is fixed.
     """
     order = find_frames_with_enough_measurements(
-        observations_of_lines(frame.lines, Pitch(), frame.size) for frame in frames
+        make_observations(frame.lines, Pitch(), frame.size) for frame in frames
     )
     length = [index for index in order if _determines_length(frames[index].lines)]
     width = [index for index in order if _determines_width(frames[index].lines)]
@@ -265,7 +267,7 @@ class _FittedFrame:
     def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
         # What markings have in common is in FRAME_SIGMA_M.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
-        observations = observations_of_lines(frame.lines, pitch, frame.size)
+        observations = make_observations(frame.lines, pitch, frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations))
 
     def on(self, pitch: Pitch) -> _FittedFrame:
@@ -345,20 +347,20 @@ def _adjust_size(
         shares = [item.share() for item in seen]
         gradient, information = (sum(part) for part in zip(*shares, strict=True))
         step = -np.linalg.solve(information + np.eye(2) / _LOOSE_M**2, gradient)
-        pitch = _resized_pitch(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
+        pitch = _resize_pitch(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
         if np.abs(step).max() < _SETTLED_M:
             break
     return pitch, list(seen), shares
 
 
-def _sigmas_of_size(shares: Sequence[Share]) -> FloatArray:
+def _compute_size_sigmas(shares: Sequence[Share]) -> FloatArray:
     """Standard deviations of length and width, metres, shape (2,)."""
     pulls = np.array([pull for pull, _ in shares])
     information = np.sum([part for _, part in shares], axis=0)
     return estimate_sigmas_of_shared_numbers(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
 
 
-def _frames_disagree(shares: Sequence[Share]) -> bool:
+def _do_frames_disagree(shares: Sequence[Share]) -> bool:
     """Whether frames differ about length or width by more than chance makes frames of one pitch.
 
     A frame's gradient is zero but for chance, with its information as variance.
@@ -371,7 +373,7 @@ def _frames_disagree(shares: Sequence[Share]) -> bool:
     return bool((chdtrc(freedom, squares) < SEVERAL_P_VALUE).any())
 
 
-def _effective_frames(shares: Sequence[Share]) -> FloatArray:
+def _count_effective_frames(shares: Sequence[Share]) -> FloatArray:
     """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
     informations = np.array([np.diag(information) for _, information in shares])
     voices: FloatArray = informations.sum(axis=0) ** 2 / np.maximum(
@@ -380,7 +382,7 @@ def _effective_frames(shares: Sequence[Share]) -> FloatArray:
     return voices
 
 
-def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
+def _is_confirmed_by_other_frames(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     """Whether all frames but the one that says most know a size as well, and agree, shape (2,).
 
     A gradient is that of one frame at the size that all agree on: its share of the information
@@ -397,7 +399,7 @@ def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     return known & alike
 
 
-def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:
+def _is_within_laws(pitch: Pitch) -> npt.NDArray[np.bool_]:
     """Whether length and width lie within the Laws, not at their ends, shape (2,)."""
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     size = np.array([pitch.length, pitch.width])
@@ -405,7 +407,7 @@ def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:
     return inside
 
 
-def _resized_pitch(pitch: Pitch, by: FloatArray) -> Pitch:
+def _resize_pitch(pitch: Pitch, by: FloatArray) -> Pitch:
     """The pitch with another length and width, within the Laws of the Game."""
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     low, high = ends[:, 0] + _END_M / 2, ends[:, 1] - _END_M / 2
@@ -413,7 +415,9 @@ def _resized_pitch(pitch: Pitch, by: FloatArray) -> Pitch:
     return replace(pitch, length=length, width=width)
 
 
-def _certainly_other(now: float, found: float | None, sigma: float | None) -> float | None:
+def _significantly_different_size(
+    now: float, found: float | None, sigma: float | None
+) -> float | None:
     """What was found, to a tenth of a metre, where it certainly is another size."""
     if found is None or sigma is None:
         return None

@@ -13,19 +13,19 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.geometry.least_squares import Fit, require_determined
+from app.geometry.least_squares import LeastSquaresResult, require_determined_parameters
 from app.geometry.resection import (
     ARC,
     KAPPA,
     PARAMETERS,
     ROLL,
-    Prior,
+    GaussianPrior,
     X,
     Z,
     camera_from_parameters,
     curve_distances,
     curve_residuals,
-    fit_curves,
+    fit_camera_to_curves,
     parameters_from_camera,
 )
 from app.soccer.frames import ImageSize
@@ -39,14 +39,14 @@ from app.solving.camera_positions import (
     STANDS,
     PositionPrior,
     is_main_position,
-    make_starts_from_stands,
+    make_starts_from_known_positions,
 )
-from app.solving.line_noise import LineNoise, LinePrior, line_noise
+from app.solving.line_noise import LineNoise, LinePrior, compute_line_noise
 from app.solving.observations import (
     SHARED_SHARE,
     Observations,
+    compute_point_weights,
     principal_point,
-    weights_of_points,
 )
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
@@ -208,8 +208,8 @@ class ResectionProblem:
         return self._search_all_stages(observations, plan)
 
     def _search_all_stages(self, observations: Observations, plan: SearchPlan) -> Resection:
-        thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
-        starts = make_starts_from_stands(observations, self.size.diagonal)
+        thinned = observations.thin_points(POINTS_PER_LINE, POINTS_PER_CIRCLE)
+        starts = make_starts_from_known_positions(observations, self.size.diagonal)
         scouted = self._run_stage(thinned, starts, plan.scout, damping=1e-2)
         searched = self._run_stage(
             thinned, choose_best_starts(scouted, plan.search.starts), plan.search
@@ -234,7 +234,7 @@ class ResectionProblem:
         """
         if not is_main_position(fit.parameters[X : Z + 1]):
             return fit
-        return self._refine_near(fit, observations, STADIUM)
+        return self._refine_near_position(fit, observations, STADIUM)
 
     def refine_with_match_position(
         self, alone: Resection, observations: Observations, near: PositionPrior
@@ -246,19 +246,19 @@ class ResectionProblem:
         """
         if not is_main_position(alone.parameters[X : Z + 1]):
             return alone
-        shared = self._refine_near(alone, observations, near)
+        shared = self._refine_near_position(alone, observations, near)
         variance = self.click_variance(alone.parameters, observations)
         loss = self._data_cost(shared, observations) - self._data_cost(alone, observations)
         return shared if 2 * loss <= CONTRADICTION * variance else alone
 
-    def _refine_near(
+    def _refine_near_position(
         self, fit: Resection, observations: Observations, near: PositionPrior
     ) -> Resection:
         """Reweighted rounds with a Student prior of roll and position."""
         variance = self.click_variance(fit.parameters, observations)
         offset = np.zeros(len(MAIN_MEAN))
         for _ in range(MAIN_ROUNDS):
-            prior = self.main_prior(near, offset, variance)
+            prior = self.main_camera_prior(near, offset, variance)
             found = self._run_stage(observations, fit.parameters[None], FINAL, prior=prior)
             fit = Resection(found.parameters[0], float(found.cost[0]))
             offset = fit.parameters[ROLL : Z + 1] - prior.mean[ROLL : Z + 1]
@@ -273,10 +273,10 @@ class ResectionProblem:
 
     def weights(self, observations: Observations) -> FloatArray:
         """Weight of each observed point in the fit, shape (N,)."""
-        return weights_of_points(observations.marking, self.fit_share)
+        return compute_point_weights(observations.marking, self.fit_share)
 
     def row_weights(self, observations: Observations, marking: IntArray) -> FloatArray:
-        """The same of rows as ``noise_rows`` has them, by the marking of each, shape (M,)."""
+        """The same of rows as ``compute_noise_rows`` has them, by the marking of each, shape (M,)."""
         points = np.where(marking < 0, -1 - marking, np.arange(len(marking)))
         return self.weights(observations)[points]
 
@@ -298,13 +298,13 @@ class ResectionProblem:
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
-        rows = self.noise_rows(parameters, observations)
-        return line_noise(*rows, self.noise, self.row_weights(observations, rows[2]))
+        rows = self.compute_noise_rows(parameters, observations)
+        return compute_line_noise(*rows, self.noise, self.row_weights(observations, rows[2]))
 
-    def noise_rows(
+    def compute_noise_rows(
         self, parameters: FloatArray, observations: Observations
     ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-        """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
+        """Residuals, Jacobian, marking and prior at a minimum as ``estimate_click_noise`` takes them.
 
         Args:
             parameters: At the minimum, shape (8,).
@@ -331,7 +331,7 @@ class ResectionProblem:
         prior = np.zeros(PARAMETERS)
         prior[KAPPA] = self.distortion_sigma**-2
         jacobian *= weight[rows, None]
-        require_determined(jacobian.T @ jacobian + np.diag(prior))
+        require_determined_parameters(jacobian.T @ jacobian + np.diag(prior))
         apart = np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows]
         return apart, jacobian, np.append(observations.marking, -1 - beyond), prior
 
@@ -359,9 +359,9 @@ class ResectionProblem:
         starts: FloatArray,
         stage: ResectionStage,
         damping: float = 1e-3,
-        prior: Prior | None = None,
-    ) -> Fit:
-        return fit_curves(
+        prior: GaussianPrior | None = None,
+    ) -> LeastSquaresResult:
+        return fit_camera_to_curves(
             starts,
             observations.curves,
             observations.curve_points(self.fit_share),
@@ -373,15 +373,17 @@ class ResectionProblem:
             damping=damping,
         )
 
-    def prior(self) -> Prior:
+    def prior(self) -> GaussianPrior:
         """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
         focal = np.log(2000.0 * self.unit)
         mean = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -15.0, focal, self.distortion_mean])
         level = np.radians(2)
         sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])
-        return Prior(mean, sigma)
+        return GaussianPrior(mean, sigma)
 
-    def main_prior(self, near: PositionPrior, offset: FloatArray, variance: float = 1.0) -> Prior:
+    def main_camera_prior(
+        self, near: PositionPrior, offset: FloatArray, variance: float = 1.0
+    ) -> GaussianPrior:
         """Student prior of main cameras, reweighted for an offset from its mean.
 
         The better the clicks fit and the more they insist on an offset, the less it weighs.
@@ -402,7 +404,7 @@ class ResectionProblem:
         return prior
 
 
-def choose_best_starts(fit: Fit, count: int) -> FloatArray:
+def choose_best_starts(fit: LeastSquaresResult, count: int) -> FloatArray:
     """Parameters of the ``count`` starts of lowest cost, lowest first."""
     return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
 

@@ -15,14 +15,14 @@ import numpy as np
 
 from app.errors import InputError
 from app.geometry.arrays import BoolArray, FloatArray
-from app.geometry.bundle import Rays, best_points, bundle_equations, linearize
+from app.geometry.bundle import Rays, bundle_equations, linearize, optimize_points
 from app.geometry.camera import Camera
 from app.geometry.least_squares import covariance, levenberg_marquardt
 from app.geometry.resection import (
     KAPPA,
     LOG_FOCAL,
     PARAMETERS,
-    Prior,
+    GaussianPrior,
     X,
     Z,
     camera_from_parameters,
@@ -36,7 +36,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import CLICK_DIAGONAL
-from app.solving.observations import Observations, observations_of_lines, principal_point
+from app.solving.observations import Observations, make_observations, principal_point
 
 MIN_BALLS = 20
 """Instants that a camera must share with others to be adjusted."""
@@ -161,7 +161,7 @@ def make_rig(
     Raises:
         InputError: Too few cameras share balls, or one has a lens that cannot be adjusted.
     """
-    sharing = _cameras_sharing_balls(cameras, frames)
+    sharing = _find_cameras_sharing_balls(cameras, frames)
     if len(sharing) < 2:
         raise InputError(
             f"no two static cameras with a calibration show the ball together {MIN_BALLS} times",
@@ -170,8 +170,8 @@ def make_rig(
     for camera in sharing:
         _require_adjustable(camera)
     fitted = policy.calibration.fitted(pitch)
-    rig = Rig(tuple(sharing), *_rays_of_frames(sharing, frames, policy), fitted)
-    points = best_points(rig.start, rig.rays, np.inf)
+    rig = Rig(tuple(sharing), *_collect_rays_of_frames(sharing, frames, policy), fitted)
+    points = optimize_points(rig.start, rig.rays, np.inf)
     at = linearize(rig.start, points, rig.rays)
     apart = np.hypot(*at.residuals.T) * rig.rays.sigma
     limits = policy.tau_px(2 * rig.rays.half_diagonals)
@@ -185,22 +185,24 @@ def make_rig(
 def adjust_rig(rig: Rig) -> RigFit:
     """The cameras that explain lines and balls best, and how well they are known."""
     anchors = [sample_grass_in_view(camera) for camera in rig.cameras]
-    observed = [_observations_of_camera(camera, rig.pitch) for camera in rig.cameras]
+    observed = [_make_camera_observations(camera, rig.pitch) for camera in rig.cameras]
     parameters, ball_sigma, line_sigma = rig.start, 1.0, LINE_SIGMA_PX
     for scale in (WIDE, TIGHT, TIGHT):
         rays = replace(rig.rays, sigma=rig.rays.sigma * ball_sigma)
         problem = _RigProblem(rig.cameras, rays, observed, anchors, line_sigma, scale)
-        fit = levenberg_marquardt(problem.equations, parameters.reshape(1, -1), STEPS)
+        fit = levenberg_marquardt(
+            problem.compute_normal_equations, parameters.reshape(1, -1), STEPS
+        )
         parameters = fit.parameters[0].reshape(-1, PARAMETERS)
         # What clicks and lines are worth is known once the cameras fit.
-        ball_sigma = max(1.0, _click_noise_factor(parameters, rig.rays))
+        ball_sigma = max(1.0, _estimate_click_noise_factor(parameters, rig.rays))
         line_sigma = max(LINE_SIGMA_PX, _line_sigma(parameters, rig.cameras, observed))
     return RigFit(parameters, covariance(fit.information[0]), ball_sigma, line_sigma)
 
 
 def measure_line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> FloatArray:
     """Distance of each annotated point to its projected marking, pixels, shape (N,)."""
-    observed = _observations_of_camera(camera, pitch)
+    observed = _make_camera_observations(camera, pitch)
     return curve_distances(
         parameters, observed.curves, observed.curve_points(), camera.half_diagonal
     )
@@ -227,7 +229,9 @@ class _RigProblem:
     line_sigma_px: float
     scale: float
 
-    def equations(self, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def compute_normal_equations(
+        self, rows: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """As ``levenberg_marquardt`` asks for them, for the one row that there is."""
         parameters = rows[0].reshape(-1, PARAMETERS)
         cost, gradient, information = bundle_equations(parameters, self.rays, self.scale)
@@ -278,10 +282,10 @@ class _RigProblem:
         return cost, gradient, information
 
 
-_NO_PRIOR = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
+_NO_PRIOR = GaussianPrior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
 
 
-def _cameras_sharing_balls(
+def _find_cameras_sharing_balls(
     cameras: Sequence[RigCamera], frames: Sequence[RigFrame]
 ) -> list[RigCamera]:
     """The cameras that share enough balls with each other."""
@@ -300,7 +304,7 @@ def _cameras_sharing_balls(
     return list(left.values())
 
 
-def _rays_of_frames(
+def _collect_rays_of_frames(
     cameras: Sequence[RigCamera], frames: Sequence[RigFrame], policy: Policy
 ) -> tuple[Rays, FloatArray]:
     places = {camera.key: place for place, camera in enumerate(cameras)}
@@ -347,16 +351,16 @@ def _require_adjustable(camera: RigCamera) -> None:
         )
 
 
-def _observations_of_camera(camera: RigCamera, pitch: Pitch) -> Observations:
+def _make_camera_observations(camera: RigCamera, pitch: Pitch) -> Observations:
     """The lines of a camera, relative to its own principal point."""
-    observed = observations_of_lines(camera.lines, pitch, camera.size)
+    observed = make_observations(camera.lines, pitch, camera.size)
     shift = np.subtract(principal_point(camera.size), camera.camera.principal_point)
     return replace(observed, pixels=observed.pixels + shift)
 
 
-def _click_noise_factor(parameters: FloatArray, rays: Rays) -> float:
+def _estimate_click_noise_factor(parameters: FloatArray, rays: Rays) -> float:
     """Noise of the clicks, robustly, as a multiple of what the rays are said to have."""
-    points = best_points(parameters, rays, np.inf)
+    points = optimize_points(parameters, rays, np.inf)
     squares = (linearize(parameters, points, rays).residuals ** 2).sum(axis=1)
     total = np.bincount(rays.point, squares, minlength=rays.points)
     freedom = 2 * np.bincount(rays.point, minlength=rays.points) - 3

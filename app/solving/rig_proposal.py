@@ -12,8 +12,8 @@ from itertools import combinations
 
 import numpy as np
 
-from app.geometry.arrays import FloatArray, row_by_row
-from app.geometry.bundle import best_points, ray_gaps
+from app.geometry.arrays import FloatArray, flatten_covariance
+from app.geometry.bundle import optimize_points, ray_pair_distances_px
 from app.geometry.camera import Camera
 from app.geometry.resection import X, Z, projection_jacobians
 from app.soccer.pitch import Pitch
@@ -144,15 +144,15 @@ def propose_rig(
     odd = rig.times // BLOCK % 2 == 1
     fit = adjust_rig(rig)
     halved = adjust_rig(rig.only(~odd)) if odd.any() and not odd.all() else None
-    balls = best_points(fit.parameters, rig.rays, np.inf)
-    moved = np.linalg.norm(balls - best_points(rig.start, rig.rays, np.inf), axis=1)
+    balls = optimize_points(fit.parameters, rig.rays, np.inf)
+    moved = np.linalg.norm(balls - optimize_points(rig.start, rig.rays, np.inf), axis=1)
     used = {camera.key for camera in rig.cameras}
     return RigProposal(
         cameras=tuple(
-            _camera_change(rig, fit, row, balls[rig.rays.point[rig.rays.camera == row]])
+            _compare_camera(rig, fit, row, balls[rig.rays.point[rig.rays.camera == row]])
             for row in range(len(rig.cameras))
         ),
-        pairs=tuple(_pair_changes(rig, fit, halved, odd)),
+        pairs=tuple(_compare_pairs(rig, fit, halved, odd)),
         left_alone=tuple(camera.key for camera in cameras if camera.key not in used),
         frames=rig.rays.points,
         gross=gross,
@@ -201,7 +201,7 @@ def _pixel_derivatives(camera: RigCamera, parameters: FloatArray, points: FloatA
     return projection_jacobians(rows, points, np.full(len(points), camera.half_diagonal))
 
 
-def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> CameraChange:
+def _compare_camera(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> CameraChange:
     camera, parameters, covariance = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
     after = camera.with_parameters(parameters)
     turn = after.rotation @ camera.camera.rotation.T
@@ -214,8 +214,8 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
         key=camera.key,
         before=camera.camera,
         after=after,
-        covariance=row_by_row(covariance),
-        covariance_before=row_by_row(
+        covariance=flatten_covariance(covariance),
+        covariance_before=flatten_covariance(
             covariance + compute_error_covariance(camera, parameters, balls)
         ),
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
@@ -233,17 +233,20 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
     )
 
 
-def _pair_changes(
+def _compare_pairs(
     rig: Rig, fit: RigFit, halved: RigFit | None, odd: FloatArray
 ) -> list[PairChange]:
     pairs = []
     for a, b in combinations(range(len(rig.cameras)), 2):
-        rays, rows = rig.rays.of_cameras(a, b)
+        rays, rows = rig.rays.select_common_points(a, b)
         if len(rows) == 0:
             continue
-        before, after = ray_gaps(rig.start, rays)[0], ray_gaps(fit.parameters, rays)[0]
+        before, after = (
+            ray_pair_distances_px(rig.start, rays)[0],
+            ray_pair_distances_px(fit.parameters, rays)[0],
+        )
         out = odd[rows] if halved is not None else np.zeros(len(rows), bool)
-        unseen = None if halved is None else ray_gaps(halved.parameters, rays)[0]
+        unseen = None if halved is None else ray_pair_distances_px(halved.parameters, rays)[0]
         offset = estimate_time_offset(rig, fit, a, b)
         pairs.append(
             PairChange(
@@ -273,7 +276,7 @@ def estimate_time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, 
     Returns:
         None where too few instants show a ball before and after.
     """
-    rays, rows = rig.rays.of_cameras(a, b)
+    rays, rows = rig.rays.select_common_points(a, b)
     times = rig.times[rows]
     order = {time: place for place, time in enumerate(times.tolist())}
     around = [
@@ -284,7 +287,7 @@ def estimate_time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, 
     if len(around) < MIN_OFFSET_FRAMES:
         return None
     here, earlier, later = np.array(around).T
-    _, gaps, free = ray_gaps(fit.parameters, rays)
+    _, gaps, free = ray_pair_distances_px(fit.parameters, rays)
     in_b = np.argsort(rays.point, kind="stable").reshape(-1, 2)
     second = np.where(rays.camera[in_b] == b, 1, 0).argmax(axis=1)
     row = in_b[np.arange(len(in_b)), second]

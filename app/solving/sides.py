@@ -60,7 +60,7 @@ def turn_camera(camera: Camera) -> Camera:
     )
 
 
-def find_swaps(
+def find_swapped_views(
     first: BallObservation | None,
     usable: Sequence[BallObservation],
     pitch: Pitch,
@@ -82,14 +82,14 @@ def find_swaps(
             others, but that they are labelled from the other end the others can still tell.
     """
     if first is not None and first.camera.position[1] < 0 and _is_calibrated_from_lines(first):
-        others = _other_observations(first, usable)
+        others = _exclude_observation(first, usable)
         swap = _test_half_turn(first, others, first, pitch, policy) if first in usable else None
         return (swap or SwappedView(first.view, None, None, confidence=0.9),)
     swaps = (
         _test_half_turn(replay, others, first, pitch, policy)
         for replay in (*usable, *doubtful)
         if replay is not first and _is_calibrated_from_lines(replay)
-        if (others := _other_observations(replay, usable))
+        if (others := _exclude_observation(replay, usable))
     )
     return tuple(swap for swap in swaps if swap is not None)
 
@@ -98,7 +98,7 @@ def _is_calibrated_from_lines(observation: BallObservation) -> bool:
     return observation.calibration.source != "given"
 
 
-def _other_observations(
+def _exclude_observation(
     observation: BallObservation, observations: Sequence[BallObservation]
 ) -> list[BallObservation]:
     return [other for other in observations if other is not observation]
@@ -111,20 +111,20 @@ def _test_half_turn(
     pitch: Pitch,
     policy: Policy,
 ) -> SwappedView | None:
-    turned = _meeting_points(_turn_observation(observation), others, policy)
-    after = _smallest_pair_error(turned, pitch, policy)
+    turned = _find_meeting_points(_turn_observation(observation), others, policy)
+    after = _find_smallest_pair_error(turned, pitch, policy)
     # So it is with nearly every view that is labelled as it should be: nothing more is asked.
     if after >= 1:
         return None
-    labelled = _meeting_points(observation, others, policy)
-    costs = _pair_costs(observation, turned, True, pitch, policy)
-    better = _sum_of_weighted_costs(
-        _pair_costs(observation, labelled, False, pitch, policy), labelled, first
+    labelled = _find_meeting_points(observation, others, policy)
+    costs = _compute_pair_costs(observation, turned, True, pitch, policy)
+    better = _sum_weighted_costs(
+        _compute_pair_costs(observation, labelled, False, pitch, policy), labelled, first
     )
-    better -= _sum_of_weighted_costs(costs, turned, first)
+    better -= _sum_weighted_costs(costs, turned, first)
     if min(costs) > MAX_COST or better < CLEARLY:
         return None
-    before, tau = _smallest_pair_error(labelled, pitch, policy), observation.tau_px(policy)
+    before, tau = _find_smallest_pair_error(labelled, pitch, policy), observation.tau_px(policy)
     return SwappedView(
         observation.view,
         None if np.isinf(before) else before * tau,
@@ -140,7 +140,7 @@ def _turn_observation(observation: BallObservation) -> BallObservation:
     return replace(observation, calibration=calibration)
 
 
-def _meeting_points(
+def _find_meeting_points(
     observation: BallObservation, others: Sequence[BallObservation], policy: Policy
 ) -> list[PairPoint]:
     """Where the observation meets the others, except from beside it."""
@@ -151,7 +151,9 @@ def _meeting_points(
     ]
 
 
-def _smallest_pair_error(pair_points: Sequence[PairPoint], pitch: Pitch, policy: Policy) -> float:
+def _find_smallest_pair_error(
+    pair_points: Sequence[PairPoint], pitch: Pitch, policy: Policy
+) -> float:
     """Larger error of the best pair, in units of tau; infinite where none says anything."""
     errors = [
         max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
@@ -161,7 +163,7 @@ def _smallest_pair_error(pair_points: Sequence[PairPoint], pitch: Pitch, policy:
     return min(errors, default=np.inf)
 
 
-def _sum_of_weighted_costs(
+def _sum_weighted_costs(
     costs: Sequence[float], pair_points: Sequence[PairPoint], first: BallObservation | None
 ) -> float:
     """Sum of costs; the main camera counts more than a replay, which may be turned itself."""
@@ -171,7 +173,7 @@ def _sum_of_weighted_costs(
     )
 
 
-def _pair_costs(
+def _compute_pair_costs(
     observation: BallObservation,
     pair_points: Sequence[PairPoint],
     turned: bool,

@@ -1,9 +1,9 @@
 """Solve: from what people said of a group to everything that follows from it; and the same under another tau.
 
-``solve`` is one pure function: no clock, no database, no memory, the same bits every time. The
+``solve_group`` is one pure function: no clock, no database, no memory, the same bits every time. The
 edit in the browser, the preview, the batch and the export all call it.
 
-``rethreshold_solution`` calibrates and triangulates nothing. Of what ``solve`` computes, tau decides which pairs are
+``rethreshold_solution`` calibrates and triangulates nothing. Of what ``solve_group`` computes, tau decides which pairs are
 valid; where those stay as they were, it is told in one gate and two findings, and in which views
 look turned. The last needs the cameras again, but never under a smaller tau: a turned view must
 meet the others within tau, so one that did not before does not now.
@@ -21,7 +21,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
 from app.geometry.lens import COEFFICIENTS
-from app.geometry.likely_point import CameraTable, likely_points
+from app.geometry.likely_point import CameraTable, find_most_likely_points
 from app.soccer.annotation import make_lines
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
@@ -41,7 +41,7 @@ from app.solving.ball_box import fit_ball, predict_ball_in_view
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.calibrate import calibrate, calibrate_view, compute_view_key
 from app.solving.contradiction import compute_chi_square, find_contradiction
-from app.solving.facts import Facts, collect_facts
+from app.solving.facts import GroupFacts, collect_facts
 from app.solving.findings import (
     find_closest_pair,
     find_group_findings,
@@ -63,7 +63,7 @@ LEFT_OUT = "excluded"
 """What a view that a person left out failed at."""
 
 
-def solve(
+def solve_group(
     group: Group, policy: Policy, calibrations: Mapping[str, Calibration] = NO_CALIBRATIONS
 ) -> Solution:
     """The solution of a group under a policy.
@@ -79,10 +79,10 @@ def solve(
 
 def solve_with_facts(
     group: Group, policy: Policy, calibrations: Mapping[str, Calibration]
-) -> tuple[Solution, Facts]:
-    """``solve``, and the facts that its gates were judged by."""
+) -> tuple[Solution, GroupFacts]:
+    """``solve_group``, and the facts that its gates were judged by."""
     known = dict(calibrations)
-    keys = [_calibration_key_of_view(view, group, policy, known) for view in group.views]
+    keys = [_compute_view_calibration_key(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
     observations = collect_ball_observations(group.views, found)
     pair_points = triangulate_observation_pairs(combinations(observations, 2))
@@ -91,7 +91,7 @@ def solve_with_facts(
     judgement = judge_groups(facts, policy, uncertainty)
     pairs = judge_pairs(pair_points, judgement)
     names = [view.key for view in group.views]
-    failed = _failed_gate_names(group, judgement)
+    failed = _list_failed_gate_names(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [observation for observation in observations if observation.view in left]
     chi_square = compute_chi_square(names, facts, judgement, policy)
@@ -104,8 +104,8 @@ def solve_with_facts(
         for view, key, gate in zip(group.views, keys, failed, strict=True)
     )
     judged, left_out = (
-        _judged_views(group, views, judgement, policy),
-        _letters_of_left_out_views(group),
+        _make_judged_views(group, views, judgement, policy),
+        _list_excluded_view_letters(group),
     )
     solution = Solution(
         views=views,
@@ -122,7 +122,7 @@ def solve_with_facts(
     return solution, facts
 
 
-def _calibration_key_of_view(
+def _compute_view_calibration_key(
     view: View, group: Group, policy: Policy, known: dict[str, Calibration]
 ) -> str:
     """Key of a view's calibration, which is known then."""
@@ -132,7 +132,7 @@ def _calibration_key_of_view(
     return key
 
 
-def _failed_gate_names(group: Group, judgement: Judgement) -> list[str | None]:
+def _list_failed_gate_names(group: Group, judgement: Judgement) -> list[str | None]:
     """What each view failed at, or None."""
     return [
         LEFT_OUT if not view.included else None if gate == PASSES else GATES[gate]
@@ -163,7 +163,7 @@ def _add_ball_to_view(
     return replace(solved, ball=fit)
 
 
-def _why_no_ball(view: View) -> str:
+def _explain_missing_ball(view: View) -> str:
     """Why a view has no ball that counts, with a place for letters."""
     seen = [ball for ball in view.balls if not ball.out_of_view]
     if len(seen) > 1:
@@ -171,7 +171,7 @@ def _why_no_ball(view: View) -> str:
     return "placed in {} (not counted)" if seen and seen[0].inferred else "none in {}"
 
 
-def _judged_views(
+def _make_judged_views(
     group: Group, views: Sequence[ViewSolution], judgement: Judgement, policy: Policy
 ) -> tuple[JudgedView, ...]:
     return tuple(
@@ -183,7 +183,7 @@ def _judged_views(
             tau_px=policy.tau_px(view.size.diagonal),
             has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
-            no_ball=_why_no_ball(view),
+            no_ball=_explain_missing_ball(view),
         )
         for index, (view, solved, jac) in enumerate(
             zip(group.views, views, judgement.jac.tolist(), strict=True)
@@ -192,7 +192,7 @@ def _judged_views(
     )
 
 
-def _letters_of_left_out_views(group: Group) -> tuple[str, ...]:
+def _list_excluded_view_letters(group: Group) -> tuple[str, ...]:
     """Letters of the views that a person left out."""
     return tuple(make_view_letter(i) for i, view in enumerate(group.views) if not view.included)
 
@@ -212,7 +212,7 @@ def warm_up_solver() -> None:
     lens = np.array([0.01, *np.zeros(COEFFICIENTS - 1)])
     upright = Camera(np.eye(3), np.zeros(3), (1000.0, 1000.0), (480.0, 270.0), distortion=lens)
     upright.undistort(np.zeros((1, 2)))
-    likely_points(
+    find_most_likely_points(
         CameraTable.of([upright]),
         np.zeros((1, 2)),
         np.zeros((1, 1), int),
@@ -227,7 +227,7 @@ def differs_only_in_smaller_tau(policy: Policy, before: Policy) -> bool:
     return alike == policy and policy.tau_percent < before.tau_percent
 
 
-def has_unchanged_pairs(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
+def has_unchanged_pairs(facts: GroupFacts, before: Policy, policy: Policy) -> BoolArray:
     """Groups in which no pair fails another gate than under the policy before, shape (G,).
 
     Args:
@@ -246,7 +246,7 @@ def has_unchanged_pairs(facts: Facts, before: Policy, policy: Policy) -> BoolArr
 def rethreshold_solution(
     solution: Solution, diagonals: Sequence[float], policy: Policy
 ) -> Solution | None:
-    """What ``solve`` says under a smaller tau, bit for bit; None where it has to be asked.
+    """What ``solve_group`` says under a smaller tau, bit for bit; None where it has to be asked.
 
     Args:
         solution: Under a policy that this one ``differs_only_in_smaller_tau`` than, of a group that is
@@ -254,7 +254,7 @@ def rethreshold_solution(
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
     """
-    if any(item.kind == "sides_swapped" or _is_behind(item) for item in solution.findings):
+    if any(item.kind == "sides_swapped" or _is_behind_camera(item) for item in solution.findings):
         return None
     keys = [view.view for view in solution.views]
     tau_px = {key: policy.tau_px(diagonal) for key, diagonal in zip(keys, diagonals, strict=True)}
@@ -278,7 +278,7 @@ def rethreshold_solution(
     )
 
 
-def _is_behind(found: Finding) -> bool:
+def _is_behind_camera(found: Finding) -> bool:
     """Whether rays meet behind a camera: how far apart the pixels are was not told."""
     return found.kind in ("view_disagrees", "not_synchronous") and found.number is None
 

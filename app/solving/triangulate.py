@@ -14,7 +14,7 @@ from app.geometry.resection import PARAMETERS, parameters_from_camera
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import View
-from app.soccer.picture import camera_as_taken
+from app.soccer.picture import camera_of_original_picture
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 
@@ -52,7 +52,7 @@ class CameraNumbers:
             covariance = np.reshape(calibration.covariance, (PARAMETERS, PARAMETERS))
             return CameraNumbers(parameters_from_camera(camera, diagonal / 2), covariance)
         whole = np.reshape(calibration.picture_covariance, (WHOLE, WHOLE))
-        parameters = parameters_from_camera(camera_as_taken(camera), diagonal / 2)
+        parameters = parameters_from_camera(camera_of_original_picture(camera), diagonal / 2)
         return CameraNumbers(parameters, whole[:PARAMETERS, :PARAMETERS], whole[PARAMETERS:])
 
 
@@ -99,7 +99,7 @@ class BallObservation:
         return center
 
     @cached_property
-    def ideal_slope(self) -> FloatArray:
+    def undistortion_jacobian(self) -> FloatArray:
         """How far ``ideal_center`` moves with the centre, shape (2, 2).
 
         One to one but through a wide lens: what other lenses add lies below the noise of a click.
@@ -200,7 +200,7 @@ def triangulate_observation_pairs(
     couples = [(a, b) for a, b in couples if not np.array_equal(a.P, b.P)]
     if not couples:
         return []
-    points = triangulate_pairs(*stack_pairs([a for a, _ in couples], [b for _, b in couples]))
+    points = triangulate_pairs(*stack_pair_arrays([a for a, _ in couples], [b for _, b in couples]))
     return [
         _make_pair_point(a, b, point)
         for (a, b), point in zip(couples, points, strict=True)
@@ -208,7 +208,7 @@ def triangulate_observation_pairs(
     ]
 
 
-def stack_pairs(
+def stack_pair_arrays(
     a: Sequence[BallObservation], b: Sequence[BallObservation]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Couples of observations as ``triangulate_pairs`` takes them."""

@@ -45,10 +45,10 @@ from app.solving.paint_noise import (
     SIZES,
     TERMS,
     PaintOffsets,
-    all_terms,
     cautious_weights,
-    painted_shift,
-    shifted_offsets,
+    compute_paint_shift,
+    pitch_and_marking_terms,
+    shift_offsets,
 )
 from app.solving.pitch_size import CERTAIN_SIGMAS, LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
 from app.solving.resect import ResectionProblem
@@ -150,29 +150,29 @@ class TripodPitch:
     @property
     def crown(self) -> tuple[float, float]:
         """How far the grass is raised along the middle, and its standard deviation, metres."""
-        return self._number(CROWN, CROWN_SIGMA_M)
+        return self._term_with_sigma(CROWN, CROWN_SIGMA_M)
 
     @property
     def inward(self) -> tuple[float, float]:
         """How far the paint lies inside the plan, and its standard deviation, metres."""
-        return self._number(INWARD, INWARD_SIGMA_M)
+        return self._term_with_sigma(INWARD, INWARD_SIGMA_M)
 
-    def _number(self, term: int, unit: float) -> tuple[float, float]:
+    def _term_with_sigma(self, term: int, unit: float) -> tuple[float, float]:
         sigma = np.sqrt(np.diag(self.covariance)[_PITCH][term])
         return float(unit * self.terms[term]), float(unit * sigma)
 
     @property
-    def knows_sizes(self) -> tuple[bool, bool]:
+    def are_sizes_known(self) -> tuple[bool, bool]:
         """Whether length and width are shown."""
         limit = np.minimum(TOLD_SHARE * PAINT_SIZE_SIGMA_M, UNKNOWN_SIGMA_M)
         length, width = (self.sizes_sigma <= limit).tolist()
         return length, width
 
-    def other_pitch(self) -> Pitch | None:
+    def clearly_different_pitch(self) -> Pitch | None:
         """The size that is shown, to a tenth of a metre, where it certainly is not the plan's."""
         found, used = (np.array([each.length, each.width]) for each in (self.pitch, self.plan))
         limit = np.maximum(CERTAIN_SIGMAS * self.sizes_sigma, LEAST_DIFFERENCE_M)
-        off = (np.abs(found - used) > limit) & self.knows_sizes
+        off = (np.abs(found - used) > limit) & self.are_sizes_known
         if not off.any():
             return None
         length, width = np.where(off, found.round(1), used).tolist()
@@ -182,16 +182,16 @@ class TripodPitch:
         """Points along a marking as it is shown, pitch frame, metres, shape (N, 3)."""
         points = self.pitch.sample(marking, STEP_M, STEP_M)
         which = np.full(len(points), MARKINGS.index(marking))
-        return points + painted_shift(points[:, :2], which, self.terms, self.pitch)
+        return points + compute_paint_shift(points[:, :2], which, self.terms, self.pitch)
 
-    def shift_of(self, frame: PaintSightings) -> FloatArray:
+    def compute_frame_shift(self, frame: PaintSightings) -> FloatArray:
         """How far each place of paint lies off the plan of the size that is shown, metres, shape (N, 3)."""
         grass = project_paint_to_grass(frame, self.size)
-        return painted_shift(grass, frame.sightings.curve, self.terms, self.pitch)
+        return compute_paint_shift(grass, frame.sightings.curve, self.terms, self.pitch)
 
     def camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
         """The camera of a frame on the pitch that is shown, shape (8,), and its covariance, shape (8, 8)."""
-        frames = _Frames([frame], self.size, self.plan, self.policy, self)
+        frames = _TripodProblem([frame], self.size, self.plan, self.policy, self)
         for _ in range(ALONE_ROUNDS):
             parts = frames.parts()
             frames.parameters = (
@@ -202,13 +202,13 @@ class TripodPitch:
     def error_px(self, frame: PaintSightings, parameters: FloatArray) -> float:
         """Median distance of a frame's paint from the pitch that is shown, by its camera there, pixels."""
         at = replace(frame, parameters=parameters)
-        seen = _Frames([at], self.size, self.plan, self.policy, self).seen(0)
+        seen = _TripodProblem([at], self.size, self.plan, self.policy, self).seen(0)
         return float(np.median(np.abs(seen.offsets)))
 
     def covariance_of(self, frame: PaintSightings, parameters: FloatArray) -> FloatArray:
         """The same of parameters that are known already, shape (8, 8)."""
         at = replace(frame, parameters=parameters)
-        parts = _Frames([at], self.size, self.plan, self.policy, self).parts()
+        parts = _TripodProblem([at], self.size, self.plan, self.policy, self).parts()
         own = np.linalg.inv(parts.own[0])
         carried = own @ parts.between[0]
         covariance = own + carried @ self.covariance @ carried.T
@@ -250,9 +250,9 @@ def find_tripod_pitch(
     if len(frames) < LEAST_FRAMES:
         return None
     places = np.linspace(0, len(frames) - 1, min(len(frames), MOST_FRAMES)).round().astype(int)
-    together = _Frames([frames[place] for place in places], size, pitch, policy)
+    together = _TripodProblem([frames[place] for place in places], size, pitch, policy)
     try:
-        found = together.descend()
+        found = together.minimize_cost()
     except np.linalg.LinAlgError:
         return None
     away = np.linalg.norm(together.parameters[:, X : Z + 1] - found.position, axis=1)
@@ -265,7 +265,7 @@ def find_tripod_pitch(
 
 
 @dataclass(frozen=True)
-class _Parts:
+class _NormalEquations:
     """Normal equations: of each frame, of what they share, and between both.
 
     Attributes:
@@ -284,7 +284,7 @@ class _Parts:
     lens: FloatArray
 
 
-class _Frames:
+class _TripodProblem:
     """Frames of one tripod, or one of them where the rest is known."""
 
     def __init__(
@@ -315,23 +315,29 @@ class _Frames:
         seen = measure_offsets(
             self._problem, self.parameters[at], frame.sightings, frame.sigmas, known.pitch
         )
-        shift = painted_shift(self._grass[at], seen.marking, known.terms, known.pitch)
-        return replace(seen, offsets=shifted_offsets(seen.offsets, seen.jacobian, shift))
+        shift = compute_paint_shift(self._grass[at], seen.marking, known.terms, known.pitch)
+        return replace(seen, offsets=shift_offsets(seen.offsets, seen.jacobian, shift))
 
-    def parts(self) -> _Parts:
+    def parts(self) -> _NormalEquations:
         """The equations where frames and what they share are now."""
         count, known = len(self.parameters), self._known
         own, between = (
             np.zeros((count, PARAMETERS, PARAMETERS)),
             np.zeros((count, PARAMETERS, SHARED)),
         )
-        common, own_right, right = self._prior(), np.zeros((count, PARAMETERS)), self._pull()
+        common, own_right, right = (
+            self._prior_information(),
+            np.zeros((count, PARAMETERS)),
+            self._prior_gradient(),
+        )
         lens = np.zeros((count, PARAMETERS))
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
         level = MAIN_SIGMA[0] ** -2.0
         for at in range(count):
             seen = self.seen(at)
-            terms = all_terms(self._grass[at], seen.marking, seen.jacobian, self._plan)
+            terms = pitch_and_marking_terms(
+                self._grass[at], seen.marking, seen.jacobian, self._plan
+            )
             robust = self._problem.robust(seen.offsets, seen.sigmas)
             each = robust * cautious_weights(seen.marking, seen.sigmas) / seen.sigmas**2
             weighted = seen.jacobian * (each / known.noise)[:, None]
@@ -342,7 +348,7 @@ class _Frames:
             common[_PITCH, _PITCH] += weighted_terms.T @ terms
             right[_PITCH] += weighted_terms.T @ seen.offsets
             lens[at] = weighted.T @ (seen.radii**2 * seen.jacobian[:, KAPPA])
-            basis = self._basis(at)
+            basis = self._shared_parameter_basis(at)
             rest = weight * (self.parameters[at][_OWN] - basis @ known.shared)
             own[at][_OWN, _OWN] += weight
             own_right[at][_OWN] -= rest
@@ -351,32 +357,32 @@ class _Frames:
             right += basis.T @ rest
             own[at][ROLL, ROLL] += level
             own_right[at][ROLL] -= level * self.parameters[at][ROLL]
-        return _Parts(own, between, common, own_right, right, lens)
+        return _NormalEquations(own, between, common, own_right, right, lens)
 
-    def _basis(self, at: int) -> FloatArray:
+    def _shared_parameter_basis(self, at: int) -> FloatArray:
         """What the frames share, to the position and distortion of one, shape (4, SHARED)."""
         basis = np.zeros((4, SHARED))
         basis[_PLACE, _PLACE] = np.eye(3)
         basis[3, _LENS] = 1.0, self.parameters[at][LOG_FOCAL] - self._known.zoom
         return basis
 
-    def _sigmas(self) -> FloatArray:
+    def _prior_sigmas(self) -> FloatArray:
         """Of what is thought of the shared numbers beforehand, shape (SHARED,)."""
         lens = [self._policy.distortion_sigma, KAPPA_SLOPE_SIGMA]
         is_main = is_main_position(self._known.position)
         place = MAIN_SIGMA[1:] if is_main else np.full(3, np.inf)
         return np.concatenate([place, lens, np.ones(TERMS)])
 
-    def _prior(self) -> FloatArray:
-        return np.diag(self._sigmas() ** -2.0)
+    def _prior_information(self) -> FloatArray:
+        return np.diag(self._prior_sigmas() ** -2.0)
 
-    def _pull(self) -> FloatArray:
+    def _prior_gradient(self) -> FloatArray:
         """Of the prior, shape (SHARED,)."""
         mean = np.zeros(SHARED)
         mean[_PLACE], mean[_LENS.start] = MAIN_MEAN[1:], self._policy.distortion_mean
-        return np.asarray(self._sigmas() ** -2.0 * (mean - self._known.shared))
+        return np.asarray(self._prior_sigmas() ** -2.0 * (mean - self._known.shared))
 
-    def descend(self) -> TripodPitch:
+    def minimize_cost(self) -> TripodPitch:
         """Gauss-Newton steps until the pitch stays as it is.
 
         Raises:
@@ -385,9 +391,9 @@ class _Frames:
         for _ in range(ROUNDS):
             parts = self.parts()
             alone = np.linalg.solve(parts.own, parts.own_right[..., None])[..., 0]
-            carried = _moves_of_parameters(parts)
+            carried = _parameter_derivatives(parts)
             below = parts.right - np.einsum("nis,ni->s", parts.between, alone)
-            step = np.linalg.solve(_without_frames(parts, carried), below)
+            step = np.linalg.solve(_eliminate_frames(parts, carried), below)
             self.parameters = self.parameters + alone - carried @ step
             self._known = replace(self._known, shared=self._known.shared + step)
             if not np.isfinite(self.parameters).all():
@@ -400,7 +406,7 @@ class _Frames:
             if np.abs(step[_PITCH]).max() < SETTLED:
                 break
         parts = self.parts()
-        covariance = np.linalg.inv(_without_frames(parts, _moves_of_parameters(parts)))
+        covariance = np.linalg.inv(_eliminate_frames(parts, _parameter_derivatives(parts)))
         away = self.parameters[:, X : Z + 1] - self._known.position
         return replace(
             self._known,
@@ -409,12 +415,12 @@ class _Frames:
         )
 
 
-def _moves_of_parameters(parts: _Parts) -> FloatArray:
+def _parameter_derivatives(parts: _NormalEquations) -> FloatArray:
     """How far each frame's parameters move with what is shared, shape (F, 8, SHARED)."""
     return np.asarray(np.linalg.solve(parts.own, parts.between))
 
 
-def _without_frames(parts: _Parts, carried: FloatArray) -> FloatArray:
+def _eliminate_frames(parts: _NormalEquations, carried: FloatArray) -> FloatArray:
     """What is left of the shared part once the frames are eliminated (Schur complement)."""
     return np.asarray(parts.common - np.einsum("nis,nit->st", parts.between, carried))
 
@@ -423,4 +429,4 @@ def project_paint_to_grass(frame: PaintSightings, size: ImageSize) -> FloatArray
     """Where on the grass each place of paint lies by the frame's camera, metres, shape (N, 2)."""
     center = principal_point(size)
     camera = camera_from_parameters(frame.parameters, center, size.diagonal / 2)
-    return np.nan_to_num(camera.on_ground(frame.sightings.pixels + np.array(center)))
+    return np.nan_to_num(camera.project_to_ground(frame.sightings.pixels + np.array(center)))

@@ -132,10 +132,10 @@ def read_settings(**given: object) -> Settings:
         name = "_".join(str(part) for part in first["loc"]).upper()
         raise typer.BadParameter(f"{first['msg']} (TOUCHLINE_{name})") from None
     except SettingsError as error:
-        raise typer.BadParameter(_json_problem(str(error))) from None
+        raise typer.BadParameter(_describe_json_problem(str(error))) from None
 
 
-def _json_problem(error: str) -> str:
+def _describe_json_problem(error: str) -> str:
     """What is wrong with a variable that should hold JSON; nothing of what it holds, maybe a secret."""
     from app.config import Settings
 

@@ -95,7 +95,7 @@ def fetch_findings(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
         yield select_values(item, *names, "confidence", "fix", "dismissed")
 
 
-def solve_values(
+def solve_on_server(
     client: Client, dataset: str, policy: Policy | None, progress: ReportProgress
 ) -> tuple[dict[str, Any], str]:
     """Let the server solve a dataset, by another policy from now on where one is given.
@@ -164,7 +164,7 @@ def plan_or_give_verdicts(
     return plan, None if dry_run else dict(client.post(place, dict(body)))
 
 
-def freeze_values(
+def freeze_on_server(
     client: Client,
     dataset: str,
     request: Mapping[str, Any],
@@ -177,16 +177,16 @@ def freeze_values(
     if dry_run:
         return dict(client.post(place, {**request, "dry_run": True}))
     job = follow_job(client, client.post(place, request), progress)
-    return _version_values(client.get(f"versions/{job['result']['version']}"))
+    return _select_version_values(client.get(f"versions/{job['result']['version']}"))
 
 
 def fetch_versions(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``versions`` has them."""
     items = client.get(f"datasets/{quote_address_part(dataset)}/versions")["items"]
-    return [_version_values(item) for item in items]
+    return [_select_version_values(item) for item in items]
 
 
-def _version_values(item: Mapping[str, Any]) -> dict[str, Any]:
+def _select_version_values(item: Mapping[str, Any]) -> dict[str, Any]:
     policy = {"policy": item["policy"]["name"], "policy_hash": item["policy"]["hash"]}
     return select_values({**item, **policy, "created": format_time(item["created"])}, *VERSION)
 
@@ -194,22 +194,24 @@ def _version_values(item: Mapping[str, Any]) -> dict[str, Any]:
 def fetch_batches(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``batch list`` has them."""
     items = client.get(f"datasets/{quote_address_part(dataset)}/batches")["items"]
-    return [_batch_values(item) for item in items]
+    return [_select_batch_values(item) for item in items]
 
 
 def assign_batch(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
     """Let the server give a batch out; as ``batch give`` has it."""
-    return _batch_values(client.post(f"datasets/{quote_address_part(dataset)}/batches", dict(body)))
+    return _select_batch_values(
+        client.post(f"datasets/{quote_address_part(dataset)}/batches", dict(body))
+    )
 
 
-def read_batch(client: Client, number: int) -> dict[str, Any]:
+def fetch_batch(client: Client, number: int) -> dict[str, Any]:
     """As ``batch show`` has it."""
-    return _batch_values(client.get(f"batches/{number}"))
+    return _select_batch_values(client.get(f"batches/{number}"))
 
 
 def close_batch(client: Client, number: int) -> dict[str, Any]:
     """Let the server give nothing more out of a batch."""
-    return _batch_values(client.patch(f"batches/{number}", {"state": "closed"}))
+    return _select_batch_values(client.patch(f"batches/{number}", {"state": "closed"}))
 
 
 def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -219,10 +221,10 @@ def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[s
 
 def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str, Any]:
     """Let the server mix other many gold groups into a batch."""
-    return _batch_values(client.patch(f"batches/{number}", {"gold_every": gold_every}))
+    return _select_batch_values(client.patch(f"batches/{number}", {"gold_every": gold_every}))
 
 
-def _batch_values(item: Mapping[str, Any]) -> dict[str, Any]:
+def _select_batch_values(item: Mapping[str, Any]) -> dict[str, Any]:
     last = None if item["last"] is None else format_time(item["last"])
     own = {"query": item["q"], "created": format_time(item["created"]), "last": last}
     return select_values({**item, **own}, *BATCH)
@@ -264,7 +266,7 @@ def select_values(values: Mapping[str, Any], *names: str) -> dict[str, Any]:
     return {name: values[name] for name in names}
 
 
-def import_values(
+def import_on_server(
     client: Client,
     dataset: str,
     format_: str,
@@ -294,18 +296,20 @@ def import_values(
             "a policy in a file cannot be sent with an import",
             hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
         )
-    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": send_file(client, lines)}}
+    more: dict[str, Any] = (
+        {} if lines is None else {"lines": {"upload": upload_file(client, lines)}}
+    )
     if frames is not None:
         stored = is_address(frames)
         more["frames"] = (
-            {"folder": frames} if stored else {"upload": send_file(client, Path(frames))}
+            {"folder": frames} if stored else {"upload": upload_file(client, Path(frames))}
         )
     body = {
         "dataset": dataset,
         "format": format_,
         "source": {"folder": path}
         if isinstance(path, str)
-        else {"upload": send_file(client, path)},
+        else {"upload": upload_file(client, path)},
         "options": {**options, **more},
         "policy": policy,
         "dry_run": dry_run,
@@ -316,11 +320,11 @@ def import_values(
         report, problem = error.job["result"], error.job["problem"]
         if not report or not problem:
             raise
-        return _import_report_values(report), (problem["detail"], problem["hint"])
-    return _import_report_values(report), None
+        return _select_import_values(report), (problem["detail"], problem["hint"])
+    return _select_import_values(report), None
 
 
-def _import_report_values(result: Mapping[str, Any]) -> dict[str, Any]:
+def _select_import_values(result: Mapping[str, Any]) -> dict[str, Any]:
     """As ``import`` has it; the server keeps names in their alphabetical order."""
     skipped = [
         select_values(item, "file", "record", "field", "problem") for item in result["skipped"]
@@ -328,7 +332,7 @@ def _import_report_values(result: Mapping[str, Any]) -> dict[str, Any]:
     return {**select_values(result, *IMPORT), "skipped": skipped}
 
 
-def export_values(
+def export_on_server(
     client: Client, out: Path | str, request: Mapping[str, Any], progress: ReportProgress
 ) -> dict[str, Any]:
     """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
@@ -337,7 +341,7 @@ def export_values(
     """
     if isinstance(out, str):
         job = follow_job(client, client.post("exports", {**request, "to": out}), progress)
-        report = _export_report_values(client.get(f"exports/{job['id']}"))
+        report = _select_export_values(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.formats.output import open_output_folder
 
@@ -347,10 +351,10 @@ def export_values(
         found = client.get(f"exports/{job['id']}")
         content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
         unpack_zip(content, folder)
-    return {"out": str(out), "format": request["format"], **_export_report_values(found)}
+    return {"out": str(out), "format": request["format"], **_select_export_values(found)}
 
 
-def _export_report_values(found: Mapping[str, Any]) -> dict[str, Any]:
+def _select_export_values(found: Mapping[str, Any]) -> dict[str, Any]:
     return select_values(found, "counts", "left_out", "missing_images")
 
 
@@ -367,7 +371,7 @@ def evaluate_on_server(
     """
     named = {"predictions": request.predictions, "careful": request.careful}
     sets = {
-        name: _prediction_set_values(client, dataset, source)
+        name: _find_or_send_prediction_set(client, dataset, source)
         for name, source in named.items()
         if not source.is_empty
     }
@@ -394,17 +398,19 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
         InputError: The folder cannot be written.
         UnsafePathError: The server names what would lie outside of it.
     """
-    from app.features.predictions.evaluation import write_parts
+    from app.features.predictions.evaluation import write_evaluation_parts
 
     place = f"evaluations/{values['id']}"
 
-    def fetch(kind: str, name: str, file: Path) -> None:
+    def download_file(kind: str, name: str, file: Path) -> None:
         client.download(f"{place}/{kind}/{quote_address_part(name)}", file)
 
-    write_parts(out, values, client.pages(f"{place}/frames"), fetch)
+    write_evaluation_parts(out, values, client.pages(f"{place}/frames"), download_file)
 
 
-def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
+def _find_or_send_prediction_set(
+    client: Client, dataset: str, source: PredictionFiles
+) -> dict[str, Any]:
     """The set of a source: of its files, which are read once, or of its name."""
     place = f"datasets/{quote_address_part(dataset)}/predictions"
     path = source.path
@@ -418,7 +424,7 @@ def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles
     files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
     sizes = {"size": source.size, "cameras_size": source.cameras_size}
     body: dict[str, Any] = {
-        **{field: send_file(client, file) for field, file in files.items() if file is not None},
+        **{field: upload_file(client, file) for field, file in files.items() if file is not None},
         **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
         "format": source.format,
         "category": source.category,
@@ -426,7 +432,7 @@ def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles
     return dict(client.post(place, body))
 
 
-def send_file(client: Client, path: Path) -> str:
+def upload_file(client: Client, path: Path) -> str:
     """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
     from app.features.imports.upload_queries import upload_id
     from touchline.errors import NotFoundError as NotThere

@@ -54,7 +54,7 @@ class ServerPlace:
 _SERVER: ContextVar[ServerPlace | None] = ContextVar("server", default=None)
 
 
-def work_against_server(url: str | None, token_file: Path | None, command: str | None) -> None:
+def set_current_server(url: str | None, token_file: Path | None, command: str | None) -> None:
     """Let this command work against a server; None: in a home on this machine.
 
     Raises:
@@ -136,15 +136,15 @@ def connect_to_server(server: ServerPlace) -> Iterator[Client]:
         headers["Authorization"] = f"Bearer {read_token(server.token_file)}"
     try:
         with Client(server.url, patience=0, timeout=20) as first:
-            _require_version(server, first)
+            _require_same_version(server, first)
         with Client(server.url, headers=headers) as client:
-            _require_team(server, client)
+            _require_login(server, client)
             yield client
     except TouchlineError as error:
-        raise _command_error(server, error) from error
+        raise _translate_client_error(server, error) from error
 
 
-def _require_version(server: ServerPlace, client: Client) -> None:
+def _require_same_version(server: ServerPlace, client: Client) -> None:
     from app.formats.manifest import read_software_version
 
     mine, found = read_software_version(), None
@@ -163,7 +163,7 @@ def _require_version(server: ServerPlace, client: Client) -> None:
         )
 
 
-def _require_team(server: ServerPlace, client: Client) -> None:
+def _require_login(server: ServerPlace, client: Client) -> None:
     session = client.get("session")
     if session["team"] and session["name"] is None:
         raise InputError(
@@ -177,7 +177,7 @@ def _require_team(server: ServerPlace, client: Client) -> None:
         )
 
 
-def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
+def _translate_client_error(server: ServerPlace, error: Exception) -> ReviewError:
     """The same as an error of a command: what the server said, or why it said nothing."""
     message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
     said_nothing = getattr(error, "status", None) == 0

@@ -61,20 +61,20 @@ def show_progress(what: str) -> Iterator[ReportProgress]:
         last = 0.0
 
         # A bar has no room for sentences.
-        def progress(done: int, total: int | None = None, _sentence: str = "") -> None:
+        def print_progress(done: int, total: int | None = None, _sentence: str = "") -> None:
             nonlocal last
             if done == total or time.monotonic() - last > MIN_SECONDS:
                 last = time.monotonic()
                 bar.update(task, completed=done, total=total)
 
-        yield progress
+        yield print_progress
 
 
 def _print_progress_lines(what: str) -> ReportProgress:
     """Progress in plain lines; what is done within seconds tells none."""
     last = time.monotonic()
 
-    def progress(done: int, total: int | None = None, sentence: str = "") -> None:
+    def print_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         nonlocal last
         if time.monotonic() - last < LINE_SECONDS:
             return
@@ -83,7 +83,7 @@ def _print_progress_lines(what: str) -> ReportProgress:
         stage = f"{sentence.rstrip('.')} ({place})" if sentence else place
         print_error(f"{what}: {stage}")
 
-    return progress
+    return print_progress
 
 
 @contextmanager

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.tracking.ball_frames import Frame, inverse_of, moved_by
-from app.tracking.ball_picture import Grey, disc, likeness
+from app.tracking.ball_frames import BallFrame, apply_homography, invert_homography
+from app.tracking.ball_picture import Grey, make_ball_template, match_template
 from app.tracking.ball_run import DetectedBall, ExpectedPlace
 
 CANDIDATES = 14
@@ -29,7 +29,7 @@ class Peak(NamedTuple):
 
     Attributes:
         x, y: Pixels.
-        alike, contrast: As ``ball_picture.likeness`` has them.
+        alike, contrast: As ``ball_picture.match_template`` has them.
         smear, angle: As of ``ball_picture.disc``.
         added: What a detector says, as a logarithm.
     """
@@ -44,7 +44,7 @@ class Peak(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Candidates:
+class BallCandidates:
     """Places of a frame that may be the ball.
 
     Attributes:
@@ -63,13 +63,13 @@ class Candidates:
 
 
 def find_candidates(
-    frame: Frame,
+    frame: BallFrame,
     size: float,
     area: tuple[FloatArray, FloatArray],
     smears: Sequence[tuple[float, float]],
     detected: Iterable[DetectedBall],
-    earlier: Sequence[tuple[Frame, FloatArray]],
-) -> Candidates:
+    earlier: Sequence[tuple[BallFrame, FloatArray]],
+) -> BallCandidates:
     """The places of a frame that look most like the ball.
 
     Args:
@@ -88,25 +88,29 @@ def find_candidates(
     if right > left and bottom > top:
         wide = frame.part(left - border, top - border, right + border + 1, bottom + border + 1)
         for smear, angle in smears:
-            found += _peaks_of(wide, (left, top), border, size, smear, angle)
+            found += _find_peaks(wide, (left, top), border, size, smear, angle)
     found += [
         Peak(one.x, one.y, 0.62, 1.0, added=4.0 * (one.score - 0.25))
         for one in detected
         if 0.4 < one.diameter / size < 2.5
     ]
-    found = _apart(sorted(found, key=lambda one: -one.alike), 0.4 * size)[:CANDIDATES]
+    found = _suppress_nearby_peaks(sorted(found, key=lambda one: -one.alike), 0.4 * size)[
+        :CANDIDATES
+    ]
     values = np.array(found, float).reshape(-1, 7)
     places, alike, contrast = values[:, :2], values[:, 2], values[:, 3]
     parts = [
-        _part(frame, place, size + smear / 2)
+        _crop_around(frame, place, size + smear / 2)
         for place, smear in zip(places, values[:, 4], strict=True)
     ]
-    looks = _looks(alike, contrast) + values[:, 6]
-    static = _static(places, alike * np.maximum(contrast, 0.05), size, earlier)
-    return Candidates(places, looks, static, parts, values[:, 4:6])
+    looks = _appearance_log_likelihood(alike, contrast) + values[:, 6]
+    static = _measure_static_fraction(places, alike * np.maximum(contrast, 0.05), size, earlier)
+    return BallCandidates(places, looks, static, parts, values[:, 4:6])
 
 
-def looks_with_others(found: Candidates, expected: Iterable[ExpectedPlace]) -> Candidates:
+def reweight_by_other_views(
+    found: BallCandidates, expected: Iterable[ExpectedPlace]
+) -> BallCandidates:
     """The same places, each as much likelier or less as other views say."""
     looks = found.looks
     for one in expected:
@@ -115,25 +119,25 @@ def looks_with_others(found: Candidates, expected: Iterable[ExpectedPlace]) -> C
     return replace(found, looks=looks)
 
 
-def no_places() -> Candidates:
+def make_empty_candidates() -> BallCandidates:
     """Of a frame that nobody can read."""
     empty = np.zeros((0, 2))
-    return Candidates(empty, np.zeros(0), np.zeros((0, len(STATIC_LAGS))), [], empty)
+    return BallCandidates(empty, np.zeros(0), np.zeros((0, len(STATIC_LAGS))), [], empty)
 
 
-def clicked_place(frame: Frame, size: float, x: float, y: float) -> Candidates:
+def make_clicked_candidate(frame: BallFrame, size: float, x: float, y: float) -> BallCandidates:
     """The place at which a person says that the ball is, and no other."""
     place = np.array([x, y])
-    return Candidates(
+    return BallCandidates(
         place[None],
         np.array([CLICKED]),
         np.full((1, len(STATIC_LAGS)), np.nan),
-        [_part(frame, place, size)],
+        [_crop_around(frame, place, size)],
         np.zeros((1, 2)),
     )
 
 
-def _peaks_of(
+def _find_peaks(
     wide: Grey,
     corner: tuple[int, int],
     border: int,
@@ -142,11 +146,11 @@ def _peaks_of(
     angle: float,
 ) -> list[Peak]:
     """Local maxima."""
-    template = disc(round(size * 4) / 4, smear, angle)
+    template = make_ball_template(round(size * 4) / 4, smear, angle)
     side = template.shape[0] // 2
     cut = border - side
     inner = wide[cut : wide.shape[0] - cut, cut : wide.shape[1] - cut]
-    alike, contrast = likeness(inner, template)
+    alike, contrast = match_template(inner, template)
     worth = alike * np.clip(contrast / 0.5, 0, 1)
     around = np.ones((2 * max(round(size / 3), 1) + 1,) * 2, np.uint8)
     peaks = (worth >= cv2.dilate(worth, around)) & (worth > 0.25)
@@ -154,43 +158,43 @@ def _peaks_of(
     order = np.argsort(-worth[rows, columns])[:CANDIDATES]
     found = []
     for row, column in zip(rows[order], columns[order], strict=True):
-        x, y = _top_of(worth, int(row), int(column))
+        x, y = _refine_peak_position(worth, int(row), int(column))
         values = float(alike[row, column]), float(contrast[row, column])
         found.append(Peak(corner[0] + x, corner[1] + y, *values, smear, angle))
     return found
 
 
-def _static(
+def _measure_static_fraction(
     places: FloatArray,
     worth: FloatArray,
     size: float,
-    earlier: Sequence[tuple[Frame, FloatArray]],
+    earlier: Sequence[tuple[BallFrame, FloatArray]],
 ) -> FloatArray:
     """How much of each place was there before, as a share of what is there now, shape (C, lags)."""
     shares = np.full((len(places), len(STATIC_LAGS)), np.nan)
-    template = disc(round(size * 4) / 4)
+    template = make_ball_template(round(size * 4) / 4)
     reach = template.shape[0] // 2 + 2
     for column, lag in enumerate(STATIC_LAGS):
         if lag > len(earlier) or not len(places):
             continue
         frame, way = earlier[lag - 1]
-        there = moved_by(inverse_of(way), places)
+        there = apply_homography(invert_homography(way), places)
         for row, (x, y) in enumerate(there.round().astype(int)):
             if not (0 <= x < frame.size[0] and 0 <= y < frame.size[1]):
                 continue
             part = frame.part(x - reach, y - reach, x + reach + 1, y + reach + 1)
-            alike, contrast = likeness(part, template)
+            alike, contrast = match_template(part, template)
             shares[row, column] = float((alike * np.maximum(contrast, 0)).max()) / worth[row]
     return shares
 
 
-def _looks(alike: FloatArray, contrast: FloatArray) -> FloatArray:
+def _appearance_log_likelihood(alike: FloatArray, contrast: FloatArray) -> FloatArray:
     """How much likelier a look is of the ball than of anything else, as a logarithm."""
     against = np.log(np.clip(contrast, 0.1, 4.0))
     return np.asarray(7.0 * (alike - 0.62) - 1.2 * against**2)
 
 
-def _part(frame: Frame, place: FloatArray, reach: float) -> tuple[Grey, FloatArray]:
+def _crop_around(frame: BallFrame, place: FloatArray, reach: float) -> tuple[Grey, FloatArray]:
     """The picture around a place, with the pixel of its corner."""
     around = round(1.8 * reach) + 6
     x, y = place.round().astype(int)
@@ -198,7 +202,7 @@ def _part(frame: Frame, place: FloatArray, reach: float) -> tuple[Grey, FloatArr
     return frame.part(left, top, x + around + 1, y + around + 1), np.array([left, top], float)
 
 
-def _top_of(values: FloatArray, row: int, column: int) -> tuple[float, float]:
+def _refine_peak_position(values: FloatArray, row: int, column: int) -> tuple[float, float]:
     """Column and row of a maximum between its pixels."""
     place = []
     for at, line in ((column, values[row]), (row, values[:, column])):
@@ -211,7 +215,7 @@ def _top_of(values: FloatArray, row: int, column: int) -> tuple[float, float]:
     return place[0], place[1]
 
 
-def _apart(found: Sequence[Peak], least: float) -> list[Peak]:
+def _suppress_nearby_peaks(found: Sequence[Peak], least: float) -> list[Peak]:
     """Those that no better one is near; what a detector adds to a place goes to that."""
     kept: list[Peak] = []
     for one in found:

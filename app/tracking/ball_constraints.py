@@ -92,7 +92,7 @@ class InstantConstraints:
         return not int(self.may_not[to]) >> kind & 1
 
 
-def constraints_at(times: FloatArray, said: TrackConstraints) -> InstantConstraints:
+def build_instant_constraints(times: FloatArray, said: TrackConstraints) -> InstantConstraints:
     """What is said of a run.
 
     Args:

@@ -13,17 +13,17 @@ import numpy as np
 from app.geometry.arrays import BoolArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_constraints import EventConstraint, PlaceConstraint, TrackConstraints
-from app.tracking.ball_join import joined
+from app.tracking.ball_join import join_runs
 from app.tracking.ball_models import BOUNCE, KICK, REST
-from app.tracking.ball_prediction import summed
+from app.tracking.ball_prediction import summarize_prediction_errors
 from app.tracking.ball_solve import track_ball
-from app.tracking.ball_solve_run import TrackOptions, runs_of, solve_run
+from app.tracking.ball_solve_run import TrackOptions, solve_run, split_into_runs
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
     BallMode,
     BallTrack,
-    Correction,
+    EventCorrection,
     ViewErrors,
 )
 
@@ -56,7 +56,7 @@ class TrackPatch:
             is by ``rows``.
     """
 
-    corrections: tuple[Correction, ...]
+    corrections: tuple[EventCorrection, ...]
     rows: IntArray
     part: BallTrack
 
@@ -65,7 +65,7 @@ def correct_track(
     track: BallTrack,
     measurements: BallMeasurements,
     pitch: Pitch,
-    corrections: Iterable[Correction],
+    corrections: Iterable[EventCorrection],
     known: Sequence[TrackPatch] = (),
 ) -> tuple[TrackPatch, ...]:
     """The parts of a track that corrections change, solved anew.
@@ -89,24 +89,26 @@ def correct_track(
     if not wanted:
         return ()
     if track.reason is not None:
-        return _whole(track, measurements, pitch, tuple(wanted))
+        return _solve_whole_track(track, measurements, pitch, tuple(wanted))
     before = {
         (item.corrections, int(item.part.frames[0]), len(item.part.frames)): item for item in known
     }
     found = []
-    for first, last, said in _clusters(track, [(rows[item.frame], item) for item in wanted]):
+    for first, last, said in _group_corrections(
+        track, [(rows[item.frame], item) for item in wanted]
+    ):
         patch = before.get((said, int(track.frames[first]), last - first + 1))
-        patch = patch or _solved(track, measurements, pitch, first, last, said)
+        patch = patch or _solve_rows(track, measurements, pitch, first, last, said)
         if patch is not None:
             found.append(patch)
     return tuple(found)
 
 
-def patched(
+def apply_patches(
     track: BallTrack,
     measurements: BallMeasurements,
     patches: Sequence[TrackPatch],
-    corrections: Iterable[Correction],
+    corrections: Iterable[EventCorrection],
 ) -> BallTrack:
     """A track with its corrections.
 
@@ -117,11 +119,15 @@ def patched(
         corrections: All of them: an event that the measurements say nothing of stands where the ball is.
     """
     for patch in patches:
-        track = _spliced(track, measurements, patch)
-    return _listed(track, sorted(corrections, key=lambda item: (item.frame, item.kind, item.added)))
+        track = _splice_patch(track, measurements, patch)
+    return _apply_event_corrections(
+        track, sorted(corrections, key=lambda item: (item.frame, item.kind, item.added))
+    )
 
 
-def near_correction(event: BallEvent, corrections: Iterable[Correction], added: bool) -> bool:
+def is_near_correction(
+    event: BallEvent, corrections: Iterable[EventCorrection], added: bool
+) -> bool:
     """Whether an event is one that a person added, or removed."""
     return any(
         item.added == added
@@ -131,11 +137,14 @@ def near_correction(event: BallEvent, corrections: Iterable[Correction], added: 
     )
 
 
-def _whole(
-    track: BallTrack, measurements: BallMeasurements, pitch: Pitch, said: tuple[Correction, ...]
+def _solve_whole_track(
+    track: BallTrack,
+    measurements: BallMeasurements,
+    pitch: Pitch,
+    said: tuple[EventCorrection, ...],
 ) -> tuple[TrackPatch, ...]:
     """What is said may give a track where measurements alone say none."""
-    events = tuple(_event_constraints(track, said))
+    events = tuple(_build_event_constraints(track, said))
     if not events:
         return ()
     found = track_ball(
@@ -146,14 +155,14 @@ def _whole(
     return (TrackPatch(said, np.arange(len(measurements)), found),)
 
 
-def _clusters(
-    track: BallTrack, wanted: Sequence[tuple[int, Correction]]
-) -> Iterator[tuple[int, int, tuple[Correction, ...]]]:
+def _group_corrections(
+    track: BallTrack, wanted: Sequence[tuple[int, EventCorrection]]
+) -> Iterator[tuple[int, int, tuple[EventCorrection, ...]]]:
     """First and last rows that are solved anew together, with their corrections."""
     first = last = -1
-    said: list[Correction] = []
+    said: list[EventCorrection] = []
     for row, item in wanted:
-        begin, end = _reach(track, row, -1), _reach(track, row, 1)
+        begin, end = _find_resolve_limit(track, row, -1), _find_resolve_limit(track, row, 1)
         if said and begin > last:
             yield first, last, tuple(said)
             said = []
@@ -162,7 +171,7 @@ def _clusters(
     yield first, last, tuple(said)
 
 
-def _reach(track: BallTrack, row: int, step: int) -> int:
+def _find_resolve_limit(track: BallTrack, row: int, step: int) -> int:
     """The row up to which a track is solved anew: as far as no two views see the ball."""
     times, at = track.times, row
     events = np.array([event.time_s for event in track.events])
@@ -175,13 +184,13 @@ def _reach(track: BallTrack, row: int, step: int) -> int:
     return at
 
 
-def _solved(
+def _solve_rows(
     track: BallTrack,
     measurements: BallMeasurements,
     pitch: Pitch,
     first: int,
     last: int,
-    corrections: tuple[Correction, ...],
+    corrections: tuple[EventCorrection, ...],
 ) -> TrackPatch | None:
     """The rows from one to another, solved anew; None where measurements say nothing of them."""
     times, frames = track.times, track.frames
@@ -193,26 +202,26 @@ def _solved(
         return None
     near, options = measurements.part(numbers), TrackOptions()
     known = ViewErrors(dict(track.noise), dict(track.offsets))
-    shift = known.shifts(near.names)
+    shift = known.time_shifts(near.names)
     said = TrackConstraints(
-        tuple(_event_constraints(track, corrections)),
-        tuple(_held(track, begin, end, first, last, corrections, pitch)),
+        tuple(_build_event_constraints(track, corrections)),
+        tuple(_build_place_constraints(track, begin, end, first, last, corrections, pitch)),
     )
     own = slice(begin, end + 1)
     runs = [
         solve_run(near, rows, times[own], shift, pitch, options, said, known)
-        for rows in runs_of(near.times, options.longest_gap_s)
+        for rows in split_into_runs(near.times, options.longest_gap_s)
     ]
     if all(run.fitted is None for run in runs):
         return None
-    part = joined(near, frames[own], times[own], runs, shift, pitch, options)
+    part = join_runs(near, frames[own], times[own], runs, shift, pitch, options)
     # Where this says nothing, what the whole track said stays.
     for run in runs:
         if run.fitted is None:
             low, high = near.times[run.rows].min(), near.times[run.rows].max()
             lost = (times[own] > low - options.beyond_s) & (times[own] < high + options.beyond_s)
-            rows = np.flatnonzero(lost & ~_known(part))
-            part = _placed(part, rows, track, rows + begin)
+            rows = np.flatnonzero(lost & ~_has_position(part))
+            part = _replace_rows(part, rows, track, rows + begin)
     inner = (near.frames >= frames[first]) & (near.frames <= frames[last])
     rows = np.arange(first, last + 1) - begin
     left = part.left_out
@@ -234,17 +243,17 @@ def _solved(
             if inner[item.measurement]
         ),
         None,
-        summed(px, near.frames[inner], part.frames[rows]),
+        summarize_prediction_errors(px, near.frames[inner], part.frames[rows]),
         jumps=tuple(jump for jump in part.jumps if frames[first] <= jump.frame <= frames[last]),
     )
     return TrackPatch(corrections, numbers[inner], cut)
 
 
-def _event_constraints(
-    track: BallTrack, corrections: Iterable[Correction]
+def _build_event_constraints(
+    track: BallTrack, corrections: Iterable[EventCorrection]
 ) -> Iterator[EventConstraint]:
     """Kicks and bounces that are forced and forbidden; where both are said, both hold."""
-    step = _step(track)
+    step = _frame_interval_s(track)
     for item in corrections:
         if item.kind in _KINDS:
             at = float(track.times[item.frame - track.frames[0]])
@@ -253,17 +262,17 @@ def _event_constraints(
             yield EventConstraint(_KINDS[item.kind], at - slack, at + slack, item.added)
 
 
-def _held(
+def _build_place_constraints(
     track: BallTrack,
     begin: int,
     end: int,
     first: int,
     last: int,
-    corrections: Iterable[Correction],
+    corrections: Iterable[EventCorrection],
     pitch: Pitch,
 ) -> Iterator[PlaceConstraint]:
     """Where the rest of the track holds the ball, and the lines at which it is said to be out."""
-    known = _known(track)
+    known = _has_position(track)
     for rows in (range(begin, first), range(end, last, -1)):
         row = next((row for row in rows if known[row]), None)
         if row is None:
@@ -288,16 +297,18 @@ def _held(
             yield PlaceConstraint(float(track.times[row]), normal, line, _LINE_SIGMA_M)
 
 
-def _step(track: BallTrack) -> float:
+def _frame_interval_s(track: BallTrack) -> float:
     """Seconds from frame to frame."""
     return float(np.median(np.diff(track.times))) if len(track.times) > 1 else 0.0
 
 
-def _known(track: BallTrack) -> BoolArray:
+def _has_position(track: BallTrack) -> BoolArray:
     return np.asarray(np.isfinite(track.position).all(axis=1))
 
 
-def _placed(track: BallTrack, rows: IntArray, other: BallTrack, places: IntArray) -> BallTrack:
+def _replace_rows(
+    track: BallTrack, rows: IntArray, other: BallTrack, places: IntArray
+) -> BallTrack:
     """A track with the ball of some of its rows as another one has it in as many."""
     position, velocity = track.position.copy(), track.velocity.copy()
     covariance = track.covariance.copy()
@@ -321,13 +332,13 @@ def _placed(track: BallTrack, rows: IntArray, other: BallTrack, places: IntArray
     )
 
 
-def _spliced(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch) -> BallTrack:
+def _splice_patch(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch) -> BallTrack:
     part = patch.part
     if track.reason is not None:
         return part
     first, last = int(part.frames[0]), int(part.frames[-1])
     rows = np.arange(len(part.frames))
-    whole = _placed(track, rows + first - int(track.frames[0]), part, rows)
+    whole = _replace_rows(track, rows + first - int(track.frames[0]), part, rows)
     taken = set(patch.rows.tolist())
     beside = [event for event in track.events if not first <= event.frame <= last]
     jumps = [jump for jump in track.jumps if not first <= jump.frame <= last]
@@ -336,7 +347,7 @@ def _spliced(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch
     if left is not None and part.left_out is not None:
         px = left.px.copy()
         px[patch.rows] = part.left_out.px
-        left = summed(px, measurements.frames, track.frames)
+        left = summarize_prediction_errors(px, measurements.frames, track.frames)
     return replace(
         whole,
         events=tuple(sorted([*beside, *part.events], key=lambda event: event.time_s)),
@@ -348,7 +359,7 @@ def _spliced(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch
     )
 
 
-def _listed(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
+def _apply_event_corrections(track: BallTrack, corrections: Sequence[EventCorrection]) -> BallTrack:
     """A track with the events that people added and without those they removed."""
     events, mode = list(track.events), list(track.mode)
     rows = {int(frame): row for row, frame in enumerate(track.frames)}
@@ -360,22 +371,22 @@ def _listed(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
             gone = [
                 event
                 for event in events
-                if near_correction(event, [item], added=False)
-                and not near_correction(event, corrections, added=True)
+                if is_near_correction(event, [item], added=False)
+                and not is_near_correction(event, corrections, added=True)
             ]
             events = [event for event in events if all(event is not other for other in gone)]
             if item.kind == "out" and gone:
-                _stays_in(track, mode, rows[gone[0].frame])
+                _set_in_play_from(track, mode, rows[gone[0].frame])
         elif np.isfinite(track.position[row]).all() and not any(
-            near_correction(event, [item], added=True) for event in events
+            is_near_correction(event, [item], added=True) for event in events
         ):
-            time, half = float(track.times[row]), _step(track) / 2
+            time, half = float(track.times[row]), _frame_interval_s(track) / 2
             events.append(BallEvent(item.frame, time, item.kind, track.position[row], half))
     events.sort(key=lambda event: event.time_s)
     return replace(track, events=tuple(events), mode=tuple(mode))
 
 
-def _stays_in(track: BallTrack, mode: list[BallMode], row: int) -> None:
+def _set_in_play_from(track: BallTrack, mode: list[BallMode], row: int) -> None:
     """Let a ball that somebody says is not out do what its height says, from a row on."""
     while row < len(mode) and mode[row] != "out":
         row += 1

@@ -14,7 +14,7 @@ INEXACT_PX = 12.0
 HIGHEST_M, FARTHEST_M, STEPS = 20.0, 300.0, 64
 
 
-def place_of(expected: ExpectedBall) -> ExpectedPlace:
+def make_expected_place(expected: ExpectedBall) -> ExpectedPlace:
     """Where the 3D ball of the other views is seen."""
     spread = np.array(expected.covariance, float).reshape(2, 2)
     known = np.isfinite(spread).all()
@@ -23,7 +23,7 @@ def place_of(expected: ExpectedBall) -> ExpectedPlace:
     return ExpectedPlace(place, place, float(np.hypot(INEXACT_PX, sigma)))
 
 
-def segment_of(
+def project_ray_segment(
     source: Camera, ball: ImagePoint, target: Camera, size: ImageSize
 ) -> ExpectedPlace | None:
     """Where the ray of another view's ball runs through a picture, between the grass and 20 m above it.

@@ -45,7 +45,7 @@ OUTLIER = np.log(0.01 / 1000.0**2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def move(m, P, mode, dt):
+def predict_state(m, P, mode, dt):
     """Carry a state, shape (6,), and its covariance over a time without events, in place."""
     if dt <= 0.0:
         return
@@ -101,7 +101,7 @@ def move(m, P, mode, dt):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def pin(m, P, e, value, variance):
+def apply_linear_measurement(m, P, e, value, variance):
     """Take a measurement ``e . position = value``; the square of its miss by its variance, and that."""
     # Most of a search is spent here: without an array of its own, and with one division, it takes a third.
     x, y, z = e[0], e[1], e[2]
@@ -128,7 +128,7 @@ def pin(m, P, e, value, variance):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def copy(to_m, to_P, m, P):
+def copy_state(to_m, to_P, m, P):
     for i in range(6):
         to_m[i] = m[i]
         for j in range(6):
@@ -136,7 +136,7 @@ def copy(to_m, to_P, m, P):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def forget(P, first, last):
+def clear_covariance(P, first, last):
     for i in range(first, last):
         for j in range(6):
             P[i, j] = 0.0
@@ -144,20 +144,22 @@ def forget(P, first, last):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def touch(m, P, before, mode, dt):
+def apply_kick(m, P, before, mode, dt):
     """A kick at an unknown time between two knots, in place; its logarithm of probability."""
     cost = np.log(KICKS_A_SECOND * max(dt, 1e-3))
-    move(m, P, before, dt / 2)
+    predict_state(m, P, before, dt / 2)
     if before == FLIGHT and mode != ROLL:
         up = np.array([0.0, 0.0, 1.0])
-        square, _ = pin(m, P, up, -TOUCHED, TOUCHED_SIGMA**2)
+        square, _ = apply_linear_measurement(m, P, up, -TOUCHED, TOUCHED_SIGMA**2)
         cost -= min(square / 2, 12.0)
     spread = dt * dt / 12 * (m[3] ** 2 + m[4] ** 2 + KICK_SPEED**2)
     if mode == ROLL:
         cost += np.log(0.5)
-        square, total = pin(m, P, np.array([0.0, 0.0, 1.0]), -REST, 4 * GRASS_SIGMA**2)
+        square, total = apply_linear_measurement(
+            m, P, np.array([0.0, 0.0, 1.0]), -REST, 4 * GRASS_SIGMA**2
+        )
         cost += min(0.0, -square / 2 - np.log(total) / 2 + np.log(0.4))
-        forget(P, 3, 6)
+        clear_covariance(P, 3, 6)
         m[5] = 0.0
         if before == ROLL:
             P[3, 3] = P[4, 4] = TOUCH_SPEED**2
@@ -169,7 +171,7 @@ def touch(m, P, before, mode, dt):
         P[2, 2] += GRASS_SIGMA**2
     elif mode == FLIGHT:
         cost += np.log(0.5)
-        forget(P, 3, 6)
+        clear_covariance(P, 3, 6)
         m[3] *= 0.2
         m[4] *= 0.2
         m[5] = -3.0
@@ -185,20 +187,20 @@ def touch(m, P, before, mode, dt):
         m[5] *= 0.2
     for i in range(3):
         P[i, i] += spread
-    move(m, P, mode, dt / 2)
+    predict_state(m, P, mode, dt / 2)
     return cost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def most_of_touch(mode, dt):
-    """The largest logarithm of probability that ``touch`` gives."""
+def max_kick_log_probability(mode, dt):
+    """The largest logarithm of probability that ``apply_kick`` gives."""
     if mode == HELD:
         return np.log(HOLDS_A_SECOND * max(dt, 1e-3))
     return np.log(KICKS_A_SECOND * max(dt, 1e-3)) + np.log(0.5)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bounce(m, P, mode, dt):
+def apply_bounce(m, P, mode, dt):
     """A bounce between two knots, in place; its logarithm of probability, -inf where there is none."""
     fall = m[5]
     height = -m[2] - REST
@@ -208,10 +210,10 @@ def bounce(m, P, mode, dt):
     when = min(max(height / fall, 0.0), dt)
     if abs(height - fall * when) > 1.0 + 4 * np.sqrt(P[2, 2]):
         return -np.inf
-    move(m, P, FLIGHT, when)
+    predict_state(m, P, FLIGHT, when)
     fall = max(m[5], 0.3)
     slack = (fall * dt) ** 2 / 12 + 0.04**2
-    square, total = pin(m, P, np.array([0.0, 0.0, 1.0]), -REST, slack)
+    square, total = apply_linear_measurement(m, P, np.array([0.0, 0.0, 1.0]), -REST, slack)
     cost = (
         -square / 2
         - np.log(2 * np.pi * total) / 2
@@ -239,21 +241,21 @@ def bounce(m, P, mode, dt):
     P[0, 0] += spread
     P[1, 1] += spread
     P[2, 2] += dt * dt / 12 * (1.6 * fall) ** 2 + 1e-4
-    move(m, P, mode, dt - when)
+    predict_state(m, P, mode, dt - when)
     return cost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def jump(m, P, mode, dt):
+def apply_view_jump(m, P, mode, dt):
     """The place that other cameras put a ball at, in place; its logarithm of probability."""
-    move(m, P, mode, dt)
+    predict_state(m, P, mode, dt)
     for i in range(3):
         P[i, i] += JUMP_SIGMA**2
     return np.log(JUMP_SHARE)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def see(
+def apply_knot_measurements(
     m, P, first, last, centres, across, along, noise, scale, far, far_sigma, kept_m, kept_P
 ):  # fmt: skip
     """Take the measurements of a knot, in place; their log likelihood and those left out, as bits.
@@ -267,21 +269,23 @@ def see(
             reach += along[row, i] * (m[i] - centres[row, i])
         reach = min(max(reach, 3.0), 200.0)
         likely = 0.0
-        copy(kept_m, kept_P, m, P)
+        copy_state(kept_m, kept_P, m, P)
         for which in range(2):
             e = across[row, which]
             value = e[0] * centres[row, 0] + e[1] * centres[row, 1] + e[2] * centres[row, 2]
-            square, spread = pin(m, P, e, value, (noise[row] * reach) ** 2)
+            square, spread = apply_linear_measurement(m, P, e, value, (noise[row] * reach) ** 2)
             # Metres at this reach to pixels.
             pixels = np.sqrt(spread) / reach * scale[row]
             likely += -square / 2 - np.log(pixels) - 0.919
         if far_sigma[row] > 0:
             e = along[row]
             value = e[0] * centres[row, 0] + e[1] * centres[row, 1] + e[2] * centres[row, 2]
-            square, spread = pin(m, P, e, value + far[row], far_sigma[row] ** 2)
+            square, spread = apply_linear_measurement(
+                m, P, e, value + far[row], far_sigma[row] ** 2
+            )
             likely += max(-square / 2, -4.0) - np.log(np.sqrt(spread) / far_sigma[row])
         if likely < OUTLIER:
-            copy(m, P, kept_m, kept_P)
+            copy_state(m, P, kept_m, kept_P)
             likely = OUTLIER
             left |= 1 << (row - first)
         total += likely

@@ -16,9 +16,9 @@ from app.tracking.ball_fit_kernels import (
     FREEDOM,
     NEAR_M,
     SIZE,
-    equations,
-    factor,
-    hit,
+    build_normal_equations,
+    compute_hit_residuals,
+    factor_block_tridiagonal,
     inverse_blocks,
     solve_factored,
 )
@@ -42,7 +42,7 @@ from app.tracking.ball_models import (
     SPIN_S,
     SPIN_SHARE,
 )
-from app.tracking.ball_search import Knots
+from app.tracking.ball_search import TrackKnots
 
 P, V = slice(0, 3), slice(3, 6)
 """Where position and velocity stand in a state."""
@@ -56,7 +56,7 @@ _ROUGH = 0.0016
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedPath:
     """The smooth way.
 
     Attributes:
@@ -82,8 +82,8 @@ class Fitted:
     late_pull: FloatArray
 
 
-def fit(
-    knots: Knots,
+def fit_ball_path(
+    knots: TrackKnots,
     mode: IntArray,
     event: IntArray,
     used: BoolArray,
@@ -92,7 +92,7 @@ def fit(
     unseen: FloatArray,
     *,
     brief: bool = False,
-) -> Fitted:
+) -> FittedPath:
     """Fit the way of a ball.
 
     Args:
@@ -106,31 +106,31 @@ def fit(
             knot, (m/s2)2 s, shape (K,).
         brief: Leave out what only a result tells: ``event_sigma`` is NaN, and nothing is late.
     """
-    problem = _Problem(knots, mode, event, used, noise, unseen, start)
+    problem = _PathProblem(knots, mode, event, used, noise, unseen, start)
     state = start
     for _ in range(_ROUNDS):
-        diagonal, beside, pull = problem.equations(state)
-        rows = factor(diagonal, beside)
+        diagonal, beside, pull = problem.compute_normal_equations(state)
+        rows = factor_block_tridiagonal(diagonal, beside)
         step = -solve_factored(rows, pull.ravel()).reshape(-1, SIZE)
         most = float(np.abs(step[:, P]).max())
         state = state + step * min(1.0, _MOST_M / max(most, 1e-12))
         if most < _SETTLED_M:
             break
-    diagonal, beside, _ = problem.equations(state)
-    rows = factor(diagonal, beside)
+    diagonal, beside, _ = problem.compute_normal_equations(state)
+    rows = factor_block_tridiagonal(diagonal, beside)
     covariance, after = inverse_blocks(rows)
     when, spread = problem.events(state, None if brief else (covariance, after))
     miss, slope, weight = problem.misses(state)
-    late = (np.zeros((0, 0)), np.zeros(0)) if brief else problem.lateness(state, rows)
-    return Fitted(state, covariance, miss, slope, weight, when, spread, *late)
+    late = (np.zeros((0, 0)), np.zeros(0)) if brief else problem.time_offset_equations(state, rows)
+    return FittedPath(state, covariance, miss, slope, weight, when, spread, *late)
 
 
-class _Problem:
+class _PathProblem:
     """The equations of a fit."""
 
     def __init__(
         self,
-        knots: Knots,
+        knots: TrackKnots,
         mode: IntArray,
         event: IntArray,
         used: BoolArray,
@@ -142,9 +142,9 @@ class _Problem:
         self.used, self.noise = used, noise
         self.dt = np.diff(knots.times)
         self.loud = np.flatnonzero((event[1:] == KICK) | (event[1:] == BOUNCE))
-        turned = spin(np.linalg.norm(start[:-1, V], axis=1))
+        turned = spin_acceleration_sigma(np.linalg.norm(start[:-1, V], axis=1))
         jumps = event[1:] == JUMP
-        self.way, self.inverse = quiet_noise(mode[1:], self.dt, unseen[1:], turned, jumps)
+        self.way, self.inverse = event_free_transition(mode[1:], self.dt, unseen[1:], turned, jumps)
 
     def misses(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Misses of the rays by their noise, (R, 2); their slopes, (R, 2, 3); and weights, (R,)."""
@@ -160,7 +160,9 @@ class _Problem:
         weight = (FREEDOM + 2) / (FREEDOM + (miss**2).sum(axis=1))
         return miss, slope, np.where(self.used, np.minimum(weight, 1.0), 0.0)
 
-    def equations(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def compute_normal_equations(
+        self, state: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Diagonal blocks, (K, 9, 9); those beside them, (K - 1, 9, 9); and the pull, (K, 9)."""
         knots, asked = self.knots, self.knots.asked
         # What is known before anything is seen.
@@ -168,7 +170,7 @@ class _Problem:
         begin = np.array([0, 0, -REST if roll else -2.0, 0, 0, 0, 0, 0, 0])
         lift = (GRASS_SIGMA, 0.1, 0.5) if roll else (4.0, 5.0, 2.0)
         sigma = np.array([40, 30, lift[0], 10, 10, lift[1], 2.0, 2.0, lift[2]])
-        found: tuple[FloatArray, FloatArray, FloatArray] = equations(
+        found: tuple[FloatArray, FloatArray, FloatArray] = build_normal_equations(
             state, self.mode, self.event, self.dt, self.way, self.inverse,
             knots.at, self.used, self.noise, knots.centres, knots.along, knots.across,
             knots.far, knots.far_sigma, asked.at, asked.normal, asked.value, asked.sigma,
@@ -182,7 +184,7 @@ class _Problem:
         """Times of the events before each knot, and their sigmas, NaN without blocks of covariance, both (K,)."""
         when, spread = np.full(len(state), np.nan), np.full(len(state), np.nan)
         for at in self.loud.tolist():
-            _, slopes, own, way, time, slack = hit(
+            _, slopes, own, way, time, slack = compute_hit_residuals(
                 state[at], state[at + 1], self.dt[at], self.mode[at], self.mode[at + 1],
                 self.event[at + 1] == BOUNCE,
             )  # fmt: skip
@@ -197,7 +199,9 @@ class _Problem:
             spread[at + 1] = np.sqrt(1 / (1 / slack + gain))
         return when, spread
 
-    def lateness(self, state: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def time_offset_equations(
+        self, state: FloatArray, rows: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """What the rays say of the views' times when the ball's way may follow, (V, V) and (V,)."""
         knots = self.knots
         miss, slope, weight = self.misses(state)
@@ -217,12 +221,12 @@ class _Problem:
         return (known + known.T) / 2, pull
 
 
-def spin(speed: FloatArray) -> FloatArray:
+def spin_acceleration_sigma(speed: FloatArray) -> FloatArray:
     """Standard deviation of the acceleration by spin and wind at a speed, m/s2."""
     return SPIN_SHARE * DRAG * np.minimum(speed, 30.0) ** 2 + SPIN_LEAST
 
 
-def quiet_noise(
+def event_free_transition(
     mode: IntArray, dt: FloatArray, unseen: FloatArray, strong_spin: FloatArray, jumps: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """How states move without events and without drag, and the inverse of the noise, (N, 9, 9) each.
@@ -231,7 +235,7 @@ def quiet_noise(
         mode: Of each interval, shape (N,).
         dt: Seconds, shape (N,).
         unseen: What touches that nobody saw add to the acceleration's noise, (m/s2)2 s, shape (N,).
-        strong_spin: From ``spin``, shape (N,).
+        strong_spin: From ``spin_acceleration_sigma``, shape (N,).
         jumps: Whether other cameras, which are not exact, see the ball from there on, shape (N,).
     """
     count = len(mode)

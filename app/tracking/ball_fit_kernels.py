@@ -45,7 +45,7 @@ _ROWS = 10
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def hit(a, b, dt, before, after, bounce):
+def compute_hit_residuals(a, b, dt, before, after, bounce):
     """An interval with a kick or a bounce at an unknown time.
 
     Args:
@@ -132,7 +132,7 @@ def hit(a, b, dt, before, after, bounce):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def equations(
+def build_normal_equations(
     state, mode, event, dt, way, inverse, at, used, noise, centres, along, across, far, far_sigma,
     places, normal, value, sigma, begin, begin_sigma,
 ):  # fmt: skip
@@ -164,7 +164,7 @@ def equations(
         pull[0, i] += (state[0, i] - begin[i]) * begin_sigma[i] ** -2
     for ray in range(len(at)):
         if used[ray]:
-            _see(
+            _add_ray_equations(
                 state[at[ray]], diagonal[at[ray]], pull[at[ray]], noise[ray], centres[ray],
                 along[ray], across[ray], far[ray], far_sigma[ray],
             )  # fmt: skip
@@ -185,9 +185,11 @@ def equations(
     for before in range(count - 1):
         after = before + 1
         if event[after] == KICK or event[after] == BOUNCE:
-            _tie_hit(state, mode, event[after] == BOUNCE, dt, before, diagonal, beside, pull)
+            _add_hit_equations(
+                state, mode, event[after] == BOUNCE, dt, before, diagonal, beside, pull
+            )
         else:
-            _tie(
+            _add_motion_equations(
                 state, mode[after], dt[before], before, way[before], inverse[before],
                 diagonal, beside, pull,
             )  # fmt: skip
@@ -195,7 +197,7 @@ def equations(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _see(state, diagonal, pull, noise, centre, along, across, far, far_sigma):
+def _add_ray_equations(state, diagonal, pull, noise, centre, along, across, far, far_sigma):
     """A ray, and the distance by size."""
     off, reach = np.zeros(3), 0.0
     for i in range(3):
@@ -226,10 +228,10 @@ def _see(state, diagonal, pull, noise, centre, along, across, far, far_sigma):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _tie_hit(state, mode, bounce, dt, before, diagonal, beside, pull):
+def _add_hit_equations(state, mode, bounce, dt, before, diagonal, beside, pull):
     """An interval with a kick or a bounce."""
     after = before + 1
-    miss, slopes, noise, way, _, spread = hit(
+    miss, slopes, noise, way, _, spread = compute_hit_residuals(
         state[before], state[after], dt[before], mode[before], mode[after], bounce
     )
     # The inverse of the noise and of what the unknown time adds to it: Sherman and Morrison.
@@ -260,7 +262,7 @@ def _tie_hit(state, mode, bounce, dt, before, diagonal, beside, pull):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _tie(state, mode, dt, before, still, inverse, diagonal, beside, pull):
+def _add_motion_equations(state, mode, dt, before, still, inverse, diagonal, beside, pull):
     """An interval without an event."""
     after, half = before + 1, dt**2 / 2
     a, b = state[before], state[after]
@@ -313,7 +315,7 @@ def _tie(state, mode, dt, before, still, inverse, diagonal, beside, pull):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def factor(diagonal, beside):
+def factor_block_tridiagonal(diagonal, beside):
     """Cholesky factor of a positive definite block tridiagonal matrix.
 
     Args:
@@ -352,7 +354,7 @@ def factor(diagonal, beside):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def solve_factored(rows, right):
-    """Solve for a right side, shape (K * S,), with the factor of ``factor``."""
+    """Solve for a right side, shape (K * S,), with the factor of ``factor_block_tridiagonal``."""
     count, size, wide = rows.shape
     found = np.zeros((count + 1) * size)
     found[: count * size] = right

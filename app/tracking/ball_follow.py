@@ -18,14 +18,26 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.tracking.ball_candidates import (
     STATIC_LAGS,
-    Candidates,
-    clicked_place,
+    BallCandidates,
     find_candidates,
-    looks_with_others,
-    no_places,
+    make_clicked_candidate,
+    make_empty_candidates,
+    reweight_by_other_views,
 )
-from app.tracking.ball_frames import Frame, inverse_of, moved_by, turn_between
-from app.tracking.ball_picture import BallColour, BallSpot, Image, find_ball, find_like, fit_disc
+from app.tracking.ball_frames import (
+    BallFrame,
+    apply_homography,
+    estimate_background_homography,
+    invert_homography,
+)
+from app.tracking.ball_picture import (
+    BallColour,
+    BallSpot,
+    Image,
+    find_ball,
+    find_similar_ball,
+    fit_disc,
+)
 from app.tracking.ball_run import (
     BallClick,
     BallRun,
@@ -58,12 +70,12 @@ SAME = 0.7
 """Diameters within which two places are the same ball."""
 
 
-def expected_diameter(camera: Camera, x: float, y: float) -> float | None:
+def expected_ball_diameter(camera: Camera, x: float, y: float) -> float | None:
     """Of a ball that lies on the grass where a pixel looks, pixels; None where it looks at none.
 
     One in the air is nearer and larger.
     """
-    ground = camera.on_ground(np.array([[x, y]]))[0]
+    ground = camera.project_to_ground(np.array([[x, y]]))[0]
     if not np.isfinite(ground).all() or np.hypot(*ground) > 150:
         return None
     depth = float(camera.pitch_to_camera(np.array([[*ground, -BALL_M / 2]]))[0, 2])
@@ -94,30 +106,32 @@ def follow_ball(
     """
     hints = hints or FollowHints()
     number, x, y = click.frame, click.x, click.y
-    image = _needed(read, number)
+    image = _read_required_frame(read, number)
     camera = hints.cameras.get(number)
-    expected = None if camera is None else expected_diameter(camera, x, y)
+    expected = None if camera is None else expected_ball_diameter(camera, x, y)
     if hints.seen is None:
         found = find_ball(image, x, y, expected)
         if found is None:
             return None
         spot, colour = found
     else:
-        spot, colour = _found_again(_needed(read, hints.seen.frame), image, click, expected, hints)
+        spot, colour = _find_ball_by_appearance(
+            _read_required_frame(read, hints.seen.frame), image, click, expected, hints
+        )
     first = FollowedBall(number, spot.x, spot.y, spot.diameter, spot.sigma_px, 1.0, "followed")
     clicks = {one.frame: one for one in hints.clicks if one.frame != number} | {number: click}
     ways, ends = [], list[End]()
     done = 0
     sides = list(before), list(after)
     for wanted, behind in (sides, sides[::-1]):
-        lead = _lead(click, clicks, behind)
+        lead = _list_lead_in_frames(click, clicks, behind)
         begin = read(lead[0]) if lead else None
         if begin is None:
             start, at, begin, lead = click, spot, image, []
         else:
             start = clicks[lead[0]]
             at = replace(spot, x=start.x, y=start.y)
-        way = _Way(Frame.of(start.frame, begin, colour), at, hints, clicks)
+        way = _BallFollower(BallFrame.of(start.frame, begin, colour), at, hints, clicks)
         for each in lead[1:]:
             way.step(each, read(each), colour)
         end: End = "limit"
@@ -136,14 +150,16 @@ def follow_ball(
     return BallRun((click,), (*reversed(ways[0]), first, *ways[1]), *ends)
 
 
-def _needed(read: Callable[[int], Image | None], number: int) -> Image:
+def _read_required_frame(read: Callable[[int], Image | None], number: int) -> Image:
     image = read(number)
     if image is None:
         raise ImageError(f"frame {number} cannot be read")
     return image
 
 
-def _lead(click: BallClick, clicks: Mapping[int, BallClick], behind: Sequence[int]) -> list[int]:
+def _list_lead_in_frames(
+    click: BallClick, clicks: Mapping[int, BallClick], behind: Sequence[int]
+) -> list[int]:
     """Frames from the nearest other click behind a click to itself, which tell how the ball moves; empty without one.
 
     Args:
@@ -156,7 +172,7 @@ def _lead(click: BallClick, clicks: Mapping[int, BallClick], behind: Sequence[in
     return [] if place is None else [*reversed(near[: place + 1]), click.frame]
 
 
-def _found_again(
+def _find_ball_by_appearance(
     other: Image, image: Image, click: BallClick, expected: float | None, hints: FollowHints
 ) -> tuple[BallSpot, BallColour]:
     """The ball at a click by how it looks in another frame, and at the click itself where it does not."""
@@ -164,14 +180,14 @@ def _found_again(
     assert seen is not None
     colour, size = BallColour.of(other, seen.x, seen.y, seen.diameter), seen.diameter
     camera = hints.cameras.get(seen.frame)
-    there = None if camera is None else expected_diameter(camera, seen.x, seen.y)
+    there = None if camera is None else expected_ball_diameter(camera, seen.x, seen.y)
     if expected is not None and there is not None:
         size *= expected / there
-    return find_like(colour.grey(image), click.x, click.y, size), colour
+    return find_similar_ball(colour.grey(image), click.x, click.y, size), colour
 
 
 @dataclass(frozen=True)
-class _Step:
+class _FrameHistories:
     """The histories that are kept at a frame, H of them.
 
     Attributes:
@@ -187,15 +203,15 @@ class _Step:
     parents: IntArray
     chosen: IntArray
     scores: FloatArray
-    candidates: Candidates
+    candidates: BallCandidates
 
 
-class _Way:
+class _BallFollower:
     """Follows a ball one way, frame by frame."""
 
     def __init__(
         self,
-        frame: Frame,
+        frame: BallFrame,
         spot: BallSpot,
         hints: FollowHints,
         clicks: Mapping[int, BallClick],
@@ -209,8 +225,8 @@ class _Way:
         self._scores = np.zeros(1)
         longest = max(STATIC_LAGS)
         self._trail: FloatArray = np.full((1, longest, 2), np.nan)
-        self._earlier: deque[tuple[Frame, FloatArray]] = deque(maxlen=longest)
-        self._steps: list[_Step] = []
+        self._earlier: deque[tuple[BallFrame, FloatArray]] = deque(maxlen=longest)
+        self._steps: list[_FrameHistories] = []
 
     def step(self, number: int, image: Image | None, colour: BallColour) -> End | None:
         """Look at the next frame, or pass one that nobody has; returns why the way ends there."""
@@ -218,18 +234,22 @@ class _Way:
         if image is None:
             frame = replace(self._last, number=number)
         else:
-            frame = Frame.of(number, image, colour)
-        turn = np.eye(3) if still else turn_between(self._last, frame, self._hints.cameras)
-        self._carry(frame, turn)
+            frame = BallFrame.of(number, image, colour)
+        turn = (
+            np.eye(3)
+            if still
+            else estimate_background_homography(self._last, frame, self._hints.cameras)
+        )
+        self._transform_to_frame(frame, turn)
         click = self._clicks.get(number)
         if image is None:
-            candidates = no_places()
+            candidates = make_empty_candidates()
         elif click is None:
             others = self._hints.expected.get(number, ())
-            candidates = looks_with_others(self._look(frame), others)
+            candidates = reweight_by_other_views(self._find_frame_candidates(frame), others)
         else:
-            candidates = clicked_place(frame, self._diameter, click.x, click.y)
-        self._choose(frame, candidates)
+            candidates = make_clicked_candidate(frame, self._diameter, click.x, click.y)
+        self._extend_histories(frame, candidates)
         self._last = frame
         best = self._places[0]
         margin = self._diameter / 2
@@ -237,31 +257,31 @@ class _Way:
             return "left"
         return "lost" if self._missed[0] > MOST_MISSED else None
 
-    def _carry(self, frame: Frame, turn: FloatArray) -> None:
+    def _transform_to_frame(self, frame: BallFrame, turn: FloatArray) -> None:
         """Everything in pixels of the next frame."""
         self._earlier = deque(
             ((one, turn @ way) for one, way in [(self._last, np.eye(3)), *self._earlier]),
             maxlen=self._earlier.maxlen,
         )
-        places = moved_by(turn, self._places)
-        ahead = moved_by(turn, self._places + self._speeds)
+        places = apply_homography(turn, self._places)
+        ahead = apply_homography(turn, self._places + self._speeds)
         trail: FloatArray = np.concatenate([self._places[:, None], self._trail[:, :-1]], axis=1)
-        self._trail = moved_by(turn, trail.reshape(-1, 2)).reshape(trail.shape)
+        self._trail = apply_homography(turn, trail.reshape(-1, 2)).reshape(trail.shape)
         one = np.array([[1.0, 0.0], [0.0, 1.0]])
-        edge = moved_by(turn, self._places[:1] + one) - places[:1]
+        edge = apply_homography(turn, self._places[:1] + one) - places[:1]
         scale = float(np.sqrt(abs(np.linalg.det(edge))))
         self._diameter *= float(np.clip(scale, 0.9, 1.1))
         self._places, self._speeds = places, ahead - places
         camera = self._hints.cameras.get(frame.number)
-        if camera is not None and (lies := expected_diameter(camera, *places[0])) is not None:
+        if camera is not None and (lies := expected_ball_diameter(camera, *places[0])) is not None:
             self._diameter = float(np.clip(self._diameter, 0.85 * lies, 1.8 * lies))
 
-    def _look(self, frame: Frame) -> Candidates:
+    def _find_frame_candidates(self, frame: BallFrame) -> BallCandidates:
         """The places that look most like the ball where histories may have gone."""
         size = self._diameter
         speed = np.hypot(*self._speeds.T)
         reach = size * REACH * (1 + 0.15 * self._missed) + 0.5 * speed * (1 + self._missed)
-        ahead = self._ahead()
+        ahead = self._predict_places()
         worth = self._scores > self._scores.max() - DEEPEST / 2
         centers = [*ahead[worth], *self._places[worth]]
         reaches = [*reach[worth], *np.full(int(worth.sum()), size * REACH)]
@@ -272,13 +292,13 @@ class _Way:
         high = np.minimum(high, middle + LARGEST_ROI / 2).round()
         detected = self._hints.detected.get(frame.number, ())
         return find_candidates(
-            frame, size, (low, high), self._smears(), detected, list(self._earlier)
+            frame, size, (low, high), self._list_motion_blurs(), detected, list(self._earlier)
         )
 
-    def _ahead(self) -> FloatArray:
+    def _predict_places(self) -> FloatArray:
         return np.asarray(self._places + self._speeds)
 
-    def _smears(self) -> list[tuple[float, float]]:
+    def _list_motion_blurs(self) -> list[tuple[float, float]]:
         """How the ball may be smeared: not at all, or by its motion in the picture while the shutter is open."""
         best = self._places[0] + self._speeds[0]
         earlier = self._trail[0, 0]
@@ -286,7 +306,7 @@ class _Way:
             return [(0.0, 0.0)]
         # In the picture, not beside the background.
         _, way = self._earlier[0]
-        before = moved_by(inverse_of(way), earlier[None])[0]
+        before = apply_homography(invert_homography(way), earlier[None])[0]
         moved = best - before
         far = float(np.hypot(*moved))
         if far < 0.8 * self._diameter:
@@ -294,10 +314,10 @@ class _Way:
         angle = float(np.arctan2(moved[1], moved[0]) % np.pi)
         return [(0.0, 0.0), (round(min(0.4 * far, 3 * self._diameter)), round(angle / 0.2) * 0.2)]
 
-    def _choose(self, frame: Frame, found: Candidates) -> None:
+    def _extend_histories(self, frame: BallFrame, found: BallCandidates) -> None:
         """Extend every history by every candidate and by none, and keep the best."""
         size, count = self._diameter, len(found.places)
-        ahead, speed = self._ahead(), np.hypot(*self._speeds.T)
+        ahead, speed = self._predict_places(), np.hypot(*self._speeds.T)
         wait = 1.0 + self._missed
         spread = (0.15 * size + 0.4 + 0.12 * speed) * (1 + 0.6 * self._missed)
         spread = np.where(self._ages == 0, 2.0 * size, spread)
@@ -332,27 +352,29 @@ class _Way:
         kick |= self._ages[parents] == 0
         smoothed = self._speeds[parents] + 0.5 * (places - ahead[parents]) / wait[parents, None]
         speeds = np.where((kick & (chosen >= 0))[:, None], fresh, smoothed)
-        kept = _unlike(places, speeds, every[order], size)
+        kept = _select_distinct_histories(places, speeds, every[order], size)
         self._places, self._speeds = places[kept], speeds[kept]
         self._missed = np.where(chosen[kept] >= 0, 0, self._missed[parents[kept]] + 1)
         self._ages = self._ages[parents[kept]] + (chosen[kept] >= 0)
         self._trail = self._trail[parents[kept]]
         self._scores = every[order][kept]
-        step = _Step(
+        step = _FrameHistories(
             frame.number, size, self._places, parents[kept], chosen[kept], self._scores, found
         )
         self._steps.append(step)
         if (place := chosen[kept][0]) >= 0:
-            self._resize(found, int(place))
+            self._update_diameter(found, int(place))
 
-    def _resize(self, found: Candidates, place: int) -> None:
+    def _update_diameter(self, found: BallCandidates, place: int) -> None:
         """The size follows what is seen, slowly."""
-        spot = self._fitted(found, place, self._diameter)
+        spot = self._fit_candidate_disc(found, place, self._diameter)
         if spot is not None and spot.likeness > 0.6:
             share = np.clip(spot.diameter / self._diameter, 0.8, 1.25)
             self._diameter *= float(share**0.1)
 
-    def _fitted(self, found: Candidates, place: int, size: float) -> BallSpot | None:
+    def _fit_candidate_disc(
+        self, found: BallCandidates, place: int, size: float
+    ) -> BallSpot | None:
         part, corner = found.parts[place]
         x, y = found.places[place] - corner
         smear, angle = found.smears[place]
@@ -372,13 +394,15 @@ class _Way:
         rows.reverse()
         seen = [step.chosen[row] >= 0 for step, row in zip(steps, rows, strict=True)]
         last = max((at for at, one in enumerate(seen) if one), default=-1)
-        return [self._ball(at, rows) for at in range(skipped, last + 1)]
+        return [self._make_followed_ball(at, rows) for at in range(skipped, last + 1)]
 
-    def _ball(self, at: int, rows: Sequence[int]) -> FollowedBall:
+    def _make_followed_ball(self, at: int, rows: Sequence[int]) -> FollowedBall:
         step, row = self._steps[at], rows[at]
-        margin = self._margin(at, rows)
+        margin = self._compute_score_margin(at, rows)
         choice = int(step.chosen[row])
-        spot = None if choice < 0 else self._fitted(step.candidates, choice, step.diameter)
+        spot = (
+            None if choice < 0 else self._fit_candidate_disc(step.candidates, choice, step.diameter)
+        )
         if choice < 0:
             x, y = step.places[row]
             size = step.diameter
@@ -398,7 +422,7 @@ class _Way:
             spot.sigma_px, confidence, state,
         )  # fmt: skip
 
-    def _margin(self, at: int, rows: Sequence[int]) -> float:
+    def _compute_score_margin(self, at: int, rows: Sequence[int]) -> float:
         """How much better the best history is than those that have the ball elsewhere in a frame."""
         end = min(at + LOOK_AHEAD, len(self._steps) - 1)
         back = np.arange(len(self._steps[end].scores))
@@ -414,7 +438,9 @@ class _Way:
         return float(mine.max() - scores[other].max())
 
 
-def _unlike(places: FloatArray, speeds: FloatArray, scores: FloatArray, size: float) -> BoolArray:
+def _select_distinct_histories(
+    places: FloatArray, speeds: FloatArray, scores: FloatArray, size: float
+) -> BoolArray:
     """Which histories are kept, the best first: those whose future is not that of a better one."""
     kept = np.zeros(len(places), bool)
     mine: list[int] = []

@@ -18,7 +18,7 @@ BACKGROUND_WIDTH = 640
 
 
 @dataclass(frozen=True)
-class Frame:
+class BallFrame:
     """A frame as the search sees it.
 
     Attributes:
@@ -33,11 +33,11 @@ class Frame:
     small: Grey
 
     @staticmethod
-    def of(number: int, image: Image, colour: BallColour) -> Frame:
+    def of(number: int, image: Image, colour: BallColour) -> BallFrame:
         scale = min(1.0, BACKGROUND_WIDTH / image.shape[1])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), np.uint8)
-        return Frame(number, image, colour, grey)
+        return BallFrame(number, image, colour, grey)
 
     @property
     def size(self) -> FloatArray:
@@ -52,7 +52,9 @@ class Frame:
         return self.colour.grey(self.image[rows[0] : rows[-1] + 1][rows - rows[0]][:, columns])
 
 
-def turn_between(here: Frame, there: Frame, cameras: Mapping[int, Camera]) -> FloatArray:
+def estimate_background_homography(
+    here: BallFrame, there: BallFrame, cameras: Mapping[int, Camera]
+) -> FloatArray:
     """How the background moves from a frame to another one, a homography of pixels, shape (3, 3)."""
     one, other = cameras.get(here.number), cameras.get(there.number)
     width, height = here.size
@@ -75,12 +77,12 @@ def turn_between(here: Frame, there: Frame, cameras: Mapping[int, Camera]) -> Fl
     return np.asarray(enlarge @ found @ np.linalg.inv(enlarge)) if found is not None else np.eye(3)
 
 
-def moved_by(turn: FloatArray, points: FloatArray) -> FloatArray:
+def apply_homography(turn: FloatArray, points: FloatArray) -> FloatArray:
     """Points (N, 2) after a homography."""
     whole = points @ turn[:, :2].T + turn[:, 2]
     return np.asarray(whole[:, :2] / whole[:, 2:])
 
 
-def inverse_of(turn: FloatArray) -> FloatArray:
+def invert_homography(turn: FloatArray) -> FloatArray:
     """The homography back."""
     return np.asarray(np.linalg.inv(turn), float)

@@ -10,20 +10,20 @@ from scipy.special import ndtr
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
-from app.tracking.ball_fit import Fitted
+from app.tracking.ball_fit import FittedPath
 from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, JUMP, KICK, LEAST_CHANGE, REST, ROLL
-from app.tracking.ball_prediction import left_out, summed
-from app.tracking.ball_search import History, Knots
-from app.tracking.ball_solve_run import Run, TrackOptions
+from app.tracking.ball_prediction import leave_one_out_errors, summarize_prediction_errors
+from app.tracking.ball_search import BallHistory, TrackKnots
+from app.tracking.ball_solve_run import TrackOptions, TrackRun
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
     BallMode,
     BallState,
     BallTrack,
-    Contradiction,
+    ContradictingMeasurement,
     EventKind,
-    Untracked,
+    UntrackedRun,
     ViewJump,
 )
 
@@ -39,11 +39,11 @@ LEAST_TOLD_S = 0.0015
 """Of an offset in time that is told."""
 
 
-def joined(
+def join_runs(
     measurements: BallMeasurements,
     frames: IntArray,
     times: FloatArray,
-    runs: Sequence[Run],
+    runs: Sequence[TrackRun],
     shift: FloatArray,
     pitch: Pitch,
     options: TrackOptions,
@@ -66,8 +66,8 @@ def joined(
     mode: list[BallMode] = list(blank.mode)
     views: list[tuple[str, ...]] = list(blank.views)
     events: list[BallEvent] = []
-    against: list[Contradiction] = []
-    untracked: list[Untracked] = []
+    against: list[ContradictingMeasurement] = []
+    untracked: list[UntrackedRun] = []
     jumps: list[ViewJump] = []
     px = np.full(len(measurements), np.nan)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.04
@@ -75,17 +75,17 @@ def joined(
     for run in runs:
         knots, fitted, history = run.knots, run.fitted, run.history
         if knots is None or fitted is None or history is None:
-            untracked.append(_untracked(measurements, run, run.reason or ""))
+            untracked.append(_make_untracked(measurements, run, run.reason or ""))
             continue
         assert run.used is not None and run.noise is not None
-        spread = _with_event_times(knots, fitted)
+        spread = _add_event_time_covariance(knots, fitted)
         seen = np.flatnonzero(np.bincount(knots.at[run.used], minlength=len(knots.times)) > 0)
         sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
         known = sigma <= options.most_sigma_m
         if not known.any():
-            untracked.append(_untracked(measurements, run, OPEN))
+            untracked.append(_make_untracked(measurements, run, OPEN))
         at_times = knots.times[knots.at]
-        for row, knot in _rows_of(knots, times):
+        for row, knot in _match_rows_to_knots(knots, times):
             if not known[knot]:
                 continue
             rays = np.arange(*np.searchsorted(at_times, times[row] + half))
@@ -99,19 +99,19 @@ def joined(
                 state[row] = "measured" if len(names) > 1 else "one_view"
             else:
                 state[row] = "bridged" if seen[0] < knot < seen[-1] else "predicted"
-        events += _events(knots, history, fitted, known, frames, times)
-        jumps += _jumps(run, knots, history, fitted, known, frames, times)
+        events += _find_events(knots, history, fitted, known, frames, times)
+        jumps += _find_view_jumps(run, knots, history, fitted, known, frames, times)
         off = np.linalg.norm(fitted.miss, axis=1)
         for ray in np.flatnonzero(~run.used & known[knots.at]):
             reason = f"It lies {off[ray]:.0f} times its noise from the track: another ball, or a wrong click."
             miss = float(off[ray] * run.noise[ray] * knots.scale[ray])
-            against.append(Contradiction(int(knots.rows[ray]), miss, reason))
+            against.append(ContradictingMeasurement(int(knots.rows[ray]), miss, reason))
         if options.leave_out:
-            px[knots.rows] = left_out(knots, fitted, run.noise, known)
+            px[knots.rows] = leave_one_out_errors(knots, fitted, run.noise, known)
     jumps.sort(key=lambda one: one.time_s)
-    contradicting = _between_views(times, jumps)
+    contradicting = _jump_position_variance(times, jumps)
     covariance[:, :3, :3] += contradicting[:, None, None] * np.eye(3)
-    mode, out = _outside(position, mode, pitch, frames, times)
+    mode, out = _mark_out_of_play(position, mode, pitch, frames, times)
     return replace(
         blank,
         position=position,
@@ -123,19 +123,23 @@ def joined(
         events=tuple(sorted([*events, *out], key=lambda one: one.time_s)),
         contradicted=tuple(sorted(against, key=lambda one: one.measurement)),
         reason=None,
-        left_out=summed(px, measurements.frames, frames) if options.leave_out else None,
+        left_out=summarize_prediction_errors(px, measurements.frames, frames)
+        if options.leave_out
+        else None,
         offsets=tuple(
             (name, float(late))
             for name, late in zip(measurements.names, shift, strict=True)
             if abs(late) > LEAST_TOLD_S
         ),
-        noise=_noise(measurements, runs),
+        noise=_mean_noise_by_view(measurements, runs),
         untracked=tuple(sorted(untracked, key=lambda one: one.first)),
         jumps=tuple(jumps),
     )
 
 
-def _noise(measurements: BallMeasurements, runs: Sequence[Run]) -> tuple[tuple[str, float], ...]:
+def _mean_noise_by_view(
+    measurements: BallMeasurements, runs: Sequence[TrackRun]
+) -> tuple[tuple[str, float], ...]:
     """Times that views are noisier than is said of them, the mean over their rays, where it is more than once."""
     times, rays = dict[str, float](), dict[str, int]()
     for run in runs:
@@ -150,19 +154,19 @@ def _noise(measurements: BallMeasurements, runs: Sequence[Run]) -> tuple[tuple[s
     return tuple((name, value) for name, value in mean.items() if value > 1 + 1e-9)
 
 
-def _untracked(measurements: BallMeasurements, run: Run, reason: str) -> Untracked:
+def _make_untracked(measurements: BallMeasurements, run: TrackRun, reason: str) -> UntrackedRun:
     of_run = measurements.frames[run.rows]
-    return Untracked(int(of_run.min()), int(of_run.max()), len(run.rows), reason)
+    return UntrackedRun(int(of_run.min()), int(of_run.max()), len(run.rows), reason)
 
 
-def _rows_of(knots: Knots, times: FloatArray) -> Iterator[tuple[int, int]]:
+def _match_rows_to_knots(knots: TrackKnots, times: FloatArray) -> Iterator[tuple[int, int]]:
     """Rows of the track and their knots."""
     at = np.clip(np.searchsorted(knots.times, times - 1e-3), 0, len(knots.times) - 1)
     for row in np.flatnonzero(np.abs(knots.times[at] - times) < 1e-3):
         yield int(row), int(at[row])
 
 
-def _with_event_times(knots: Knots, fitted: Fitted) -> FloatArray:
+def _add_event_time_covariance(knots: TrackKnots, fitted: FittedPath) -> FloatArray:
     """Covariances with what unknown times of events in gaps add, (K, 6, 6).
 
     The fit places an event in one interval. Where neither end of it was seen the event may have been
@@ -188,10 +192,10 @@ def _with_event_times(knots: Knots, fitted: Fitted) -> FloatArray:
     return covariance
 
 
-def _events(
-    knots: Knots,
-    history: History,
-    fitted: Fitted,
+def _find_events(
+    knots: TrackKnots,
+    history: BallHistory,
+    fitted: FittedPath,
     known: BoolArray,
     frames: IntArray,
     times: FloatArray,
@@ -221,11 +225,11 @@ def _events(
         yield BallEvent(frame, float(when[at]), kind, place, float(fitted.event_sigma[at]))
 
 
-def _jumps(
-    run: Run,
-    knots: Knots,
-    history: History,
-    fitted: Fitted,
+def _find_view_jumps(
+    run: TrackRun,
+    knots: TrackKnots,
+    history: BallHistory,
+    fitted: FittedPath,
     known: BoolArray,
     frames: IntArray,
     times: FloatArray,
@@ -245,7 +249,7 @@ def _jumps(
             yield ViewJump(frame, time, float(np.sqrt(beyond)), tuple(views))
 
 
-def _between_views(times: FloatArray, jumps: Sequence[ViewJump]) -> FloatArray:
+def _jump_position_variance(times: FloatArray, jumps: Sequence[ViewJump]) -> FloatArray:
     """What jumps add to the variance of each coordinate, square metres, shape (N,).
 
     Either side may be the one that is wrong, and in any direction: a jump is one sample of it. Of the last one
@@ -267,7 +271,7 @@ def _between_views(times: FloatArray, jumps: Sequence[ViewJump]) -> FloatArray:
     return most
 
 
-def _outside(
+def _mark_out_of_play(
     position: FloatArray,
     mode: list[BallMode],
     pitch: Pitch,

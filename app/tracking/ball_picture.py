@@ -104,7 +104,9 @@ class BallColour:
 
 
 @lru_cache(maxsize=256)
-def disc(diameter: float, smear: float = 0.0, angle: float = 0.0) -> npt.NDArray[np.float32]:
+def make_ball_template(
+    diameter: float, smear: float = 0.0, angle: float = 0.0
+) -> npt.NDArray[np.float32]:
     """The picture of a ball, 1 on 0, whose side is about two diameters.
 
     Args:
@@ -114,10 +116,10 @@ def disc(diameter: float, smear: float = 0.0, angle: float = 0.0) -> npt.NDArray
     """
     reach = int(np.ceil(diameter + smear / 2))
     rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(float)
-    return np.asarray(_rim(columns, rows, diameter / 2, smear, angle)[0], np.float32)
+    return np.asarray(_model_soft_disc(columns, rows, diameter / 2, smear, angle)[0], np.float32)
 
 
-def _rim(
+def _model_soft_disc(
     columns: FloatArray, rows: FloatArray, radius: float, smear: float, angle: float
 ) -> tuple[FloatArray, FloatArray]:
     """A disc, or what it covers on its way, with a soft rim; and how it changes with its place and radius."""
@@ -133,7 +135,7 @@ def _rim(
     return shape, np.stack([x * unit, y * unit, steep], axis=-1)
 
 
-def likeness(
+def match_template(
     grey: Grey, template: npt.NDArray[np.float32]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
     """How much each place of a picture looks like a template, and its contrast there.
@@ -170,7 +172,7 @@ def fit_disc(
         grey: From ``BallColour.grey``, shape (H, W).
         x, y: About where its centre is, pixels.
         diameter: About how large it is, pixels.
-        smear, angle: As of ``disc``.
+        smear, angle: As of ``make_ball_template``.
 
     Returns:
         None where nothing is brighter there, or it would move away.
@@ -189,7 +191,7 @@ def fit_disc(
 
     root = np.sqrt(weight).ravel()
     for _ in range(ROUNDS):
-        shape, slopes = _rim(columns - at[0], rows - at[1], at[2], smear, angle)
+        shape, slopes = _model_soft_disc(columns - at[0], rows - at[1], at[2], smear, angle)
         base = np.column_stack([shape.ravel(), np.ones(shape.size)]) * root[:, None]
         level = np.linalg.solve(base.T @ base + 1e-9 * np.eye(2), base.T @ (part.ravel() * root))
         rest = part.ravel() * root - base @ level
@@ -253,13 +255,13 @@ def find_ball(
     best: tuple[float, float, float, float] | None = None
     size = low
     while size <= high:
-        template = disc(round(size, 2))
+        template = make_ball_template(round(size, 2))
         reach = template.shape[0] // 2 + int(np.ceil(near))
         left, top = round(x) - reach, round(y) - reach
         if left >= 0 and top >= 0 and left + 2 * reach < width and top + 2 * reach < height:
             for grey in greys:
                 part = grey[top : top + 2 * reach + 1, left : left + 2 * reach + 1]
-                alike, contrast = likeness(part, template)
+                alike, contrast = match_template(part, template)
                 rows, columns = np.mgrid[: alike.shape[0], : alike.shape[1]]
                 away = np.hypot(columns - alike.shape[1] // 2, rows - alike.shape[0] // 2)
                 usual = 1.0
@@ -291,7 +293,7 @@ def find_ball(
     return fit_disc(colour.grey(image), spot.x, spot.y, spot.diameter) or spot, colour
 
 
-def find_like(grey: Grey, x: float, y: float, diameter: float) -> BallSpot:
+def find_similar_ball(grey: Grey, x: float, y: float, diameter: float) -> BallSpot:
     """The ball at a click by how it looks elsewhere: what looks like it there, else the click itself.
 
     Args:
@@ -300,13 +302,13 @@ def find_like(grey: Grey, x: float, y: float, diameter: float) -> BallSpot:
         diameter: About how large it is, pixels.
     """
     click = BallSpot(x, y, diameter, UNSEEN_PX, 0.0, 1.0)
-    template = disc(round(diameter * 4) / 4)
+    template = make_ball_template(round(diameter * 4) / 4)
     near = int(np.ceil(max(3.0, 0.5 * diameter)))
     reach = template.shape[0] // 2 + near
     left, top = round(x) - reach, round(y) - reach
     if left < 0 or top < 0 or left + 2 * reach >= grey.shape[1] or top + 2 * reach >= grey.shape[0]:
         return click
-    alike, contrast = likeness(
+    alike, contrast = match_template(
         grey[top : top + 2 * reach + 1, left : left + 2 * reach + 1], template
     )
     rows, columns = np.mgrid[: alike.shape[0], : alike.shape[1]]

@@ -9,15 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.tracking.ball_fit import Fitted
-from app.tracking.ball_search import Knots
-from app.tracking.ball_track import LeftOut
+from app.tracking.ball_fit import FittedPath
+from app.tracking.ball_search import TrackKnots
+from app.tracking.ball_track import LeaveOneOutSummary
 
 _MOST = 0.999
 """Leverage of an instant that nothing else holds: nothing predicts it."""
 
 
-def left_out(knots: Knots, fitted: Fitted, noise: FloatArray, known: BoolArray) -> FloatArray:
+def leave_one_out_errors(
+    knots: TrackKnots, fitted: FittedPath, noise: FloatArray, known: BoolArray
+) -> FloatArray:
     """How far each ray is from the track without its instant, pixels, NaN where none holds, (R,).
 
     Args:
@@ -48,7 +50,9 @@ def left_out(knots: Knots, fitted: Fitted, noise: FloatArray, known: BoolArray) 
     return px
 
 
-def summed(px: FloatArray, of_frame: IntArray, frames: IntArray) -> LeftOut:
+def summarize_prediction_errors(
+    px: FloatArray, of_frame: IntArray, frames: IntArray
+) -> LeaveOneOutSummary:
     """What is said of a stretch.
 
     Args:
@@ -63,6 +67,6 @@ def summed(px: FloatArray, of_frame: IntArray, frames: IntArray) -> LeftOut:
     for row in np.flatnonzero(last > first):
         by_frame[row] = np.median(px[order[first[row] : last[row]]])
     if not told.any():
-        return LeftOut(px, by_frame, None, None, 0)
+        return LeaveOneOutSummary(px, by_frame, None, None, 0)
     median, most = np.percentile(px[told], (50, 95))
-    return LeftOut(px, by_frame, float(median), float(most), int(told.sum()))
+    return LeaveOneOutSummary(px, by_frame, float(median), float(most), int(told.sum()))

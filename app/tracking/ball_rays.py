@@ -68,7 +68,7 @@ class BallRays:
         )
 
 
-def ball_rays(
+def build_ball_rays(
     times: Sequence[float], pixels: Sequence[Sequence[float]], cameras: Sequence[Camera]
 ) -> BallRays:
     """The rays of a ball, without gross errors, and how noisy its own path shows them to be.
@@ -99,11 +99,11 @@ def ball_rays(
     positions = np.array([camera.position for camera in cameras]).reshape(-1, 3)
     sigma_px = _LEAST_SIGMA_PX
     for _ in range(_ROUNDS):
-        sigma_px = _noise(time[keep], unit[keep], scale[keep])
-        off = _off_path(time[keep], unit[keep], scale[keep])
+        sigma_px = _estimate_noise_px(time[keep], unit[keep], scale[keep])
+        off = _distance_from_neighbour_path(time[keep], unit[keep], scale[keep])
         limit = max(_GROSS * sigma_px, _GROSS_PX)
         # The worst of its neighbourhood alone: beside a gross error the sound ones look wrong.
-        worst = (off > limit) & (off >= _largest_near(off))
+        worst = (off > limit) & (off >= _rolling_maximum(off))
         if not worst.any():
             break
         keep = keep[~worst]
@@ -117,7 +117,7 @@ def ball_rays(
     )
 
 
-def slopes_of(rays: BallRays) -> tuple[FloatArray, FloatArray, FloatArray]:
+def estimate_ray_velocities(rays: BallRays) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Velocities of cameras and of rays, from a line through the neighbours of each ray.
 
     Returns:
@@ -140,7 +140,7 @@ def slopes_of(rays: BallRays) -> tuple[FloatArray, FloatArray, FloatArray]:
     return moved, turned, rays.sigma**2 / spread
 
 
-def _noise(times: FloatArray, directions: FloatArray, scale: FloatArray) -> float:
+def _estimate_noise_px(times: FloatArray, directions: FloatArray, scale: FloatArray) -> float:
     """Noise of one number of a ray in pixels, from how far each is from a parabola of its neighbours."""
     if len(times) < 8:
         return 1.0
@@ -150,18 +150,18 @@ def _noise(times: FloatArray, directions: FloatArray, scale: FloatArray) -> floa
     if near.sum() < 5:
         return 1.0
     at, t = at[near], t[near]
-    weights = [_lagrange(t[:, 1], t[:, [0, 2, 3]], which) for which in range(3)]
+    weights = [_lagrange_weights(t[:, 1], t[:, [0, 2, 3]], which) for which in range(3)]
     miss = directions[at] - sum(
         weight[:, None] * directions[at + step]
         for weight, step in zip(weights, (-1, 1, 2), strict=True)
     )
     spread = np.sqrt(1 + sum(weight**2 for weight in weights))
-    miss = _across(miss, directions[at]) * (scale[at] / spread)[:, None]
+    miss = _perpendicular_component(miss, directions[at]) * (scale[at] / spread)[:, None]
     # The median of a length of two normal numbers is 1.177 sigma.
     return max(float(np.median(np.linalg.norm(miss, axis=1))) / 1.177, _LEAST_SIGMA_PX)
 
 
-def _lagrange(x: FloatArray, nodes: FloatArray, which: int) -> FloatArray:
+def _lagrange_weights(x: FloatArray, nodes: FloatArray, which: int) -> FloatArray:
     value = np.ones(len(x))
     for other in range(nodes.shape[1]):
         if other != which:
@@ -169,14 +169,16 @@ def _lagrange(x: FloatArray, nodes: FloatArray, which: int) -> FloatArray:
     return value
 
 
-def _across(vectors: FloatArray, directions: FloatArray) -> FloatArray:
+def _perpendicular_component(vectors: FloatArray, directions: FloatArray) -> FloatArray:
     """What of vectors is at right angles to directions."""
     along = (vectors * directions).sum(axis=1, keepdims=True)
     across: FloatArray = vectors - along * directions
     return across
 
 
-def _off_path(times: FloatArray, directions: FloatArray, scale: FloatArray) -> FloatArray:
+def _distance_from_neighbour_path(
+    times: FloatArray, directions: FloatArray, scale: FloatArray
+) -> FloatArray:
     """Pixels between each ray and the path of its neighbours, by the pair of them that fits best."""
     count = len(times)
     found = np.full(count, np.inf)
@@ -189,7 +191,9 @@ def _off_path(times: FloatArray, directions: FloatArray, scale: FloatArray) -> F
         path = directions[at + first] + share[:, None] * (
             directions[at + second] - directions[at + first]
         )
-        miss = np.linalg.norm(_across(directions[at] - path, directions[at]), axis=1)
+        miss = np.linalg.norm(
+            _perpendicular_component(directions[at] - path, directions[at]), axis=1
+        )
         spread = np.sqrt(1 + share**2 + (1 - share) ** 2)
         near = np.maximum(np.abs(times[at] - t0), np.abs(times[at] - t1)) <= LONGEST_GAP_S
         found[at] = np.minimum(found[at], np.where(near, miss * scale[at] / spread, np.inf))
@@ -197,7 +201,7 @@ def _off_path(times: FloatArray, directions: FloatArray, scale: FloatArray) -> F
     return found
 
 
-def _largest_near(values: FloatArray) -> FloatArray:
+def _rolling_maximum(values: FloatArray) -> FloatArray:
     padded = np.pad(values, _NEAR, constant_values=-np.inf)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1)
     largest: FloatArray = windows.max(axis=1)

@@ -102,7 +102,7 @@ class FollowedBall:
     confidence: float
     state: State
 
-    def is_at(self, other: FollowedBall) -> bool:
+    def is_same_ball(self, other: FollowedBall) -> bool:
         """Whether another place of the same frame is the same ball."""
         return float(np.hypot(self.x - other.x, self.y - other.y)) < SAME * self.diameter
 
@@ -137,13 +137,13 @@ class BallRun:
         """How many frames are in a state."""
         return sum(ball.state == state for ball in self.balls)
 
-    def surest(self) -> FollowedBall | None:
+    def find_most_certain_click(self) -> FollowedBall | None:
         """The clicked ball that is seen best: before socks and boots another thing may stand for a ball near by."""
         clicked = {click.frame for click in self.clicks}
         mine = (ball for ball in self.balls if ball.frame in clicked)
         return min(mine, key=lambda ball: ball.sigma_px / ball.diameter, default=None)
 
-    def mended(self, new: BallRun) -> BallRun:
+    def merge_run(self, new: BallRun) -> BallRun:
         """The run with what one more click says.
 
         From the click to either side its frames take the place of those that were there, up to where both agree or
@@ -155,9 +155,11 @@ class BallRun:
         earlier = max((frame for frame in others if frame < click.frame), default=None)
         later = min((frame for frame in others if frame > click.frame), default=None)
         there = {ball.frame: ball for ball in new.balls}
-        down, before = _until(range(click.frame - 1, new.first - 1, -1), there, old, earlier)
-        up, after = _until(range(click.frame + 1, new.last + 1), there, old, later)
-        kept = [ball for ball in self.balls if _stays(ball.frame, down, up)]
+        down, before = _find_merge_frame(
+            range(click.frame - 1, new.first - 1, -1), there, old, earlier
+        )
+        up, after = _find_merge_frame(range(click.frame + 1, new.last + 1), there, old, later)
+        kept = [ball for ball in self.balls if _is_kept_frame(ball.frame, down, up)]
         taken = [
             ball
             for ball in new.balls
@@ -178,12 +180,12 @@ class BallRun:
         )
 
 
-def _stays(frame: int, down: int | None, up: int | None) -> bool:
+def _is_kept_frame(frame: int, down: int | None, up: int | None) -> bool:
     """Whether an old frame lies behind the places where the new ones end."""
     return (down is not None and frame <= down) or (up is not None and frame >= up)
 
 
-def _until(
+def _find_merge_frame(
     frames: Iterable[int],
     new: Mapping[int, FollowedBall],
     old: Mapping[int, FollowedBall],
@@ -196,7 +198,7 @@ def _until(
         one, other = new.get(frame), old.get(frame)
         if one is None or other is None or "uncertain" in (one.state, other.state):
             continue
-        if one.is_at(other):
+        if one.is_same_ball(other):
             return frame, True
     # A click of a person stays, and what was followed from it to the other side.
     return (click, True) if click is not None else (None, False)

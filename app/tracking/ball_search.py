@@ -8,9 +8,13 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
-from app.tracking.ball_constraints import InstantConstraints, TrackConstraints, constraints_at
+from app.tracking.ball_constraints import (
+    InstantConstraints,
+    TrackConstraints,
+    build_instant_constraints,
+)
 from app.tracking.ball_models import REST
-from app.tracking.ball_search_kernels import likeliest
+from app.tracking.ball_search_kernels import find_likeliest_modes
 from app.tracking.ball_track import BallMeasurements
 
 _WIDTH = 96
@@ -24,7 +28,7 @@ _ASIDE_M, _ABOVE_M, _BELOW_M = 12.0, 45.0, 0.0
 
 
 @dataclass(frozen=True)
-class Knots:
+class TrackKnots:
     """Instants of a stretch and the rays of the ball at each.
 
     Attributes:
@@ -58,7 +62,7 @@ class Knots:
 
 
 @dataclass(frozen=True)
-class History:
+class BallHistory:
     """The likeliest one.
 
     Attributes:
@@ -76,12 +80,12 @@ class History:
     score: float
 
 
-def knots_of(
+def build_knots(
     measurements: BallMeasurements,
     times: FloatArray,
     shift: FloatArray,
     said: TrackConstraints | None = None,
-) -> Knots:
+) -> TrackKnots:
     """Instants and rays; pixels through which no ray goes have none.
 
     Args:
@@ -115,24 +119,24 @@ def knots_of(
     size, size_sigma = measurements.sizes[rows], measurements.size_sigma[rows]
     known = np.isfinite(size) & np.isfinite(size_sigma) & (size > 0)
     far = np.where(known, 2 * REST * scale / np.where(known, size, 1.0), 0.0)
-    return Knots(
+    return TrackKnots(
         knots,
         rows,
         at,
         np.searchsorted(at, np.arange(len(knots) + 1)),
         centre[rows],
         along,
-        _across(along),
+        _perpendicular_axes(along),
         scale,
         measurements.sigma[rows] / scale,
         far,
         np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
         view[rows],
-        constraints_at(knots, said or TrackConstraints()),
+        build_instant_constraints(knots, said or TrackConstraints()),
     )
 
 
-def louder(knots: Knots, most: float) -> Knots:
+def inflate_ray_noise(knots: TrackKnots, most: float) -> TrackKnots:
     """The knots with the noise of views whose rays pass each other by more than it says.
 
     Cameras that are not exact make all rays of a view miss those of others alike: they are of the
@@ -160,23 +164,23 @@ def louder(knots: Knots, most: float) -> Knots:
     return replace(knots, noise=knots.noise * factor)
 
 
-def search(knots: Knots, pitch: Pitch, width: int = _WIDTH) -> History:
+def find_likeliest_history(knots: TrackKnots, pitch: Pitch, width: int = _WIDTH) -> BallHistory:
     """The likeliest history of a stretch."""
     x, y = pitch.length / 2 + _ASIDE_M, pitch.width / 2 + _ASIDE_M
     room = np.array([[-x, x], [-y, y], [-_ABOVE_M, _BELOW_M]])
     asked = knots.asked
-    mode, event, left, state, score = likeliest(
+    mode, event, left, state, score = find_likeliest_modes(
         knots.times, knots.starts, knots.centres, knots.across, knots.along,
         knots.noise, knots.scale, knots.far, knots.far_sigma, room, width,
-        changed_views(knots), asked.wanted, asked.begin, asked.due, asked.may_not,
+        find_view_changes(knots), asked.wanted, asked.begin, asked.due, asked.may_not,
         np.searchsorted(asked.at, np.arange(len(knots.times) + 1)),
         asked.normal, asked.value, asked.sigma,
     )  # fmt: skip
     bit = np.arange(len(knots.at)) - knots.starts[knots.at]
-    return History(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))
+    return BallHistory(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))
 
 
-def changed_views(knots: Knots) -> BoolArray:
+def find_view_changes(knots: TrackKnots) -> BoolArray:
     """Whether other views see the ball at a knot than at the last one before it that any does, (K,)."""
     result = np.zeros(len(knots.times), dtype=bool)
     before: set[int] = set()
@@ -187,7 +191,7 @@ def changed_views(knots: Knots) -> BoolArray:
     return result
 
 
-def _across(along: FloatArray) -> FloatArray:
+def _perpendicular_axes(along: FloatArray) -> FloatArray:
     """Two unit vectors at right angles to each direction and to each other, shape (N, 2, 3)."""
     helper = np.where(np.abs(along[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     first = np.cross(along, helper)

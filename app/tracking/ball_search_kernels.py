@@ -12,14 +12,14 @@ from numba import njit
 
 from app.tracking.ball_filter_kernels import (
     OUTLIER,
-    bounce,
-    copy,
-    jump,
-    most_of_touch,
-    move,
-    pin,
-    see,
-    touch,
+    apply_bounce,
+    apply_kick,
+    apply_knot_measurements,
+    apply_linear_measurement,
+    apply_view_jump,
+    copy_state,
+    max_kick_log_probability,
+    predict_state,
 )
 from app.tracking.ball_models import (
     BOUNCE,
@@ -44,7 +44,7 @@ _PER_KNOT = 6
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin_with(m, P, mode):
+def initialize_state(m, P, mode):
     """What is known of a ball before anything is seen, in place; its logarithm of probability."""
     m[:], P[:] = 0.0, 0.0
     m[2] = -REST if mode == ROLL else -2.0
@@ -56,7 +56,7 @@ def begin_with(m, P, mode):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def at_most(first, last, noise, scale):
+def max_log_likelihood(first, last, noise, scale):
     """More than ``see`` finds for no state."""
     total = 0.0
     for row in range(first, last):
@@ -65,7 +65,7 @@ def at_most(first, last, noise, scale):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def misplaced(m, P, mode, room):
+def out_of_bounds_cost(m, P, mode, room):
     """What a place outside of the room costs, or one out of reach of who holds the ball."""
     cost = 0.0
     for i in range(3):
@@ -81,7 +81,7 @@ def misplaced(m, P, mode, room):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def likeliest(
+def find_likeliest_modes(
     times, starts, centres, across, along, noise, scale, far, far_sigma, room, width,
     changed, wanted, begin, due, may_not, places, normal, value, sigma,
 ):  # fmt: skip
@@ -132,7 +132,7 @@ def likeliest(
     jump_of = np.zeros((3, 4), np.int64)
     for k in range(K):
         made, best = 0, -np.inf
-        most = at_most(starts[k], starts[k + 1], noise, scale)
+        most = max_log_likelihood(starts[k], starts[k + 1], noise, scale)
         for row in range(places[k], places[k + 1]):
             most -= np.log(sigma[row])
         second[:] = -np.inf
@@ -160,23 +160,23 @@ def likeliest(
                     m, P = cm[made], cC[made]
                     after, cost = mode, 0.0
                     if k == 0:
-                        cost = begin_with(m, P, mode)
+                        cost = initialize_state(m, P, mode)
                     elif way == 0:
-                        copy(m, P, M[h], C[h])
-                        move(m, P, mode, dt)
+                        copy_state(m, P, M[h], C[h])
+                        predict_state(m, P, mode, dt)
                     elif way == 5:
-                        copy(m, P, M[h], C[h])
-                        cost = jump(m, P, mode, dt)
+                        copy_state(m, P, M[h], C[h])
+                        cost = apply_view_jump(m, P, mode, dt)
                     elif way == 4:
                         if mode != FLIGHT:
                             continue
-                        copy(m, P, M[h], C[h])
-                        cost = bounce(m, P, FLIGHT, dt)
+                        copy_state(m, P, M[h], C[h])
+                        cost = apply_bounce(m, P, FLIGHT, dt)
                         if cost > -np.inf and m[5] > -1.2:
                             # Too low a hop to be seen as one.
-                            copy(m, P, M[h], C[h])
+                            copy_state(m, P, M[h], C[h])
                             after = ROLL
-                            cost = bounce(m, P, ROLL, dt)
+                            cost = apply_bounce(m, P, ROLL, dt)
                     else:
                         after = FLIGHT if way == 1 else ROLL if way == 2 else HELD
                         if after == HELD and mode == HELD:
@@ -185,22 +185,24 @@ def likeliest(
                         least = (
                             second[after, KICK, 1] if jump_of[after, KICK] == jumped[h] else -np.inf
                         )
-                        if score[h] + most_of_touch(after, dt) + most < least:
+                        if score[h] + max_kick_log_probability(after, dt) + most < least:
                             continue
-                        copy(m, P, M[h], C[h])
-                        cost = touch(m, P, mode, after, dt)
+                        copy_state(m, P, M[h], C[h])
+                        cost = apply_kick(m, P, mode, after, dt)
                     if cost == -np.inf or (k and score[h] + cost + most < best - _WORST):
                         # Whatever it sees, it is not kept.
                         continue
-                    likely, cleft[made] = see(
+                    likely, cleft[made] = apply_knot_measurements(
                         m, P, starts[k], starts[k + 1],
                         centres, across, along, noise, scale, far, far_sigma, kept_m, kept_P,
                     )  # fmt: skip
                     likely += cost + score[h] if k else cost
                     for row in range(places[k], places[k + 1]):
-                        square, total = pin(m, P, normal[row], value[row], sigma[row] ** 2)
+                        square, total = apply_linear_measurement(
+                            m, P, normal[row], value[row], sigma[row] ** 2
+                        )
                         likely -= min(square / 2, _UNLIKELY) + np.log(total) / 2
-                    likely -= misplaced(m, P, after, room)
+                    likely -= out_of_bounds_cost(m, P, after, room)
                     happened = event in (KICK, BOUNCE)
                     cs[made], cmode[made], cevent[made], cp[made] = likely, after, event, h
                     csince[made] = k if happened else since[h]
@@ -233,7 +235,7 @@ def likeliest(
                     alike += events[k, other] == cevent[c]
             if alike >= _ALIKE:
                 continue
-            copy(M[kept], C[kept], cm[c], cC[c])
+            copy_state(M[kept], C[kept], cm[c], cC[c])
             for i in range(6):
                 states[k, kept, i] = cm[c, i]
             score[kept] = cs[c]

@@ -7,10 +7,16 @@ import numpy as np
 from app.geometry.arrays import FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_constraints import TrackConstraints
-from app.tracking.ball_join import OPEN, joined
+from app.tracking.ball_join import OPEN, join_runs
 from app.tracking.ball_solve_run import FEWEST as FEWEST
-from app.tracking.ball_solve_run import Run, contradiction, runs_of, solve_run, too_few
 from app.tracking.ball_solve_run import TrackOptions as TrackOptions
+from app.tracking.ball_solve_run import (
+    TrackRun,
+    explain_too_few_measurements,
+    format_contradiction,
+    solve_run,
+    split_into_runs,
+)
 from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 
 _ODD = 0.4
@@ -47,30 +53,32 @@ def track_ball(
     """
     options = options or TrackOptions()
     frames, times = np.asarray(frames), np.asarray(times, dtype=float)
-    reason = too_few(measurements) if len(frames) else "The stretch has no frames."
+    reason = (
+        explain_too_few_measurements(measurements) if len(frames) else "The stretch has no frames."
+    )
     if reason is None:
-        shift = (known or ViewErrors()).shifts(measurements.names)
+        shift = (known or ViewErrors()).time_shifts(measurements.names)
         for _ in range(_SHIFTS):
             runs = [
                 solve_run(measurements, rows, times, shift, pitch, options, said, known)
-                for rows in runs_of(measurements.times, options.longest_gap_s)
+                for rows in split_into_runs(measurements.times, options.longest_gap_s)
             ]
-            if known is not None or not (moved := _late(measurements, runs)).any():
+            if known is not None or not (moved := _estimate_time_offsets(measurements, runs)).any():
                 break
             shift += moved
-        odd = None if known is not None else _odd_view(measurements, runs)
+        odd = None if known is not None else _explain_inconsistent_view(measurements, runs)
         reason = next((run.reason for run in runs if run.reason), None)
         if odd is not None:
             reason = odd
         elif any(run.fitted is not None for run in runs):
-            track = joined(measurements, frames, times, runs, shift, pitch, options)
+            track = join_runs(measurements, frames, times, runs, shift, pitch, options)
             if any(state != "gap" for state in track.state):
                 return track
             reason = OPEN
     return BallTrack.none(frames, times, reason or "No series of measurements is long enough.")
 
 
-def _odd_view(measurements: BallMeasurements, runs: list[Run]) -> str | None:
+def _explain_inconsistent_view(measurements: BallMeasurements, runs: list[TrackRun]) -> str | None:
     """Why a view cannot be of this ball: most of it fits no track of the others."""
     names = measurements.names
     rays, wrong = np.zeros(len(names)), np.zeros(len(names))
@@ -83,12 +91,12 @@ def _odd_view(measurements: BallMeasurements, runs: list[Run]) -> str | None:
     worst = int(share.argmax())
     if share[worst] <= _ODD or rays[worst] < FEWEST:
         return None
-    return contradiction(
+    return format_contradiction(
         f"{share[worst]:.0%} of those of {names[worst]} do not fit the ball of the others"
     )
 
 
-def _late(measurements: BallMeasurements, runs: list[Run]) -> FloatArray:
+def _estimate_time_offsets(measurements: BallMeasurements, runs: list[TrackRun]) -> FloatArray:
     """Seconds to add to each view's times, nought but where the ball says it surely, shape (V,).
 
     The times of most of them are those that count.

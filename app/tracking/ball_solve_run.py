@@ -11,9 +11,15 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_constraints import TrackConstraints
-from app.tracking.ball_fit import Fitted, fit
+from app.tracking.ball_fit import FittedPath, fit_ball_path
 from app.tracking.ball_models import NOTHING
-from app.tracking.ball_search import History, Knots, knots_of, louder, search
+from app.tracking.ball_search import (
+    BallHistory,
+    TrackKnots,
+    build_knots,
+    find_likeliest_history,
+    inflate_ray_noise,
+)
 from app.tracking.ball_track import BallMeasurements, ViewErrors
 
 FEWEST = 6
@@ -54,7 +60,7 @@ class TrackOptions:
 
 
 @dataclass(frozen=True)
-class Run:
+class TrackRun:
     """Measurements without long gaps; without a fit where there is a reason.
 
     Attributes:
@@ -71,14 +77,14 @@ class Run:
     rows: IntArray
     reason: str | None
     names: tuple[str, ...] = ()
-    knots: Knots | None = None
-    history: History | None = None
-    fitted: Fitted | None = None
+    knots: TrackKnots | None = None
+    history: BallHistory | None = None
+    fitted: FittedPath | None = None
     used: BoolArray | None = None
     noise: FloatArray | None = None
 
 
-def too_few(measurements: BallMeasurements) -> str | None:
+def explain_too_few_measurements(measurements: BallMeasurements) -> str | None:
     """Why measurements are too few for a track, a sentence; None where they are not."""
     instants = np.unique(np.round(measurements.times, 4))
     if len(instants) < FEWEST:
@@ -89,7 +95,7 @@ def too_few(measurements: BallMeasurements) -> str | None:
     return None
 
 
-def runs_of(times: FloatArray, longest: float) -> Iterator[IntArray]:
+def split_into_runs(times: FloatArray, longest: float) -> Iterator[IntArray]:
     """Rows of measurements without long gaps between them."""
     order = np.argsort(times, kind="stable")
     breaks = np.flatnonzero(np.diff(times[order]) > longest) + 1
@@ -105,7 +111,7 @@ def solve_run(
     options: TrackOptions,
     said: TrackConstraints | None = None,
     known: ViewErrors | None = None,
-) -> Run:
+) -> TrackRun:
     """Search and fit a run.
 
     Args:
@@ -120,35 +126,39 @@ def solve_run(
     """
     part = measurements.part(rows)
     names = list(measurements.names)
-    if (reason := too_few(part)) is not None:
-        return Run(rows, reason)
+    if (reason := explain_too_few_measurements(part)) is not None:
+        return TrackRun(rows, reason)
     first, last = part.times.min() - options.beyond_s, part.times.max() + options.beyond_s
     own = shift[[names.index(name) for name in part.names]]
-    knots = knots_of(part, times[(times >= first) & (times <= last)], own, said)
+    knots = build_knots(part, times[(times >= first) & (times <= last)], own, said)
     if known is None:
-        knots = louder(knots, _INEXACT)
+        knots = inflate_ray_noise(knots, _INEXACT)
     else:
         knots = replace(knots, noise=knots.noise * known.factors(part.names)[knots.view])
     if len(np.unique(knots.at)) < FEWEST:
-        return Run(rows, "The ball lies where its cameras have no rays.")
-    history = search(knots, pitch) if known is None else search(knots, pitch, _WIDTH_OF_PART)
+        return TrackRun(rows, "The ball lies where its cameras have no rays.")
+    history = (
+        find_likeliest_history(knots, pitch)
+        if known is None
+        else find_likeliest_history(knots, pitch, _WIDTH_OF_PART)
+    )
     wrong = 1 - float(history.used.mean())
     if known is None and wrong > _CONTRADICT:
-        return Run(rows, contradiction(f"{wrong:.0%} of the measurements fit no ball"))
+        return TrackRun(rows, format_contradiction(f"{wrong:.0%} of the measurements fit no ball"))
     event = history.event.copy()
     used, noise = history.used.copy(), knots.noise
-    unseen = _unseen(knots)
+    unseen = _unseen_touch_noise(knots)
     state = np.pad(history.state, ((0, 0), (0, 3)))
     for turn in range(4):
-        fitted = fit(knots, history.mode, event, used, state, noise, unseen, brief=True)
+        fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen, brief=True)
         state = fitted.state
-        scale = _scale(knots, fitted, used)
+        scale = _estimate_noise_scale(knots, fitted, used)
         if known is None and turn == 0 and np.median(scale) > _LOUD:
             times_said = float(np.median(scale))
             what = f"the views miss each other by {times_said:.0f} times their noise"
-            return Run(rows, contradiction(what))
+            return TrackRun(rows, format_contradiction(what))
         heard = knots.noise * scale
-        moved = _moved(knots, history.mode, event, fitted)
+        moved = _shift_misplaced_events(knots, history.mode, event, fitted)
         gross = (fitted.miss**2).sum(axis=1) * (noise / heard) ** 2 > _GROSS
         changed = bool(moved is not None or (gross != ~used).any())
         noise, used = heard, ~gross
@@ -156,13 +166,13 @@ def solve_run(
             event, history = moved[1], replace(history, mode=moved[0])
         if not changed and turn > 0:
             break
-    fitted = fit(knots, history.mode, event, used, state, noise, unseen)
+    fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen)
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
-    return Run(rows, None, part.names, rows_of, history, fitted, used, noise)
+    return TrackRun(rows, None, part.names, rows_of, history, fitted, used, noise)
 
 
-def contradiction(what: str) -> str:
+def format_contradiction(what: str) -> str:
     """The sentence of measurements that fit no ball."""
     return (
         f"The measurements contradict each other: {what}. A camera is mirrored or exchanged, a view "
@@ -170,7 +180,7 @@ def contradiction(what: str) -> str:
     )
 
 
-def _unseen(knots: Knots) -> FloatArray:
+def _unseen_touch_noise(knots: TrackKnots) -> FloatArray:
     """What touches that nobody saw add to the acceleration's noise before each knot, (m/s2)2 s."""
     seen = np.flatnonzero(np.diff(knots.starts) > 0)
     result = np.zeros(len(knots.times))
@@ -182,7 +192,7 @@ def _unseen(knots: Knots) -> FloatArray:
     return result
 
 
-def _scale(knots: Knots, fitted: Fitted, used: BoolArray) -> FloatArray:
+def _estimate_noise_scale(knots: TrackKnots, fitted: FittedPath, used: BoolArray) -> FloatArray:
     """How many times its noise each view shows, for each ray, beside what it is said to be, (R,)."""
     held = np.einsum(
         "rki,rij,rkj->r", fitted.slope, fitted.covariance[knots.at, :3, :3], fitted.slope
@@ -202,8 +212,8 @@ def _scale(knots: Knots, fitted: Fitted, used: BoolArray) -> FloatArray:
     return result
 
 
-def _moved(
-    knots: Knots, mode: IntArray, event: IntArray, fitted: Fitted
+def _shift_misplaced_events(
+    knots: TrackKnots, mode: IntArray, event: IntArray, fitted: FittedPath
 ) -> tuple[IntArray, IntArray] | None:
     """Modes and events with those moved whose time lies in a neighbouring interval."""
     mode, event, any_moved = mode.copy(), event.copy(), False

@@ -93,7 +93,7 @@ class ViewErrors:
         """Times that views are noisier than is said of them, shape (V,)."""
         return np.array([self.noise.get(name, 1.0) for name in names])
 
-    def shifts(self, names: Sequence[str]) -> FloatArray:
+    def time_shifts(self, names: Sequence[str]) -> FloatArray:
         """Seconds to add to the times of views, shape (V,)."""
         return np.array([self.late.get(name, 0.0) for name in names])
 
@@ -105,7 +105,7 @@ class BallEvent:
     Attributes:
         frame: The nearest one.
         time_s: Seconds.
-        kind: ``kick`` (or whatever else touched it), ``bounce`` on the grass, ``out``: wholly over a
+        kind: ``kick`` (or whatever else touched it), ``apply_bounce`` on the grass, ``out``: wholly over a
             line.
         position: Pitch frame, metres, shape (3,).
         sigma_s: Of the time, seconds.
@@ -137,12 +137,12 @@ class ViewJump:
 
 
 @dataclass(frozen=True)
-class Correction:
+class EventCorrection:
     """An event that a person added to a track, or removed from it.
 
     Attributes:
         frame: Of the stretch.
-        kind: ``kick``, ``bounce`` or ``out``.
+        kind: ``kick``, ``apply_bounce`` or ``out``.
         added: Whether it is there; else it is not.
     """
 
@@ -152,7 +152,7 @@ class Correction:
 
 
 @dataclass(frozen=True)
-class Contradiction:
+class ContradictingMeasurement:
     """A measurement that the track does not explain, and took no part.
 
     Attributes:
@@ -167,7 +167,7 @@ class Contradiction:
 
 
 @dataclass(frozen=True)
-class Untracked:
+class UntrackedRun:
     """A run of measurements that is in no track, beside others that are.
 
     Attributes:
@@ -189,7 +189,7 @@ class Untracked:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeaveOneOutSummary:
     """How well measurements are predicted by a track that was made without them.
 
     Attributes:
@@ -241,12 +241,12 @@ class BallTrack:
     mode: tuple[BallMode, ...]
     views: tuple[tuple[str, ...], ...]
     events: tuple[BallEvent, ...] = ()
-    contradicted: tuple[Contradiction, ...] = ()
+    contradicted: tuple[ContradictingMeasurement, ...] = ()
     reason: str | None = None
-    left_out: LeftOut | None = None
+    left_out: LeaveOneOutSummary | None = None
     offsets: tuple[tuple[str, float], ...] = ()
     noise: tuple[tuple[str, float], ...] = ()
-    untracked: tuple[Untracked, ...] = ()
+    untracked: tuple[UntrackedRun, ...] = ()
     jumps: tuple[ViewJump, ...] = ()
 
     @cached_property

@@ -22,7 +22,7 @@ _NONE = np.full(29, np.nan)
 _UNKNOWN = np.full(PARAMETERS**2, np.nan)
 
 
-def frames_to_bytes(frames: Sequence[FrameCamera]) -> bytes:
+def frame_cameras_to_bytes(frames: Sequence[FrameCamera]) -> bytes:
     """Cameras of frames that follow each other as a compressed file of numpy; the same frames, the same bytes."""
     size = frames[0].size
     reasons = sorted({frame.reason for frame in frames if frame.reason is not None})
@@ -55,19 +55,19 @@ def frames_to_bytes(frames: Sequence[FrameCamera]) -> bytes:
     return content.getvalue()
 
 
-def frames_from_bytes(content: bytes) -> list[FrameCamera]:
-    """Back from ``frames_to_bytes``.
+def frame_cameras_from_bytes(content: bytes) -> list[FrameCamera]:
+    """Back from ``frame_cameras_to_bytes``.
 
     Raises:
         InputError: It is no such file, or one of another version.
     """
     try:
-        return _frames(content)
+        return _decode_frames(content)
     except Exception as error:
         raise InputError("the file of cameras is empty or damaged; track the shot again") from error
 
 
-def _frames(content: bytes) -> list[FrameCamera]:
+def _decode_frames(content: bytes) -> list[FrameCamera]:
     with np.load(BytesIO(content), allow_pickle=False) as arrays:
         head = json.loads(arrays["head"].tobytes())
         kept = {name: arrays[name] for name in arrays.files if name != "head"}
@@ -84,8 +84,8 @@ def _frames(content: bytes) -> list[FrameCamera]:
             time=float(kept["time"][place]),
             outcome=OUTCOMES[kept["outcome"][place]],
             size=size,
-            camera=_camera(kept["camera"][place]),
-            covariance=_covariance(kept["covariance"][place]),
+            camera=_camera_from_row(kept["camera"][place]),
+            covariance=_covariance_from_row(kept["covariance"][place]),
             supported=known[place][0],
             explained=known[place][1],
             error_px=known[place][2],
@@ -96,12 +96,12 @@ def _frames(content: bytes) -> list[FrameCamera]:
     ]
 
 
-def _camera(row: Any) -> Camera | None:
+def _camera_from_row(row: Any) -> Camera | None:
     if np.isnan(row[0]):
         return None
     focal_x, focal_y, x0, y0, skew = row[12:17].tolist()
     return Camera(row[:9].reshape(3, 3), row[9:12], (focal_x, focal_y), (x0, y0), skew, row[17:])
 
 
-def _covariance(row: Any) -> tuple[float, ...] | None:
+def _covariance_from_row(row: Any) -> tuple[float, ...] | None:
     return None if np.isnan(row[0]) else tuple(row.tolist())

@@ -25,7 +25,7 @@ from app.video.indexing import index_times
 
 
 @dataclass(frozen=True)
-class Frame:
+class ClipFrame:
     """One frame.
 
     Attributes:
@@ -75,12 +75,12 @@ class Clip:
         _, image = next(read_frames(path, index, [first]))
         if (small := explain_too_small_picture(image)) is not None:
             raise ImageError(f"{path.name}: {small}")
-        shapes = [(each.shape[1], each.shape[0]) for each in (image, _work_size(image))]
+        shapes = [(each.shape[1], each.shape[0]) for each in (image, _resize_to_work_size(image))]
         own, work = (ImageSize(*shape) for shape in shapes)
         end = len(index) if last is None else last + 1
         return Clip(path, index, first, end - first, own, work)
 
-    def frames(self, first: int = 0, end: int | None = None) -> Iterator[Frame]:
+    def frames(self, first: int = 0, end: int | None = None) -> Iterator[ClipFrame]:
         """Frames of the clip from ``first`` to before ``end``.
 
         Raises:
@@ -89,23 +89,23 @@ class Clip:
         start, end = self.start, self.count if end is None else min(end, self.count)
         for number, image in read_frames(self.path, self.index, range(start + first, start + end)):
             time = float(self.index.seconds[number])
-            yield Frame(number - start, time, np.ascontiguousarray(_work_size(image)))
+            yield ClipFrame(number - start, time, np.ascontiguousarray(_resize_to_work_size(image)))
 
-    def as_shown(self, camera: Camera) -> Camera:
+    def scale_to_video(self, camera: Camera) -> Camera:
         """A camera of the work size in pixels of the video."""
-        return camera.scaled(*self._factors)
+        return camera.scaled(*self._scale_factors)
 
-    def as_read(self, camera: Camera) -> Camera:
+    def scale_to_work_size(self, camera: Camera) -> Camera:
         """A camera of the video in pixels of the work size."""
-        across, down = self._factors
+        across, down = self._scale_factors
         return camera.scaled(1 / across, 1 / down)
 
     @property
-    def _factors(self) -> tuple[float, float]:
+    def _scale_factors(self) -> tuple[float, float]:
         return self.size.width / self.work.width, self.size.height / self.work.height
 
 
-def _work_size(image: Image) -> Image:
+def _resize_to_work_size(image: Image) -> Image:
     height, width = image.shape[:2]
     if width < ENLARGED_WIDTH:
         return enlarge_small_picture(image)

@@ -31,12 +31,12 @@ from app.geometry.resection import (
 from app.paint.agreement import PaintAgreement, measure_agreement
 from app.paint.candidates import MAIN, WIDE, CameraLibrary
 from app.paint.propose import measure_weakest_marking
-from app.paint.snap import SnappedCamera, snap_reading
+from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.tracking.missing_marking import cameras_by_missing_marking
-from app.tracking.motion import BackgroundMatches, rotate_camera
-from app.tracking.picture import Picture, propose_in_picture
+from app.tracking.missing_marking import propose_missing_marking_cameras
+from app.tracking.motion import BackgroundMatches, apply_background_motion
+from app.tracking.picture import FramePicture, propose_in_picture
 
 Outcome = Literal["tracked", "bridged", "lost"]
 TRACKED: Outcome = "tracked"
@@ -114,7 +114,7 @@ class TrackedFrame:
 
 
 @dataclass(frozen=True)
-class Reach:
+class PaintSearchReach:
     """How far from a predicted camera paint is sought.
 
     Attributes:
@@ -133,22 +133,22 @@ class Reach:
 
 
 REACHES = (
-    Reach((6.0, 4.0, 3.0, 3.0), 0.6, 0.07, np.radians(0.02), 3.0),
-    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.03), 10.0),
+    PaintSearchReach((6.0, 4.0, 3.0, 3.0), 0.6, 0.07, np.radians(0.02), 3.0),
+    PaintSearchReach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.03), 10.0),
 )
 
 
 @dataclass(frozen=True)
-class Likely:
+class LikelyCamera:
     """A camera that a frame may have, and how well it agrees with the paint, 0 to 1."""
 
-    picture: Picture
+    picture: FramePicture
     camera: Camera
     score: float
 
 
 @dataclass
-class Follower:
+class CameraFollower:
     """Carries a camera from frame to frame, in either direction.
 
     Attributes:
@@ -172,7 +172,7 @@ class Follower:
     last: TrackedFrame | None = None
     usual: float = 0.0
     tried: int | None = None
-    unsure: list[Likely] = field(default_factory=list)
+    unsure: list[LikelyCamera] = field(default_factory=list)
     patchy_every: int = PATCHY_EVERY
     sought: int | None = None
     missed: int | None = None
@@ -180,10 +180,12 @@ class Follower:
     turned_since: float = 0.0
 
     def start(
-        self, picture: Picture, camera: Camera, covariance: FloatArray | None
+        self, picture: FramePicture, camera: Camera, covariance: FloatArray | None
     ) -> TrackedFrame:
         """The frame of a frame whose camera is given: drawn onto the paint where that agrees."""
-        snapped = self._snap(picture, camera, covariance, (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0))
+        snapped = self._snap_camera(
+            picture, camera, covariance, (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
+        )
         seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
         found = TrackedFrame(
             picture.number, picture.time, TRACKED, snapped.camera, snapped, seen, is_key=True
@@ -192,46 +194,50 @@ class Follower:
             reason = snapped.reason
             found = replace(found, outcome=BRIDGED, camera=camera, snapped=None, reason=reason)
             found = replace(found, covariance=covariance)
-        return self._now(found)
+        return self._remember_frame(found)
 
-    def step(self, picture: Picture, match: BackgroundMatches | None) -> TrackedFrame:
+    def step(self, picture: FramePicture, match: BackgroundMatches | None) -> TrackedFrame:
         """The frame of the next frame.
 
         Args:
             picture: The frame.
             match: From the frame before; None where nothing moves together.
         """
-        found = self._followed(picture, match)
+        found = self._follow_background(picture, match)
         if match is None:
             # What is shown now is another picture than the one that was tried.
             self.tried, self.patchy_every, self.in_vain = None, PATCHY_EVERY, 0
         else:
-            self.turned_since += _share_turned(match, picture.image.shape[1])
+            self.turned_since += _compute_motion_fraction(match, picture.image.shape[1])
         if found.outcome is TRACKED and found.seen is not None:
-            return self._now(self._another(picture, found) if self._is_patchy(found) else found)
+            return self._remember_frame(
+                self._prefer_proposed_camera(picture, found)
+                if self._has_weak_paint(found)
+                else found
+            )
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
             again = self.propose(picture)
             if again is not None:
-                return self._now(again)
-        return self._now(found)
+                return self._remember_frame(again)
+        return self._remember_frame(found)
 
-    def _another(self, picture: Picture, found: TrackedFrame) -> TrackedFrame:
+    def _prefer_proposed_camera(self, picture: FramePicture, found: TrackedFrame) -> TrackedFrame:
         """The frame with the camera that the paint alone says where that agrees clearly better."""
-        if self._was_tried(picture, self.patchy_every):
+        if self._was_recently_proposed(picture, self.patchy_every):
             return found
         again = self.propose(picture, self.patchy_every)
-        if again is not None and _product(again) > CLEARLY * _product(found):
+        if again is not None and _agreement_product(again) > CLEARLY * _agreement_product(found):
             self.patchy_every = PATCHY_EVERY
             return again
         self.patchy_every = min(2 * self.patchy_every, PATCHY_LEAST_OFTEN)
         return found
 
-    def propose(self, picture: Picture, every: int = PROPOSED_EVERY) -> TrackedFrame | None:
+    def propose(self, picture: FramePicture, every: int = PROPOSED_EVERY) -> TrackedFrame | None:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
-        if self._was_tried(picture, every):
+        if self._was_recently_proposed(picture, every):
             return None
         self.tried, self.turned_since = picture.number, 0.0
-        libraries = self._libraries()
+        libraries = self._choose_camera_libraries()
         self.in_vain += 1
         try:
             found = propose_in_picture(picture, self.pitch, self.known[-1:], self.policy, libraries)
@@ -244,7 +250,7 @@ class Follower:
                 found.agreement.supported >= LIKELY and (found.weakest or 0) >= LIKELY_WEAKEST
             )
             if is_likely and not self.known and len(self.unsure) < MOST_UNSURE:
-                self.unsure.append(Likely(picture, found.camera, found.agreement.product))
+                self.unsure.append(LikelyCamera(picture, found.camera, found.agreement.product))
             return None
         # One that was found is no reason to wait until the view is another one.
         self.in_vain, self.turned_since = 0, np.inf
@@ -253,7 +259,7 @@ class Follower:
             is_key=True,
         )  # fmt: skip
 
-    def _libraries(self) -> tuple[CameraLibrary, ...]:
+    def _choose_camera_libraries(self) -> tuple[CameraLibrary, ...]:
         """Where a camera is sought besides the positions that are known: a tripod stays where it is.
 
         The farther off, the more seldom: to look everywhere costs ten times what a frame may.
@@ -262,14 +268,16 @@ class Follower:
             return (MAIN, WIDE)
         return () if self.known else (MAIN,)
 
-    def _was_tried(self, picture: Picture, every: int) -> bool:
+    def _was_recently_proposed(self, picture: FramePicture, every: int) -> bool:
         """Whether a camera was proposed, in vain, in one of so many frames before, or of this view."""
         if self.tried is None:
             return False
         ago = abs(picture.number - self.tried)
         return ago < every or (ago < SAME_VIEW_FRAMES and self.turned_since < SAME_VIEW)
 
-    def _followed(self, picture: Picture, match: BackgroundMatches | None) -> TrackedFrame:
+    def _follow_background(
+        self, picture: FramePicture, match: BackgroundMatches | None
+    ) -> TrackedFrame:
         last = self.last
         nothing = TrackedFrame(picture.number, picture.time, LOST)
         if last is None or last.camera is None:
@@ -277,11 +285,11 @@ class Follower:
         if match is None:
             return replace(nothing, reason="the background cannot be followed: a cut, or a blur")
         half = picture.reading.half_diagonal
-        camera, _ = rotate_camera(last.camera, match, half)
+        camera, _ = apply_background_motion(last.camera, match, half)
         unit = max(picture.reading.width / 960, 0.6)
         age = last.age + 1
         predicted = replace(nothing, outcome=BRIDGED, camera=camera, age=age)
-        found, why = self._drawn(picture, camera, predicted, unit)
+        found, why = self._snap_predicted_camera(picture, camera, predicted, unit)
         if found is None:
             return replace(nothing, reason=why)
         if why is None:
@@ -290,8 +298,8 @@ class Follower:
             return replace(nothing, seen=found.seen, reason=why)
         return replace(predicted, seen=found.seen, reason=why)
 
-    def _drawn(
-        self, picture: Picture, camera: Camera, predicted: TrackedFrame, unit: float
+    def _snap_predicted_camera(
+        self, picture: FramePicture, camera: Camera, predicted: TrackedFrame, unit: float
     ) -> tuple[TrackedFrame | None, str | None]:
         """The predicted camera drawn onto the paint, and why that does not hold.
 
@@ -304,7 +312,7 @@ class Follower:
         for reach in REACHES:
             known = predicted_covariance(picture, camera, reach, unit, 1 + self.age)
             try:
-                snapped = self._snap(picture, camera, known, reach.windows)
+                snapped = self._snap_camera(picture, camera, known, reach.windows)
                 seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
             except (GeometryError, np.linalg.LinAlgError):
                 continue
@@ -312,7 +320,7 @@ class Follower:
             if snapped.reason is None:
                 weakest = measure_weakest_marking(picture.reading, snapped, self.pitch)
             most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
-            why = self._why_not(snapped, seen, weakest, unit, most)
+            why = self._explain_rejection(snapped, seen, weakest, unit, most)
             outcome = TRACKED if why is None else BRIDGED
             found = replace(
                 predicted, outcome=outcome, camera=snapped.camera, snapped=snapped, seen=seen,
@@ -323,28 +331,31 @@ class Follower:
                 self.sought = None if score > best_score * RATHER else picture.number
             if score > best_score * (1.0 if best is None else RATHER):
                 best_score, told, best = score, why, found
-            if told is None and not self._is_worth_more(best, picture):
+            if told is None and not self._needs_wider_search(best, picture):
                 break
         if told == MISSING and best is not None and best.snapped is not None:
-            moved = self._drawn_through_missing_marking(picture, best, best.snapped, unit)
+            moved = self._snap_through_missing_marking(picture, best, best.snapped, unit)
             if moved is not None:
                 return moved, None
         return best, told
 
-    def _drawn_through_missing_marking(
-        self, picture: Picture, best: TrackedFrame, snapped: SnappedCamera, unit: float
+    def _snap_through_missing_marking(
+        self, picture: FramePicture, best: TrackedFrame, snapped: SnappedCamera, unit: float
     ) -> TrackedFrame | None:
         """The frame with a camera on whose paint the missing marking is as well; None where there is none."""
         if self.missed is not None and abs(picture.number - self.missed) < AGAIN_AFTER:
             return None
         self.missed = picture.number
-        for camera in cameras_by_missing_marking(picture, snapped, self.pitch, self.policy):
+        for camera in propose_missing_marking_cameras(picture, snapped, self.pitch, self.policy):
             try:
-                found = self._snap(picture, camera, None, REACHES[1].windows)
+                found = self._snap_camera(picture, camera, None, REACHES[1].windows)
                 seen = measure_agreement(found.camera, picture.field, picture.paint, self.pitch)
             except (GeometryError, np.linalg.LinAlgError):
                 continue
-            if found.reason is not None or _moved_px(snapped, found) > MOST_MOVED_ANEW_PX * unit:
+            if (
+                found.reason is not None
+                or _measure_median_shift_px(snapped, found) > MOST_MOVED_ANEW_PX * unit
+            ):
                 continue
             weakest = measure_weakest_marking(picture.reading, found, self.pitch)
             frame = replace(
@@ -355,20 +366,20 @@ class Follower:
                 seen=seen,
                 weakest=weakest,
             )
-            if self._why_not(found, seen, weakest, unit, np.inf) is None and (
+            if self._explain_rejection(found, seen, weakest, unit, np.inf) is None and (
                 frame.score > CLEARLY * best.score
             ):
                 self.missed = None
                 return frame
         return None
 
-    def _is_worth_more(self, found: TrackedFrame | None, picture: Picture) -> bool:
+    def _needs_wider_search(self, found: TrackedFrame | None, picture: FramePicture) -> bool:
         """Whether paint is sought farther off for a camera that has paint."""
         if self.sought is not None and abs(picture.number - self.sought) < AGAIN_AFTER:
             return False
-        return self._is_patchy(found)
+        return self._has_weak_paint(found)
 
-    def _is_patchy(self, found: TrackedFrame | None) -> bool:
+    def _has_weak_paint(self, found: TrackedFrame | None) -> bool:
         """Whether a camera has less paint, or worse, than one that is right would have."""
         if found is None or found.seen is None or found.snapped is None:
             return True
@@ -388,7 +399,7 @@ class Follower:
         """Frames since one that lies on the paint."""
         return 0 if self.last is None else self.last.age
 
-    def _why_not(
+    def _explain_rejection(
         self,
         snapped: SnappedCamera,
         seen: PaintAgreement,
@@ -408,15 +419,19 @@ class Follower:
             return MISSING
         return None
 
-    def _snap(
-        self, picture: Picture, camera: Camera, known: FloatArray | None, windows: Sequence[float]
+    def _snap_camera(
+        self,
+        picture: FramePicture,
+        camera: Camera,
+        known: FloatArray | None,
+        windows: Sequence[float],
     ) -> SnappedCamera:
-        return snap_reading(
+        return snap_to_prepared_picture(
             picture.reading, camera, self.pitch, windows, self.policy, known,
             circles_count_twice=True, position_is_known=known is not None, most_surprising=np.inf,
         )  # fmt: skip
 
-    def _now(self, found: TrackedFrame) -> TrackedFrame:
+    def _remember_frame(self, found: TrackedFrame) -> TrackedFrame:
         self.last = found
         if found.outcome is TRACKED and found.seen is not None and found.camera is not None:
             share = found.seen.supported
@@ -425,7 +440,7 @@ class Follower:
         return found
 
 
-def _share_turned(match: BackgroundMatches, width: int) -> float:
+def _compute_motion_fraction(match: BackgroundMatches, width: int) -> float:
     """By which share of its width the picture moved, or grew."""
     moved = match.there - match.here
     shift = float(np.hypot(*np.median(moved, axis=0)))
@@ -433,19 +448,19 @@ def _share_turned(match: BackgroundMatches, width: int) -> float:
     return shift / width + abs(float(np.log(spread[1] / spread[0])))
 
 
-def _moved_px(before: SnappedCamera, after: SnappedCamera) -> float:
+def _measure_median_shift_px(before: SnappedCamera, after: SnappedCamera) -> float:
     """How far the places on which paint was seen are moved by another camera, in the median, pixels."""
     places = before.evidence.traced.places
     apart = np.hypot(*(after.camera.project(places) - before.camera.project(places)).T)
     return float(np.median(np.nan_to_num(apart, nan=np.inf)))
 
 
-def _product(frame: TrackedFrame) -> float:
+def _agreement_product(frame: TrackedFrame) -> float:
     return 0.0 if frame.seen is None else frame.seen.product
 
 
 def predicted_covariance(
-    picture: Picture, camera: Camera, reach: Reach, unit: float, frames: int
+    picture: FramePicture, camera: Camera, reach: PaintSearchReach, unit: float, frames: int
 ) -> FloatArray:
     """How well a camera is known that the background turned, shape (8, 8).
 
@@ -462,7 +477,7 @@ def predicted_covariance(
     height, width = picture.field.shape
     columns, rows = np.meshgrid(*(np.linspace(0.1, 0.9, n) for n in GRID))
     pixels = np.column_stack([columns.ravel() * width, rows.ravel() * height])
-    ground = camera.on_ground(pixels)
+    ground = camera.project_to_ground(pixels)
     ground = ground[np.isfinite(ground).all(axis=1) & (np.hypot(*np.nan_to_num(ground).T) < 150)]
     sigma = np.empty(PARAMETERS)
     sigma[[PAN, TILT]], sigma[ROLL] = ANGLE_SIGMA, reach.roll_sigma * np.sqrt(frames)

@@ -13,9 +13,9 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
 from app.tracking.ball_rays import BallRays
-from app.tracking.link_fit import FEWEST_PAIRS, Fit, Map, frame_seconds
-from app.tracking.link_reasons import judged
-from app.tracking.time_map import TimeMap, map_of_instants
+from app.tracking.link_fit import FEWEST_PAIRS, LinearTimeMap, LinkFit, estimate_frame_interval_s
+from app.tracking.link_reasons import judge_map
+from app.tracking.time_map import TimeMap, fit_map_to_instants
 
 _CHANGE = 15.0
 """Natural logarithm of how many times likelier a change of the map makes the rays."""
@@ -39,43 +39,47 @@ def find_time_map(
             a frame. Two say a map where the ball says none.
     """
     given = np.array(hints, dtype=float).reshape(-1, 2)
-    made = or_turned(map_of_ball(live, replay, given), live, replay, given)
+    made = check_half_turn(fit_time_map(live, replay, given), live, replay, given)
     if made.pieces:
         return made
     if made.reason is not None and len(given) > 1 and np.ptp(given[:, 1]) > 0:
-        return _by_hand(live, replay, given)
+        return _make_map_from_hints(live, replay, given)
     return made
 
 
-def map_of_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
+def fit_time_map(
+    live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True
+) -> TimeMap:
     """The map that the ball says, near the hints, shape (N, 2); with its pieces where a ``whole`` replay has several."""
     for name, rays in (("live shot", live), ("replay", replay)):
         if len(rays) < FEWEST_PAIRS:
             reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
-    fit = Fit(live, replay, hints)
-    tried = [fit.refined(one) for one in fit.candidates()]
+    fit = LinkFit(live, replay, hints)
+    tried = [fit.refine_map(one) for one in fit.candidates()]
     found = [one for one in tried if one is not None]
     if not found:
         where = " near the instants given" if len(hints) else ""
         reason = f"The rays of the live shot and the replay do not meet long enough{where}."
         return TimeMap(reason)
     best = max(found, key=fit.evidence)
-    made = judged(fit, best, found)
-    return _in_pieces(fit, made, best, found) if whole else made
+    made = judge_map(fit, best, found)
+    return _split_into_pieces(fit, made, best, found) if whole else made
 
 
-def or_turned(made: TimeMap, live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
-    """What ``map_of_ball`` made; where it says nothing, and would once the replay's cameras are turned, that is said."""
+def check_half_turn(made: TimeMap, live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
+    """What ``fit_time_map`` made; where it says nothing, and would once the replay's cameras are turned, that is said."""
     if made.reason is None or made.pieces:
         return made
-    other = map_of_ball(live, replay.turned(), hints)
+    other = fit_time_map(live, replay.turned(), hints)
     if other.reason is not None and not other.pieces:
         return made
     return replace(made, reason=TURNED, turned=True)
 
 
-def ray_misses(live: BallRays, replay: BallRays, made: TimeMap) -> tuple[FloatArray, FloatArray]:
+def measure_ray_distances(
+    live: BallRays, replay: BallRays, made: TimeMap
+) -> tuple[FloatArray, FloatArray]:
     """Times of the rays of a replay that have live ones beside them under a map, and how far they miss, metres."""
     times, misses = [np.zeros(0)], [np.zeros(0)]
     for piece in made.pieces or (made,):
@@ -83,26 +87,28 @@ def ray_misses(live: BallRays, replay: BallRays, made: TimeMap) -> tuple[FloatAr
         inside = (replay.times >= piece.first) & (replay.times <= piece.last)
         part = replay.part(np.flatnonzero(inside))
         if len(part):
-            fit = Fit(live, part, np.zeros((0, 2)))
-            pairs = fit.pairs(Map(piece.offset, piece.speed, 0.0))
+            fit = LinkFit(live, part, np.zeros((0, 2)))
+            pairs = fit.pairs(LinearTimeMap(piece.offset, piece.speed, 0.0))
             times.append(part.times[pairs.replay])
             misses.append(np.abs(pairs.miss))
     return np.concatenate(times), np.concatenate(misses)
 
 
-def _by_hand(live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
+def _make_map_from_hints(live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
     """The map of a person's instants alone."""
-    made = map_of_instants(hints, frame_seconds(live))
+    made = fit_map_to_instants(hints, estimate_frame_interval_s(live))
     if made.reason is not None or min(len(live), len(replay)) < 2:
         return made
     assert made.offset is not None and made.speed is not None
-    pairs = Fit(live, replay, hints).pairs(Map(made.offset, made.speed, 0.0))
+    pairs = LinkFit(live, replay, hints).pairs(LinearTimeMap(made.offset, made.speed, 0.0))
     count = len(pairs.miss)
     miss = float(np.median(np.abs(pairs.miss))) if count else None
     return replace(made, miss=miss, pairs=count)
 
 
-def _in_pieces(fit: Fit, made: TimeMap, best: Map, found: Sequence[Map]) -> TimeMap:
+def _split_into_pieces(
+    fit: LinkFit, made: TimeMap, best: LinearTimeMap, found: Sequence[LinearTimeMap]
+) -> TimeMap:
     """What became of a link, refused where one map does not fit the whole replay.
 
     Every ray is given one of the maps that were found, or none, changes being dear (Viterbi); the
@@ -113,22 +119,26 @@ def _in_pieces(fit: Fit, made: TimeMap, best: Map, found: Sequence[Map]) -> Time
     fit.run = 1.0
     maps = [best, *found]
     for rows in np.array_split(np.arange(len(replay)), 3):
-        near = Fit(live, replay.part(rows), fit.hints[:0])
+        near = LinkFit(live, replay.part(rows), fit.hints[:0])
         at = float(best.live(np.array(near.middle)))
-        one = near.refined(replace(best, at=at, middle=near.middle))
+        one = near.refine_map(replace(best, at=at, middle=near.middle))
         if one is not None:
             near.set_noise(one)
             fit.noise = min(fit.noise, near.noise)
             maps.append(one)
-    left = [rows for rows in _stretches(fit, [best], none=True) if fit.meant(best, rows)]
+    left = [
+        rows
+        for rows in _split_by_best_map(fit, [best], none=True)
+        if fit.has_enough_pairs(best, rows)
+    ]
     for rows in left:
-        near = Fit(live, replay.part(rows), fit.hints[:0])
-        maps += [one for one in map(near.refined, near.candidates()) if one is not None]
-    parts = [replay.part(rows) for rows in _stretches(fit, maps)]
+        near = LinkFit(live, replay.part(rows), fit.hints[:0])
+        maps += [one for one in map(near.refine_map, near.candidates()) if one is not None]
+    parts = [replay.part(rows) for rows in _split_by_best_map(fit, maps)]
     pieces: list[TimeMap] = []
     for part in parts if len(parts) > 1 else ():
-        piece = map_of_ball(live, part, fit.hints[:0], whole=False)
-        if piece.reason is None and (not pieces or _differ(pieces[-1], piece)):
+        piece = fit_time_map(live, part, fit.hints[:0], whole=False)
+        if piece.reason is None and (not pieces or _are_maps_different(pieces[-1], piece)):
             pieces.append(piece)
     if len(pieces) > 1:
         changes = " and ".join(f"{one.first:.2f} s" for one in pieces[1:])
@@ -144,15 +154,17 @@ def _in_pieces(fit: Fit, made: TimeMap, best: Map, found: Sequence[Map]) -> Time
     return made
 
 
-def _stretches(fit: Fit, maps: Sequence[Map], none: bool = False) -> list[IntArray]:
-    """Rays of the replay that follow each other and fit one map best; or with ``none`` no map."""
-    gains = np.array([np.zeros(len(fit.replay)), *(fit.likelihoods(one) for one in maps)])
-    ways = _cheapest(gains, _CHANGE)
+def _split_by_best_map(
+    fit: LinkFit, maps: Sequence[LinearTimeMap], none: bool = False
+) -> list[IntArray]:
+    """Rays of the replay that follow each other and fit one map best; or with ``make_empty_track`` no map."""
+    gains = np.array([np.zeros(len(fit.replay)), *(fit.ray_log_likelihoods(one) for one in maps)])
+    ways = _find_best_path(gains, _CHANGE)
     stretches = np.split(np.arange(len(ways)), np.flatnonzero(np.diff(ways)) + 1)
     return [rows for rows in stretches if (ways[rows[0]] == 0) == none]
 
 
-def _differ(a: TimeMap, b: TimeMap) -> bool:
+def _are_maps_different(a: TimeMap, b: TimeMap) -> bool:
     """Whether two pieces have maps that no noise makes of one."""
     assert a.offset is not None and a.speed is not None and a.covariance is not None
     assert b.offset is not None and b.speed is not None and b.covariance is not None
@@ -167,7 +179,7 @@ def _differ(a: TimeMap, b: TimeMap) -> bool:
     )
 
 
-def _cheapest(gains: FloatArray, change: float) -> IntArray:
+def _find_best_path(gains: FloatArray, change: float) -> IntArray:
     """The row of each column on the way with the greatest sum, each change of row being dear.
 
     Args:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, slopes_of
-from app.tracking.link_kernels import meeting_scores
+from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, estimate_ray_velocities
+from app.tracking.link_kernels import score_ray_meetings
 from app.tracking.time_map import TimeMap
 
 SLOWEST, FASTEST = 0.2, 1.15
@@ -50,12 +50,12 @@ _NEAR_HINT_S = 0.3
 """How far a map may be from an instant that a person gives."""
 
 
-def frame_seconds(rays: BallRays) -> float:
+def estimate_frame_interval_s(rays: BallRays) -> float:
     return float(np.median(np.diff(rays.times))) if len(rays) > 1 else 0.04
 
 
 @dataclass(frozen=True)
-class Map:
+class LinearTimeMap:
     """A map by the live time ``at`` of the replay's time ``middle``, and its speed."""
 
     at: float
@@ -73,7 +73,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Pairs:
+class RayPairs:
     """Rays of the replay with the live rays of their times under a map.
 
     Attributes:
@@ -98,7 +98,7 @@ class Pairs:
     normal: FloatArray
 
 
-def _nearest(
+def _find_closest_approach(
     live_at: FloatArray, live_way: FloatArray, replay_at: FloatArray, replay_way: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, FloatArray]:
     """Misses of rays of unit length, reaches along both, whether a ball can be there, and normals.
@@ -121,7 +121,7 @@ def _nearest(
     return miss, reach_live, reach_replay, inside, normal
 
 
-def _between(
+def _interpolate_rays(
     rays: BallRays, before: IntArray, times: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Positions and directions on the way from a ray to the next, and whether that is near enough."""
@@ -134,34 +134,34 @@ def _between(
     return positions, directions / np.linalg.norm(directions, axis=1, keepdims=True), known
 
 
-class Fit:
+class LinkFit:
     """Maps between two views, compared at the noise that their rays have."""
 
     def __init__(self, live: BallRays, replay: BallRays, hints: FloatArray):
         self.live, self.replay, self.hints = live, replay, hints
         self.middle = float(replay.times[0] + replay.times[-1]) / 2
         self.span = float(replay.times[-1] - replay.times[0])
-        self.hint_sigma = frame_seconds(live)
-        self.slopes = slopes_of(live)
+        self.hint_sigma = estimate_frame_interval_s(live)
+        self.slopes = estimate_ray_velocities(live)
         """Velocities of the live cameras, of the live rays, and the variance of the latter."""
         self.noise = 1.0
         """Misses by those that the noise of the rays leaves."""
         self.run = 1.0
         """Neighbours that say the same, beyond those that share a ray."""
 
-    def apart(self, a: Map, b: Map) -> float:
+    def apart(self, a: LinearTimeMap, b: LinearTimeMap) -> float:
         """Most seconds between the live times that two maps give the replay."""
         ends = self.replay.times[[0, -1]]
         return float(np.abs(a.live(ends) - b.live(ends)).max())
 
-    def candidates(self) -> list[Map]:
+    def candidates(self) -> list[LinearTimeMap]:
         """Maps under which most rays meet, best first: every offset with every speed."""
         live, replay = self.live, self.replay
         some = np.unique(np.linspace(0, len(replay) - 1, _MOST_TRIED).astype(int))
         begin, end = live.times[0], live.times[-1]
         grid = np.arange(begin, end + _GRID_S, _GRID_S)
         before = np.clip(np.searchsorted(live.times, grid) - 1, 0, len(live) - 2)
-        positions, directions, known = _between(live, before, grid)
+        positions, directions, known = _interpolate_rays(live, before, grid)
         seen = np.hstack([positions, directions])
         rays = np.hstack([replay.positions[some], replay.directions[some]])
         sigma_live = float(np.median(live.sigma))
@@ -171,46 +171,46 @@ class Fit:
             shifts = speed * (replay.times[some] - self.middle) / _GRID_S
             first = int(np.floor((LEAST_OVERLAP_S - speed * self.span / 2) / _GRID_S))
             centres = np.arange(first, len(grid) - first, round(_COARSE_S / _GRID_S))
-            centres = centres[self._near_hints(begin + _GRID_S * centres, float(speed))]
+            centres = centres[self._is_near_hints(begin + _GRID_S * centres, float(speed))]
             scores.append(
-                meeting_scores(
+                score_ray_meetings(
                     centres, shifts, seen, known, sigma_live, rays, replay.sigma[some], _ROOM,
                     _SEARCH_M**2, _BACKGROUND_M, float(np.exp(_WRONG)),
                 )
             )  # fmt: skip
             maps.append(np.column_stack([begin + _GRID_S * centres, np.full(len(centres), speed)]))
         score, table = np.concatenate(scores), np.vstack(maps)
-        chosen: list[Map] = []
+        chosen: list[LinearTimeMap] = []
         for row in np.argsort(-score, kind="stable"):
             if len(chosen) == _CANDIDATES or score[row] <= 0:
                 break
-            one = Map(float(table[row, 0]), float(table[row, 1]), self.middle)
+            one = LinearTimeMap(float(table[row, 0]), float(table[row, 1]), self.middle)
             if all(self.apart(one, other) > APART_S for other in chosen):
                 chosen.append(one)
         return chosen
 
-    def _near_hints(self, at: FloatArray, speed: float) -> BoolArray:
+    def _is_near_hints(self, at: FloatArray, speed: float) -> BoolArray:
         seen = at[:, None] + speed * (self.hints[:, 1] - self.middle)
         off = np.abs(seen - self.hints[:, 0]).max(axis=1, initial=0.0)
         near: BoolArray = off <= _NEAR_HINT_S
         return near
 
-    def pairs(self, one: Map) -> Pairs:
+    def pairs(self, one: LinearTimeMap) -> RayPairs:
         """The rays that have a partner under a map."""
         live, replay = self.live, self.replay
         times = one.live(replay.times)
         before = np.clip(np.searchsorted(live.times, times) - 1, 0, len(live) - 2)
-        positions, directions, known = _between(live, before, times)
+        positions, directions, known = _interpolate_rays(live, before, times)
         rays = np.flatnonzero(known)
         before = before[rays]
         gap = live.times[before + 1] - live.times[before]
         share = (times[rays] - live.times[before]) / gap
-        miss, reach_live, reach_replay, inside, normal = _nearest(
+        miss, reach_live, reach_replay, inside, normal = _find_closest_approach(
             positions[rays], directions[rays], replay.positions[rays], replay.directions[rays]
         )
-        return Pairs(rays, before, share, gap, miss, reach_live, reach_replay, inside, normal)
+        return RayPairs(rays, before, share, gap, miss, reach_live, reach_replay, inside, normal)
 
-    def _parts(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+    def _split_miss_sigma(self, pairs: RayPairs) -> tuple[FloatArray, FloatArray]:
         """Deviations of the misses: of each alone, shape (M,), and by its two live rays, (M, 2)."""
         own = pairs.reach_replay * self.replay.sigma[pairs.replay]
         # All rays of the replay between the same two live ones are bent the same way.
@@ -222,13 +222,13 @@ class Fit:
         )
         return np.hypot(own, bend), shared * pairs.reach_live[:, None]
 
-    def sigma_of(self, pairs: Pairs) -> FloatArray:
+    def compute_miss_sigma(self, pairs: RayPairs) -> FloatArray:
         """Deviation of each miss, metres, shape (M,)."""
-        own, shared = self._parts(pairs)
+        own, shared = self._split_miss_sigma(pairs)
         sigma: FloatArray = self.noise * np.sqrt(own**2 + (shared**2).sum(axis=1))
         return sigma
 
-    def _jacobian(self, pairs: Pairs) -> FloatArray:
+    def _jacobian(self, pairs: RayPairs) -> FloatArray:
         """Derivatives of the misses by the map's time and speed, shape (M, 2)."""
         at, way, _ = self.slopes
         share = pairs.share[:, None]
@@ -237,7 +237,7 @@ class Fit:
         slope = ((moved + pairs.reach_live[:, None] * turned) * pairs.normal).sum(axis=1)
         return np.column_stack([slope, slope * (self.replay.times[pairs.replay] - self.middle)])
 
-    def refined(self, one: Map, hold: int | None = None) -> Map | None:
+    def refine_map(self, one: LinearTimeMap, hold: int | None = None) -> LinearTimeMap | None:
         """The map nearby that fits best, or None; ``hold`` keeps its time (0) or its speed (1)."""
         free = [at for at in (0, 1) if at != hold]
         at = np.array([one.at, one.speed])
@@ -247,7 +247,7 @@ class Fit:
             pairs = self.pairs(replace(one, at=float(at[0]), speed=float(at[1])))
             if len(pairs.miss) < FEWEST_PAIRS:
                 return None
-            pulled = self._weigh(pairs, floor)(jacobian := self._jacobian(pairs))
+            pulled = self._make_weighting(pairs, floor)(jacobian := self._jacobian(pairs))
             normal, pull = jacobian.T @ pulled, pulled.T @ pairs.miss
             normal += hinted.T @ hinted / self.hint_sigma**2
             pull += hinted.T @ (hinted @ at - self.hints[:, 0]) / self.hint_sigma**2
@@ -260,14 +260,16 @@ class Fit:
                 break
         return replace(one, at=float(at[0]), speed=float(at[1]))
 
-    def _weigh(self, pairs: Pairs, floor: float = 0.0) -> Callable[[FloatArray], FloatArray]:
+    def _make_weighting(
+        self, pairs: RayPairs, floor: float = 0.0
+    ) -> Callable[[FloatArray], FloatArray]:
         """The inverse covariance of the misses, gross errors doubted, as a function of columns.
 
         Two rays of the replay between the same live rays share those rays' noise: the covariance
         is D + S S^T with two entries in a row of S, and its inverse by Woodbury's identity asks
         for a tridiagonal system alone.
         """
-        own, shared = self._parts(pairs)
+        own, shared = self._split_miss_sigma(pairs)
         own, shared = self.noise * own, self.noise * shared
         total = own**2 + (shared**2).sum(axis=1) + floor**2
         weight = (_FREEDOM + 1) / (_FREEDOM + pairs.miss**2 / total)
@@ -280,7 +282,7 @@ class Fit:
         np.add.at(band[1], pairs.live + 1, parts[:, 1] ** 2 / diagonal)
         np.add.at(band[0], pairs.live + 1, parts[:, 0] * parts[:, 1] / diagonal)
 
-        def weigh(columns: FloatArray) -> FloatArray:
+        def apply_inverse_covariance(columns: FloatArray) -> FloatArray:
             scaled = columns / diagonal[:, None]
             held = np.zeros((len(self.live), columns.shape[1]))
             np.add.at(held, pairs.live, parts[:, :1] * scaled)
@@ -290,15 +292,15 @@ class Fit:
             result: FloatArray = scaled - back / diagonal[:, None]
             return result
 
-        return weigh
+        return apply_inverse_covariance
 
-    def likelihoods(self, one: Map) -> FloatArray:
+    def ray_log_likelihoods(self, one: LinearTimeMap) -> FloatArray:
         """Logarithm of how much likelier each ray's miss is under a map than by chance, (N,).
 
         0 where a ray has no partner.
         """
         pairs = self.pairs(one)
-        sigma = self.sigma_of(pairs)
+        sigma = self.compute_miss_sigma(pairs)
         # The density of the t distribution with four degrees of freedom.
         ratio = np.log(0.375 * _BACKGROUND_M / sigma) - 2.5 * np.log1p(
             (pairs.miss / sigma) ** 2 / _FREEDOM
@@ -310,39 +312,39 @@ class Fit:
         result[pairs.replay] = ratio / count[pairs.live] / self.run
         return result
 
-    def meant(self, one: Map, rows: IntArray) -> bool:
+    def has_enough_pairs(self, one: LinearTimeMap, rows: IntArray) -> bool:
         """Whether so many of some rays have partners under a map that they could be linked."""
         times = self.replay.times[np.intersect1d(rows, self.pairs(one).replay)]
         if len(times) < FEWEST_PAIRS:
             return False
         return one.speed * float(np.ptp(times)) >= LEAST_OVERLAP_S / 2
 
-    def evidence(self, one: Map) -> float:
+    def evidence(self, one: LinearTimeMap) -> float:
         """The same of all rays, and of a person's instants."""
         off = (one.live(self.hints[:, 1]) - self.hints[:, 0]) / self.hint_sigma
-        return float(self.likelihoods(one).sum() - (off**2).sum() / 2)
+        return float(self.ray_log_likelihoods(one).sum() - (off**2).sum() / 2)
 
-    def as_good(self, other: Map, best: Map) -> bool:
+    def is_as_good(self, other: LinearTimeMap, best: LinearTimeMap) -> bool:
         """Whether another map explains the rays as well, or most of them: those with partners."""
         if self.evidence(other) > self.evidence(best) - _CLEARLY:
             return True
-        mine, others = self.likelihoods(best), self.likelihoods(other)
+        mine, others = self.ray_log_likelihoods(best), self.ray_log_likelihoods(other)
         both = (mine != 0) & (others != 0)
         if both.sum() < LEAST_SHARE * (mine != 0).sum():
             return False
         of_hints = self.evidence(other) - others.sum() - (self.evidence(best) - mine.sum())
         return bool(others[both].sum() + of_hints > mine[both].sum() - _CLEARLY)
 
-    def set_noise(self, one: Map) -> None:
+    def set_noise(self, one: LinearTimeMap) -> None:
         """Take the noise from the misses under a map."""
         pairs = self.pairs(one)
         if pairs.inside.sum() >= FEWEST_PAIRS // 2:
-            ratio = np.abs(pairs.miss / self.sigma_of(pairs))[pairs.inside]
+            ratio = np.abs(pairs.miss / self.compute_miss_sigma(pairs))[pairs.inside]
             self.noise = max(self.noise * float(np.median(ratio)) / 0.6745, 1.0)
 
-    def described(self, one: Map, pairs: Pairs) -> TimeMap:
+    def described(self, one: LinearTimeMap, pairs: RayPairs) -> TimeMap:
         """A map with its covariance, wider where neighbouring misses hang together."""
-        jacobian, weigh = self._jacobian(pairs), self._weigh(pairs)
+        jacobian, weigh = self._jacobian(pairs), self._make_weighting(pairs)
         hinted = np.column_stack([np.ones(len(self.hints)), self.hints[:, 1] - self.middle])
         held = hinted.T @ hinted / self.hint_sigma**2
         normal = jacobian.T @ weigh(jacobian) + held

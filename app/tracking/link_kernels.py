@@ -7,7 +7,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def meeting_scores(
+def score_ray_meetings(
     centres, shifts, live, known, live_sigma, replay, replay_sigma, room, square, range_m, wrong
 ):
     """How well the rays of a replay meet those of a live shot under maps of one speed, shape (C,).

@@ -8,7 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from app.tracking.ball_rays import BallRays
-from app.tracking.link_fit import APART_S, LEAST_OVERLAP_S, LEAST_SHARE, Fit, Map, Pairs
+from app.tracking.link_fit import (
+    APART_S,
+    LEAST_OVERLAP_S,
+    LEAST_SHARE,
+    LinearTimeMap,
+    LinkFit,
+    RayPairs,
+)
 from app.tracking.time_map import TimeMap
 
 _MOST_MISS_M = 0.6
@@ -25,18 +32,18 @@ _RESTS_M = 1.0
 """Way of a ball that hardly moves."""
 
 
-def judged(fit: Fit, best: Map, found: Sequence[Map]) -> TimeMap:
+def judge_map(fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap]) -> TimeMap:
     """What can be said of the best map among others."""
     for _ in range(3):
         fit.set_noise(best)
-        best = fit.refined(best) or best
+        best = fit.refine_map(best) or best
     pairs = fit.pairs(best)
     made = fit.described(best, pairs)
-    reason = _why_not(fit, made, pairs) or _why_open(fit, best, found, pairs)
-    return replace(made, reason=reason or _why_no_use(fit, made, pairs))
+    reason = _explain_mismatch(fit, made, pairs) or _explain_ambiguity(fit, best, found, pairs)
+    return replace(made, reason=reason or _explain_uncertainty(fit, made, pairs))
 
 
-def _why_not(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
+def _explain_mismatch(fit: LinkFit, made: TimeMap, pairs: RayPairs) -> str | None:
     """Why the rays do not meet under a map; None where they do."""
     assert made.miss is not None
     if made.overlap < LEAST_OVERLAP_S:
@@ -51,7 +58,7 @@ def _why_not(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
             f"{fit.noise:.1f} times their noise: the cameras are exchanged, mirrored or not exact "
             "enough, or the replay is of another action."
         )
-    meets = pairs.inside & (np.abs(pairs.miss) < 4 * fit.sigma_of(pairs))
+    meets = pairs.inside & (np.abs(pairs.miss) < 4 * fit.compute_miss_sigma(pairs))
     if meets.mean() < LEAST_SHARE:
         return (
             f"{meets.mean():.0%} of the replay's rays meet the live ones where a ball can be; a "
@@ -68,18 +75,20 @@ def _why_not(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
     return None
 
 
-def _why_open(fit: Fit, best: Map, found: Sequence[Map], pairs: Pairs) -> str | None:
+def _explain_ambiguity(
+    fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap], pairs: RayPairs
+) -> str | None:
     """Why the ball cannot tell a map from others; None where it can."""
     shifted = [(replace(best, at=best.at + shift), 0) for shift in _SHIFTS_S]
     stretched = [(replace(best, speed=best.speed * factor), 1) for factor in _STRETCHES]
     for start, hold in [*((one, None) for one in found), *shifted, *stretched]:
-        other = fit.refined(start, hold)
+        other = fit.refine_map(start, hold)
         if other is None or fit.apart(best, other) < APART_S / 2:
             continue
-        if not fit.as_good(other, best):
+        if not fit.is_as_good(other, best):
             continue
         fits = f"an offset of {other.offset:.2f} s and a speed of {other.speed:.2f} fit as well"
-        if _way(fit.live, pairs) < _RESTS_M:
+        if _measure_ball_travel_m(fit.live, pairs) < _RESTS_M:
             return f"The ball hardly moves: {fits}."
         return (
             f"The ball does not tell the times: {fits}. It moves too little, or in a plane with "
@@ -88,7 +97,7 @@ def _why_open(fit: Fit, best: Map, found: Sequence[Map], pairs: Pairs) -> str | 
     return None
 
 
-def _why_no_use(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
+def _explain_uncertainty(fit: LinkFit, made: TimeMap, pairs: RayPairs) -> str | None:
     """Why a map is too uncertain to be used; None where it is not."""
     assert made.covariance is not None and made.speed is not None
     middle = np.array([1.0, float(np.median(fit.replay.times[pairs.replay]))])
@@ -101,7 +110,7 @@ def _why_no_use(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
     )
 
 
-def _way(live: BallRays, pairs: Pairs) -> float:
+def _measure_ball_travel_m(live: BallRays, pairs: RayPairs) -> float:
     """How far a ball comes about, metres."""
     reach = pairs.reach_live[:, None] * live.directions[pairs.live]
     place = (live.positions[pairs.live] + reach)[pairs.inside]

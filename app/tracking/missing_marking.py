@@ -16,12 +16,12 @@ from app.errors import GeometryError
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.paint.evidence import (
-    Evidence,
-    shows_grass_beside,
+    DetectedPaint,
+    has_grass_beside,
     to_paint_evidence,
     trace_visible_markings,
 )
-from app.paint.ridges import NEAR_PX, coordinates_along_piece, find_straight_pieces
+from app.paint.ridges import NEAR_PX, find_straight_pieces, measure_along_piece
 from app.paint.snap import SnappedCamera
 from app.paint.tracing import TracedPlaces
 from app.soccer.annotation import make_lines
@@ -30,7 +30,7 @@ from app.soccer.pitch import MARKINGS, Arc, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.sides import turn_camera
-from app.tracking.picture import Picture
+from app.tracking.picture import FramePicture
 
 MOST_PIECES, LEAST_PIECE_PX = 12, 80.0
 """Straight pieces that are looked at, and how long one has to be, pixels at 960 wide."""
@@ -42,8 +42,8 @@ ON_PIECE = 5
 """Points of a piece that stand for its marking."""
 
 
-def cameras_by_missing_marking(
-    picture: Picture, snapped: SnappedCamera, pitch: Pitch, policy: CalibrationPolicy
+def propose_missing_marking_cameras(
+    picture: FramePicture, snapped: SnappedCamera, pitch: Pitch, policy: CalibrationPolicy
 ) -> Iterator[Camera]:
     """Cameras that lie on the paint that was seen and on a straight line that a missing marking may be.
 
@@ -59,17 +59,17 @@ def cameras_by_missing_marking(
     height, width = snapped.size
     unit = width / 960
     traced = trace_visible_markings(picture.reading, snapped.camera, pitch)
-    missing = _missing_straight_markings(picture, snapped.evidence, traced, pitch)
+    missing = _find_missing_straight_markings(picture, snapped.evidence, traced, pitch)
     if not len(missing):
         return
-    seen = dict(to_paint_evidence(snapped.evidence).some_points())
+    seen = dict(to_paint_evidence(snapped.evidence).thin_points())
     pieces = find_straight_pieces(picture.paint, MOST_PIECES)
     pairs = [
         (aside, index, piece)
         for index in missing.tolist()
         for piece in pieces
         if not _is_explained(piece, snapped.evidence.pixels, unit)
-        and (aside := _distance_aside(piece, traced.pixels[traced.marking == index], unit))
+        and (aside := _median_distance_beside(piece, traced.pixels[traced.marking == index], unit))
         is not None
     ]
     for _, index, piece in sorted(pairs, key=lambda pair: pair[0]):
@@ -85,12 +85,12 @@ def cameras_by_missing_marking(
             yield turn_camera(found.camera) if opposite else found.camera
 
 
-def _missing_straight_markings(
-    picture: Picture, evidence: Evidence, traced: TracedPlaces, pitch: Pitch
+def _find_missing_straight_markings(
+    picture: FramePicture, evidence: DetectedPaint, traced: TracedPlaces, pitch: Pitch
 ) -> IntArray:
     """Indices into ``MARKINGS`` of the straight markings that would be seen and have no paint."""
     reading = picture.reading
-    usable = shows_grass_beside(reading, traced, GRASS_PX * reading.width / 960)
+    usable = has_grass_beside(reading, traced, GRASS_PX * reading.width / 960)
     shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
     seen = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
     straight = np.array([not isinstance(pitch.shapes.get(name), Arc) for name in MARKINGS])
@@ -100,12 +100,12 @@ def _missing_straight_markings(
 
 def _is_explained(piece: FloatArray, paint: FloatArray, unit: float) -> bool:
     """Whether the paint that was seen already lies along a piece."""
-    along, across, length = coordinates_along_piece(paint, piece)
+    along, across, length = measure_along_piece(paint, piece)
     beside = (across < 2 * NEAR_PX * unit) & (along > 0) & (along < length)
     return bool(np.ptp(along[beside]) > length / 2) if beside.any() else False
 
 
-def _distance_aside(piece: FloatArray, marking: FloatArray, unit: float) -> float | None:
+def _median_distance_beside(piece: FloatArray, marking: FloatArray, unit: float) -> float | None:
     """How far a piece lies beside a marking in the median, pixels; None where it is no candidate."""
     way, along = piece[2:] - piece[:2], marking[-1] - marking[0]
     if np.hypot(*way) < LEAST_PIECE_PX * unit or not along.any():

@@ -62,7 +62,7 @@ class BackgroundMatches:
     here: FloatArray
     there: FloatArray
 
-    def reversed(self) -> BackgroundMatches:
+    def swap_frames(self) -> BackgroundMatches:
         """The same from the later frame to the earlier one."""
         return BackgroundMatches(self.there, self.here)
 
@@ -77,15 +77,15 @@ def match_background(here: Grey, there: Grey) -> BackgroundMatches | None:
     corners = np.asarray(cv2.goodFeaturesToTrack(here, CORNERS, QUALITY, APART_PX), np.float32)
     if corners.ndim != 3 or len(corners) < LEAST_CORNERS:
         return None
-    found = _followed(here, there, corners, np.zeros(2))
+    found = _track_corners(here, there, corners, np.zeros(2))
     if found is None:
-        shift = _shift(here, there)
+        shift = _estimate_image_shift(here, there)
         if shift is not None:
-            found = _followed(here, there, corners, shift)
+            found = _track_corners(here, there, corners, shift)
     return found
 
 
-def _followed(
+def _track_corners(
     here: Grey, there: Grey, corners: npt.NDArray[np.float32], shift: FloatArray
 ) -> BackgroundMatches | None:
     """Corners that move together, sought from where a shift of the picture puts them."""
@@ -111,7 +111,7 @@ def _followed(
     return BackgroundMatches(one[chosen], other[chosen])
 
 
-def _shift(here: Grey, there: Grey) -> FloatArray | None:
+def _estimate_image_shift(here: Grey, there: Grey) -> FloatArray | None:
     """By how much all of a picture moved, pixels, shape (2,); None where both are not alike."""
     small = [
         cv2.resize(each, None, fx=1 / BLURRED, fy=1 / BLURRED, interpolation=cv2.INTER_AREA)
@@ -123,7 +123,7 @@ def _shift(here: Grey, there: Grey) -> FloatArray | None:
     return np.array(shift) * BLURRED if alike >= LEAST_ALIKE else None
 
 
-def rotate_camera(
+def apply_background_motion(
     camera: Camera, match: BackgroundMatches, half_diagonal: float
 ) -> tuple[Camera, float]:
     """A camera after the motion of a match, at the same place, and how well that explains it.
@@ -141,7 +141,7 @@ def rotate_camera(
     seen = np.isfinite(points).all(axis=1)
     points, there = points[seen], match.there[seen]
     parameters, apart = start.copy(), np.empty(len(points))
-    turn_to_points(
+    rotate_and_zoom_to_points(
         parameters, points, there - camera.principal_point, half_diagonal, ROUNDS, ROBUST_PX, apart
     )
     moved = camera_from_parameters(parameters, camera.principal_point, half_diagonal)
@@ -149,7 +149,7 @@ def rotate_camera(
 
 
 @compiled
-def turn_to_points(parameters, points, pixels, half_diagonal, rounds, robust_px, apart):
+def rotate_and_zoom_to_points(parameters, points, pixels, half_diagonal, rounds, robust_px, apart):
     """Turns and zooms a camera until it shows points where they are seen; far ones count little.
 
     Args:

@@ -14,7 +14,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
 from app.paint.candidates import CameraLibrary
-from app.paint.evidence import Image, Reading, read_picture
+from app.paint.evidence import Image, PreparedPicture, read_picture
 from app.paint.grass import find_field_of_play
 from app.paint.propose import (
     FrameProposal,
@@ -26,7 +26,7 @@ from app.paint.propose import (
 from app.paint.ridges import Strength
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.tracking.clip import Frame
+from app.tracking.clip import ClipFrame
 from app.tracking.motion import Grey
 
 AHEAD = 4
@@ -34,7 +34,7 @@ AHEAD = 4
 
 
 @dataclass
-class Picture:
+class FramePicture:
     """A frame and what is seen in it, each part computed when it is asked for first.
 
     Attributes:
@@ -50,7 +50,7 @@ class Picture:
     _grey: Grey | None = dataclasses.field(default=None, init=False, repr=False)
     _field: BoolArray | None = dataclasses.field(default=None, init=False, repr=False)
     _strength: Strength | None = dataclasses.field(default=None, init=False, repr=False)
-    _reading: Reading | None = dataclasses.field(default=None, init=False, repr=False)
+    _reading: PreparedPicture | None = dataclasses.field(default=None, init=False, repr=False)
 
     @property
     def grey(self) -> Grey:
@@ -74,7 +74,7 @@ class Picture:
         return self._strength
 
     @property
-    def reading(self) -> Reading:
+    def reading(self) -> PreparedPicture:
         """Ready for paint to be read along markings."""
         if self._reading is None:
             self._reading = read_picture(self.image, self.field)
@@ -85,30 +85,30 @@ class Picture:
         """What looks like painted lines, shape (H, W)."""
         return np.asarray(self.strength > 0)
 
-    def read(self) -> Picture:
+    def read(self) -> FramePicture:
         """The same with all parts computed."""
         _ = self.grey, self.strength, self.reading
         return self
 
 
-def read_frame(frame: Frame) -> Picture:
+def make_frame_picture(frame: ClipFrame) -> FramePicture:
     """What a frame shows."""
-    return Picture(frame.number, frame.time, frame.image)
+    return FramePicture(frame.number, frame.time, frame.image)
 
 
-def read_frames(
-    frames: Iterable[Frame], is_followed: Callable[[], bool] = lambda: True
-) -> Iterator[Picture]:
+def make_frame_pictures(
+    frames: Iterable[ClipFrame], is_followed: Callable[[], bool] = lambda: True
+) -> Iterator[FramePicture]:
     """Frames read in threads, in their order, a few ahead.
 
     Args:
         is_followed: Whether a camera is followed by now. Where none is, most frames are only looked
             at for their motion, and their paint is read when it is asked for.
     """
-    waiting: deque[Future[Picture]] = deque()
+    waiting: deque[Future[FramePicture]] = deque()
     for frame in frames:
-        picture = read_frame(frame)
-        work = Picture.read if is_followed() else _read_motion
+        picture = make_frame_picture(frame)
+        work = FramePicture.read if is_followed() else _compute_grey
         waiting.append(get_kernel_executor().submit(work, picture))
         if len(waiting) > AHEAD:
             yield waiting.popleft().result()
@@ -116,13 +116,13 @@ def read_frames(
         yield waiting.popleft().result()
 
 
-def _read_motion(picture: Picture) -> Picture:
+def _compute_grey(picture: FramePicture) -> FramePicture:
     _ = picture.grey
     return picture
 
 
 def propose_in_picture(
-    picture: Picture,
+    picture: FramePicture,
     pitch: Pitch,
     known: Sequence[Camera],
     policy: CalibrationPolicy,

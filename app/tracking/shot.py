@@ -16,7 +16,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.paint.candidates import MAIN, WIDE
-from app.paint.snap import WINDOWS, snap_reading
+from app.paint.snap import WINDOWS, snap_to_prepared_picture
 from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -28,16 +28,16 @@ from app.tracking.follow import (
     NO_CAMERA,
     RATHER,
     TRACKED,
-    Follower,
+    CameraFollower,
     TrackedFrame,
 )
-from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
+from app.tracking.motion import BackgroundMatches, apply_background_motion, match_background
 from app.tracking.picture import (
     AHEAD,
-    Picture,
+    FramePicture,
+    make_frame_picture,
+    make_frame_pictures,
     propose_in_picture,
-    read_frame,
-    read_frames,
 )
 
 TRIALS, ASKED = 2, 4
@@ -57,7 +57,7 @@ Tell = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class Given:
+class GivenCamera:
     """The camera of an annotated frame.
 
     Attributes:
@@ -70,7 +70,7 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Shot:
+class FollowedShot:
     """What a clip shows of its camera.
 
     Attributes:
@@ -84,11 +84,11 @@ class Shot:
 
 def follow_shot(
     clip: Clip,
-    given: Mapping[int, Given],
+    given: Mapping[int, GivenCamera],
     pitch: Pitch,
     policy: CalibrationPolicy,
     tell: Tell | None = None,
-) -> Shot:
+) -> FollowedShot:
     """Every frame of a clip, each from its neighbours.
 
     Args:
@@ -100,36 +100,38 @@ def follow_shot(
         return shot
     likely = sorted(follower.unsure, key=lambda item: -item.score)
     for item in likely[:TRIALS]:
-        start = {item.picture.number: Given(item.camera, None)}
+        start = {item.picture.number: GivenCamera(item.camera, None)}
         trial, _ = _follow_both_ways(clip, start, pitch, policy, tell)
-        if _holds(trial, item.picture.number, clip, follower):
+        if _is_uncertain_camera_confirmed(trial, item.picture.number, clip, follower):
             return trial
     return shot
 
 
 def _follow_both_ways(
     clip: Clip,
-    given: Mapping[int, Given],
+    given: Mapping[int, GivenCamera],
     pitch: Pitch,
     policy: CalibrationPolicy,
     tell: Tell | None,
-) -> tuple[Shot, Follower]:
+) -> tuple[FollowedShot, CameraFollower]:
     """Every frame from its neighbours, and who followed them."""
-    shot, follower = _follow_on(clip, given, pitch, policy, tell)
+    shot, follower = _follow_forwards(clip, given, pitch, policy, tell)
     first = [*shot.frames]
-    for start, end in _runs(shot.frames):
+    for start, end in _find_runs_without_paint(shot.frames):
         if end < len(shot.frames):
             _follow_run(clip, shot, range(end - 1, start - 1, -1), pitch, policy)
-    for start, end in _runs(shot.frames):
+    for start, end in _find_runs_without_paint(shot.frames):
         # What was found backwards may be followed forwards.
         if start > 0 and shot.frames[start - 1] is not first[start - 1]:
             _follow_run(clip, shot, range(start, end), pitch, policy)
-    _bridge(shot.frames, shot.matches)
+    _bridge_or_drop_runs(shot.frames, shot.matches)
     _drop_unconfirmed(clip, shot.frames, pitch, policy)
     return shot, follower
 
 
-def _holds(trial: Shot, number: int, clip: Clip, follower: Follower) -> bool:
+def _is_uncertain_camera_confirmed(
+    trial: FollowedShot, number: int, clip: Clip, follower: CameraFollower
+) -> bool:
     """Whether a camera that no frame proposes for certain is right all the same.
 
     The same view has the same fault twice; so the camera has to turn, stay on the paint while it does, and where
@@ -144,9 +146,9 @@ def _holds(trial: Shot, number: int, clip: Clip, follower: Follower) -> bool:
     if len(tracked) < LEAST_HELD * len(trial.frames) or not far:
         return False
     for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
-        picture = read_frame(next(clip.frames(frame.number, frame.number + 1)))
+        picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
         found = propose_in_picture(picture, follower.pitch, [start], follower.policy, (MAIN, WIDE))
-        if found.outcome == "proposed" and _shows_the_same(found.camera, frame.camera, 0):
+        if found.outcome == "proposed" and _shows_same_grass(found.camera, frame.camera, 0):
             return True
     return False
 
@@ -157,26 +159,26 @@ def _turn_degrees(one: Camera, other: Camera | None) -> float:
     return float(np.degrees(np.arccos(np.clip(one.rotation[2] @ other.rotation[2], -1, 1))))
 
 
-def _follow_on(
+def _follow_forwards(
     clip: Clip,
-    given: Mapping[int, Given],
+    given: Mapping[int, GivenCamera],
     pitch: Pitch,
     policy: CalibrationPolicy,
     tell: Tell | None,
-) -> tuple[Shot, Follower]:
+) -> tuple[FollowedShot, CameraFollower]:
     """Every frame from the one before, and who followed them."""
-    follower = Follower(pitch, policy, known=[item.camera for item in given.values()])
-    shot = Shot([], [])
+    follower = CameraFollower(pitch, policy, known=[item.camera for item in given.values()])
+    shot = FollowedShot([], [])
     frames, before = clip.frames(), None
     for frame in islice(frames, min(given, default=0)):
         # They are followed backwards, and their paint is read then.
-        grey = read_frame(frame).grey
+        grey = make_frame_picture(frame).grey
         shot.matches.append(None if before is None else match_background(before, grey))
         shot.frames.append(TrackedFrame(frame.number, frame.time, LOST, reason=NO_CAMERA))
         before = grey
         if tell is not None:
             tell(len(shot.frames))
-    for picture in read_frames(frames, follower.has_camera):
+    for picture in make_frame_pictures(frames, follower.has_camera):
         match = None if before is None else match_background(before, picture.grey)
         shot.matches.append(match)
         key = given.get(picture.number)
@@ -190,7 +192,7 @@ def _follow_on(
     return shot, follower
 
 
-def _runs(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
+def _find_runs_without_paint(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
     """First and end of each run of frames that no paint holds."""
     open_ = [frame.outcome != TRACKED and not frame.is_key for frame in frames]
     edges = np.flatnonzero(np.diff([False, *open_, False]))
@@ -198,7 +200,7 @@ def _runs(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
 
 
 def _follow_run(
-    clip: Clip, shot: Shot, run: range, pitch: Pitch, policy: CalibrationPolicy
+    clip: Clip, shot: FollowedShot, run: range, pitch: Pitch, policy: CalibrationPolicy
 ) -> None:
     """Follow a run from the frame beside its first one; what is better than before is kept.
 
@@ -211,17 +213,23 @@ def _follow_run(
     frames, matches = shot.frames, shot.matches
     before = frames[run[0] - run.step]
     known = [frame.camera for frame in frames if frame.is_key and frame.camera is not None]
-    follower = Follower(pitch, policy, known, before, before.seen.supported if before.seen else 0.0)
-    for picture in _from_run_on(clip, run):
+    follower = CameraFollower(
+        pitch, policy, known, before, before.seen.supported if before.seen else 0.0
+    )
+    for picture in _read_pictures_from_run(clip, run):
         number = picture.number
         match = matches[number if run.step > 0 else number + 1]
         if match is not None and run.step < 0:
-            match = match.reversed()
+            match = match.swap_frames()
         there, last = frames[number], follower.last
         if number in run:
-            frames[number] = _better(there, follower.step(picture, match))
+            frames[number] = _choose_better_frame(there, follower.step(picture, match))
             continue
-        if there.is_key or last is None or _ties(last.camera, there.camera, [match]):
+        if (
+            there.is_key
+            or last is None
+            or _is_tied_by_background(last.camera, there.camera, [match])
+        ):
             break
         found = follower.step(picture, match)
         if found.outcome != TRACKED or found.score < RATHER * there.score:
@@ -229,34 +237,38 @@ def _follow_run(
         frames[number] = found
 
 
-def _better(one: TrackedFrame, other: TrackedFrame) -> TrackedFrame:
+def _choose_better_frame(one: TrackedFrame, other: TrackedFrame) -> TrackedFrame:
     rank = {TRACKED: 0, BRIDGED: 1, LOST: 2}
     return min(one, other, key=lambda frame: (rank[frame.outcome], frame.age))
 
 
-def _from_run_on(clip: Clip, run: range) -> Iterator[Picture]:
+def _read_pictures_from_run(clip: Clip, run: range) -> Iterator[FramePicture]:
     """The frames of a run, and those behind it, in the order of the run."""
     if run.step > 0:
-        yield from read_frames(clip.frames(run.start))
+        yield from make_frame_pictures(clip.frames(run.start))
         return
     end = run.start + 1
     while end > 0:
         least, most = (run[-1], CHUNK) if end > run[-1] else (0, AHEAD)
         low = max(least, end - most)
-        yield from reversed(list(read_frames(clip.frames(low, end))))
+        yield from reversed(list(make_frame_pictures(clip.frames(low, end))))
         end = low
 
 
-def _bridge(frames: list[TrackedFrame], matches: Sequence[BackgroundMatches | None]) -> None:
+def _bridge_or_drop_runs(
+    frames: list[TrackedFrame], matches: Sequence[BackgroundMatches | None]
+) -> None:
     """Decide what runs without paint are: bridged where both ends tie, lost elsewhere."""
-    for start, end in _runs(frames):
+    for start, end in _find_runs_without_paint(frames):
         inner = start > 0 and end < len(frames)
         tied = (
             inner
             and end - start <= 2 * MOST_BRIDGED
-            and _ties(frames[start - 1].camera, frames[end].camera, matches[start : end + 1])
+            and _is_tied_by_background(
+                frames[start - 1].camera, frames[end].camera, matches[start : end + 1]
+            )
         )
-        cameras = _carried(frames[start - 1].camera, matches[start:end]) if tied else []
+        cameras = _propagate_camera(frames[start - 1].camera, matches[start:end]) if tied else []
         for number in range(start, end):
             frame = frames[number]
             if tied:
@@ -279,7 +291,7 @@ def _drop_unconfirmed(
             continue
         asked = [frame for frame in run if frame.outcome == TRACKED]
         for frame in asked[len(asked) // (2 * ASKED) :: max(len(asked) // ASKED, 1)]:
-            if _stands_there(clip, frame, keys, pitch, policy):
+            if _is_at_key_frame_position(clip, frame, keys, pitch, policy):
                 frames[frame.number] = replace(frame, is_key=True)
                 break
         else:
@@ -289,7 +301,7 @@ def _drop_unconfirmed(
                 )
 
 
-def _stands_there(
+def _is_at_key_frame_position(
     clip: Clip,
     frame: TrackedFrame,
     keys: Sequence[Camera],
@@ -299,17 +311,17 @@ def _stands_there(
     """Whether the paint of a frame alone puts its camera where those of key frames stand."""
     if frame.camera is None:
         return False
-    picture = read_frame(next(clip.frames(frame.number, frame.number + 1)))
-    snapped = snap_reading(
+    picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
+    snapped = snap_to_prepared_picture(
         picture.reading, frame.camera, pitch, WINDOWS, policy, circles_count_twice=True
     )
-    if snapped.reason is not None or not _shows_the_same(snapped.camera, frame.camera, 0):
+    if snapped.reason is not None or not _shows_same_grass(snapped.camera, frame.camera, 0):
         return False
     away = [float(np.linalg.norm(snapped.camera.position - key.position)) for key in keys]
     return min(away, default=np.inf) < SAME_STAND_M
 
 
-def _carried(
+def _propagate_camera(
     camera: Camera | None, matches: Sequence[BackgroundMatches | None]
 ) -> list[Camera | None]:
     """A camera carried along matches."""
@@ -317,21 +329,21 @@ def _carried(
     for match in matches:
         if camera is not None and match is not None:
             half = float(np.hypot(*camera.principal_point))
-            camera, _ = rotate_camera(camera, match, half)
+            camera, _ = apply_background_motion(camera, match, half)
         else:
             camera = None
         cameras.append(camera)
     return cameras
 
 
-def _ties(
+def _is_tied_by_background(
     one: Camera | None, other: Camera | None, matches: Sequence[BackgroundMatches | None]
 ) -> bool:
     """Whether the background carries one camera to the other."""
-    return _shows_the_same(_carried(one, matches)[-1], other, len(matches))
+    return _shows_same_grass(_propagate_camera(one, matches)[-1], other, len(matches))
 
 
-def _shows_the_same(one: Camera | None, other: Camera | None, frames: int) -> bool:
+def _shows_same_grass(one: Camera | None, other: Camera | None, frames: int) -> bool:
     """Whether two cameras of a frame lay the grass of its picture on the same places.
 
     Args:
@@ -342,7 +354,7 @@ def _shows_the_same(one: Camera | None, other: Camera | None, frames: int) -> bo
     width = 2 * one.principal_point[0]
     grid = np.stack(np.meshgrid(*(np.linspace(0.1, 0.9, 5),) * 2), -1).reshape(-1, 2)
     pixels = grid * 2 * np.array(one.principal_point)
-    ground = np.nan_to_num(one.on_ground(pixels), nan=1e6)
+    ground = np.nan_to_num(one.project_to_ground(pixels), nan=1e6)
     near = np.hypot(*ground.T) < FARTHEST_M
     if not near.any():
         return False

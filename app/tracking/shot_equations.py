@@ -39,14 +39,14 @@ class ShotEquations:
         self.right = np.zeros((count, PARAMETERS))
         self.below = np.zeros(SHARED)
 
-    def _scaled(self) -> tuple[FloatArray, FloatArray]:
+    def _scale_equations(self) -> tuple[FloatArray, FloatArray]:
         both = SCALE[:, None] * SCALE
         return self.diagonal * both, self.beside * both
 
     def solve(self) -> tuple[FloatArray, FloatArray]:
         """The step of the frames, shape (N, 8), and of what is shared, shape (S,)."""
         right = np.concatenate([self.right[:, :, None], self.border], axis=2)
-        found = solve_tridiagonal(*self._scaled(), right * SCALE[:, None]) * SCALE[:, None]
+        found = solve_tridiagonal(*self._scale_equations(), right * SCALE[:, None]) * SCALE[:, None]
         alone, border = found[:, :, 0], found[:, :, 1:]
         rest = self.corner - np.einsum("nis,nit->st", self.border, border)
         below = self.below - np.einsum("nis,ni->s", self.border, alone)
@@ -59,7 +59,7 @@ class ShotEquations:
         Args:
             terms: Right sides of one standard deviation of each term, shape (N, 8, K).
         """
-        diagonal, beside = self._scaled()
+        diagonal, beside = self._scale_equations()
         right = np.concatenate([self.border, terms], axis=2) * SCALE[:, None]
         found = solve_tridiagonal(diagonal, beside, right) * SCALE[:, None]
         border, moved = found[:, :, :SHARED], found[:, :, SHARED:]

@@ -46,10 +46,10 @@ from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import (
     TERMS,
     PaintOffsets,
-    all_terms,
     cautious_weights,
     marking_weights,
-    shifted_offsets,
+    pitch_and_marking_terms,
+    shift_offsets,
 )
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import (
@@ -63,7 +63,7 @@ from app.solving.tripod_pitch import (
     second_moment_about_plan,
 )
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
-from app.tracking.motion import AIM, FAR_M, BackgroundMatches, rotate_camera
+from app.tracking.motion import AIM, FAR_M, BackgroundMatches, apply_background_motion
 from app.tracking.shot_equations import SHARED, ShotEquations
 
 SLOPE_SIGMA, SHOWN_SLOPE_SIGMA = 4.0, 0.1
@@ -109,17 +109,17 @@ def solve_shot(
     """
     chosen = [index for index, frame in enumerate(frames) if frame.outcome != LOST]
     if sum(frames[index].outcome == TRACKED for index in chosen) < LEAST_FRAMES:
-        alone = [_alone(frame) for frame in frames]
+        alone = [_solve_frame_alone(frame) for frame in frames]
         return SolvedShot(alone, None, alone)
-    shot = _Shot([frames[index] for index in chosen], chosen, matches, size, pitch, policy)
+    shot = _ShotProblem([frames[index] for index in chosen], chosen, matches, size, pitch, policy)
     painted = shot.painted()
     shown = find_tripod_pitch(list(painted.values()), size, pitch, policy)
-    shot.descend()
+    shot.minimize_cost()
     if shown is None:
-        solved = _with_cameras(frames, chosen, shot, shot.covariances())
+        solved = _replace_cameras(frames, chosen, shot, shot.covariances())
         return SolvedShot(solved, None, solved)
     on_shown = shot.on(shown)
-    on_shown.descend()
+    on_shown.minimize_cost()
     for place in shot.given:
         on_shown.parameters[place] = shot.parameters[place]
     known = {
@@ -134,16 +134,16 @@ def solve_shot(
         for place in range(len(chosen))
     ]
     return SolvedShot(
-        _with_cameras(frames, chosen, shot, about),
+        _replace_cameras(frames, chosen, shot, about),
         shown,
-        _with_cameras(frames, chosen, on_shown, [known[place] for place in range(len(chosen))]),
+        _replace_cameras(frames, chosen, on_shown, [known[place] for place in range(len(chosen))]),
     )
 
 
-def _with_cameras(
+def _replace_cameras(
     frames: Sequence[TrackedFrame],
     chosen: Sequence[int],
-    shot: _Shot,
+    shot: _ShotProblem,
     covariances: Sequence[FloatArray],
 ) -> list[TrackedFrame]:
     solved = list(frames)
@@ -153,7 +153,7 @@ def _with_cameras(
     return solved
 
 
-def _alone(frame: TrackedFrame) -> TrackedFrame:
+def _solve_frame_alone(frame: TrackedFrame) -> TrackedFrame:
     """A frame with what its own paint says."""
     if frame.snapped is None:
         return frame
@@ -161,7 +161,7 @@ def _alone(frame: TrackedFrame) -> TrackedFrame:
     return replace(frame, covariance=own.covariance, error_px=own.error_px)
 
 
-class _Shot:
+class _ShotProblem:
     """The problem of one shot, on the plan or on the pitch that it shows."""
 
     def __init__(
@@ -178,11 +178,11 @@ class _Shot:
         first = frames[0].camera
         assert first is not None
         self.principal_point = first.principal_point
-        self.parameters = np.array([self._row(frame) for frame in frames])
+        self.parameters = np.array([self._parameters_of_frame(frame) for frame in frames])
         # A turn past half a circle goes on.
         self.parameters[:, PAN] = np.unwrap(self.parameters[:, PAN])
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
-        self._sights = [self._sight(frame) for frame in frames]
+        self._sights = [self._make_frame_sightings(frame) for frame in frames]
         self._shifts: dict[int, FloatArray] = {}
         self._seen_from: FloatArray | None = None
         self._kept: list[PaintOffsets | None] = []
@@ -195,7 +195,7 @@ class _Shot:
         self._turns = [
             None
             if after != before + 1 or matches[after] is None
-            else self._turn(place, matches[after])
+            else self._measure_turn(place, matches[after])
             for place, (before, after) in enumerate(pairwise(numbers))
         ]
         self._policy = policy
@@ -205,30 +205,34 @@ class _Shot:
         self.shared[6] = np.median(self.parameters[:, KAPPA])
         self._noise = 1.0
 
-    def on(self, shown: TripodPitch) -> _Shot:
+    def on(self, shown: TripodPitch) -> _ShotProblem:
         """The same problem on the pitch that is shown; lines that somebody drew say nothing of that."""
         other = copy(self)
         other._pitch, other._slope_sigma = shown.pitch, SHOWN_SLOPE_SIGMA
-        other._shifts = {place: shown.shift_of(each) for place, each in self.painted().items()}
+        other._shifts = {
+            place: shown.compute_frame_shift(each) for place, each in self.painted().items()
+        }
         other.shared = np.zeros(SHARED)
         other.shared[:3], other.shared[6] = shown.position, self.shared[6]
         other.given, other._noise, other._seen_from = {}, 1.0, None
         return other
 
-    def _row(self, frame: TrackedFrame) -> FloatArray:
+    def _parameters_of_frame(self, frame: TrackedFrame) -> FloatArray:
         assert frame.camera is not None
         return parameters_from_camera(frame.camera, self.half_diagonal)
 
-    def _sight(self, frame: TrackedFrame) -> PaintSightings | None:
+    def _make_frame_sightings(self, frame: TrackedFrame) -> PaintSightings | None:
         if frame.outcome != TRACKED or frame.snapped is None:
             return None
         return make_paint_sightings(frame.snapped)
 
-    def _turn(self, place: int, match: BackgroundMatches | None) -> tuple[FloatArray, FloatArray]:
+    def _measure_turn(
+        self, place: int, match: BackgroundMatches | None
+    ) -> tuple[FloatArray, FloatArray]:
         """How the camera turned and zoomed to the next frame, shape (4,), and its information."""
         assert match is not None
         camera = self.camera(place)
-        after, apart = rotate_camera(camera, match, self.half_diagonal)
+        after, apart = apply_background_motion(camera, match, self.half_diagonal)
         turned = parameters_from_camera(after, self.half_diagonal) - self.parameters[place]
         turned[PAN] = (turned[PAN] + np.pi) % (2 * np.pi) - np.pi
         points = camera.position + FAR_M * camera.rays(match.here)
@@ -254,14 +258,16 @@ class _Shot:
             if sight is not None
         }
 
-    def _seen(self) -> list[PaintOffsets | None]:
+    def _measure_all_offsets(self) -> list[PaintOffsets | None]:
         """The paint of each frame beside its markings, worked out once for cameras that stay."""
         if self._seen_from is not self.parameters:
             self._seen_from = self.parameters
-            self._kept = [self._offsets(place) for place in range(len(self.parameters))]
+            self._kept = [
+                self._measure_frame_offsets(place) for place in range(len(self.parameters))
+            ]
         return self._kept
 
-    def _offsets(self, place: int) -> PaintOffsets | None:
+    def _measure_frame_offsets(self, place: int) -> PaintOffsets | None:
         sight = self._sights[place]
         if sight is None:
             return None
@@ -271,9 +277,9 @@ class _Shot:
         shift = self._shifts.get(place)
         if shift is None:
             return seen
-        return replace(seen, offsets=shifted_offsets(seen.offsets, seen.jacobian, shift))
+        return replace(seen, offsets=shift_offsets(seen.offsets, seen.jacobian, shift))
 
-    def _weights(self, seen: PaintOffsets) -> FloatArray:
+    def _compute_paint_weights(self, seen: PaintOffsets) -> FloatArray:
         robust = self._problem.robust(seen.offsets, seen.sigmas)
         weigh = cautious_weights if self._shifts else marking_weights
         weights: FloatArray = robust * weigh(seen.marking, seen.sigmas) / seen.sigmas**2
@@ -281,25 +287,25 @@ class _Shot:
 
     def error_px(self, place: int) -> float | None:
         """Median distance of the paint of a frame, pixels; None where it has none."""
-        seen = self._seen()[place]
+        seen = self._measure_all_offsets()[place]
         return None if seen is None else float(np.median(np.abs(seen.offsets)))
 
-    def _equations(self) -> ShotEquations:
+    def _build_equations(self) -> ShotEquations:
         count = len(self.parameters)
         equations = ShotEquations(count)
-        for place, seen in enumerate(self._seen()):
+        for place, seen in enumerate(self._measure_all_offsets()):
             if seen is not None:
-                weighted = seen.jacobian * self._weights(seen)[:, None]
+                weighted = seen.jacobian * self._compute_paint_weights(seen)[:, None]
                 equations.diagonal[place] += weighted.T @ seen.jacobian
                 equations.right[place] += weighted.T @ seen.offsets
-            self._add_tripod(equations, place)
+            self._add_tripod_equations(equations, place)
         for place, turn in enumerate(self._turns):
             if turn is not None:
-                self._add_turn(equations, place, *turn)
+                self._add_turn_equations(equations, place, *turn)
         self._add_priors(equations)
         return equations
 
-    def _basis(self, place: int) -> FloatArray:
+    def _shared_parameter_basis(self, place: int) -> FloatArray:
         """What the shot has in common, to the position and distortion of a frame, shape (4, 8)."""
         away = self.parameters[place] - self._center
         basis = np.zeros((4, SHARED))
@@ -308,8 +314,8 @@ class _Shot:
         basis[3, 6], basis[3, 7] = 1.0, away[LOG_FOCAL]
         return basis
 
-    def _add_tripod(self, equations: ShotEquations, place: int) -> None:
-        basis, own = self._basis(place), [X, X + 1, Z, KAPPA]
+    def _add_tripod_equations(self, equations: ShotEquations, place: int) -> None:
+        basis, own = self._shared_parameter_basis(place), [X, X + 1, Z, KAPPA]
         rest = self.parameters[place][own] - basis @ self.shared
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
         equations.diagonal[place][own, own] += weight
@@ -318,7 +324,7 @@ class _Shot:
         equations.corner += basis.T @ (weight[:, None] * basis)
         equations.below += basis.T @ (weight * rest)
 
-    def _add_turn(
+    def _add_turn_equations(
         self, equations: ShotEquations, place: int, turned: FloatArray, information: FloatArray
     ) -> None:
         rest = turned - (self.parameters[place + 1] - self.parameters[place])[AIM]
@@ -349,32 +355,34 @@ class _Shot:
         # A frame that neither paint nor background ties stays where it is.
         equations.diagonal[:, AIM, AIM] += UNTIED_SIGMA**-2.0
 
-    def descend(self) -> None:
+    def minimize_cost(self) -> None:
         """Gauss-Newton steps until no paint moves any more."""
         for _ in range(ROUNDS):
-            step, shared = self._equations().solve()
+            step, shared = self._build_equations().solve()
             self.parameters = self.parameters + step
             self.shared = self.shared + shared
             moved = [
                 np.abs(seen.jacobian @ own).max(initial=0.0)
-                for own, seen in zip(step, self._seen(), strict=True)
+                for own, seen in zip(step, self._measure_all_offsets(), strict=True)
                 if seen is not None
             ]
             if max(moved) < SETTLED_PX:
                 break
-        rest = [seen.offsets / seen.sigmas for seen in self._seen() if seen is not None]
+        rest = [
+            seen.offsets / seen.sigmas for seen in self._measure_all_offsets() if seen is not None
+        ]
         # Of a normal distribution the median distance is 0.6745 standard deviations.
         self._noise = max(1.0, float(np.median(np.abs(np.concatenate(rest))) / 0.6745) ** 2)
 
     def covariances(self) -> list[FloatArray]:
         """Of each frame's parameters, with what no pitch has as planned, shape (8, 8)."""
-        equations = self._equations()
+        equations = self._build_equations()
         terms = np.zeros((len(self.parameters), PARAMETERS, TERMS))
         for place, frame in self.painted().items():
-            seen = self._seen()[place]
+            seen = self._measure_all_offsets()[place]
             assert seen is not None
             grass = project_paint_to_grass(frame, self._size)
-            own = all_terms(grass, seen.marking, seen.jacobian, self._pitch)
-            weighted = seen.jacobian * self._weights(seen)[:, None]
+            own = pitch_and_marking_terms(grass, seen.marking, seen.jacobian, self._pitch)
+            weighted = seen.jacobian * self._compute_paint_weights(seen)[:, None]
             terms[place] = weighted.T @ own
         return equations.covariances(terms)

@@ -21,7 +21,7 @@ _SIGNS[[X, Y]] = -1.0
 """Of the parameters of a camera: pan grows by half a turn, which changes no derivative."""
 
 
-def turned_frame(frame: FrameCamera) -> FrameCamera:
+def turn_frame_camera(frame: FrameCamera) -> FrameCamera:
     """The camera of a frame, and its covariance, turned by 180 degrees about the centre mark; twice is as before."""
     if frame.camera is None:
         return frame
@@ -32,7 +32,7 @@ def turned_frame(frame: FrameCamera) -> FrameCamera:
     return replace(frame, camera=turn_camera(frame.camera), covariance=covariance)
 
 
-def stand_opposite(frames: Sequence[FrameCamera], before: Mapping[int, FrameCamera]) -> bool:
+def are_on_opposite_side(frames: Sequence[FrameCamera], before: Mapping[int, FrameCamera]) -> bool:
     """Whether cameras stand nearer to the earlier ones of the same frames once they are turned.
 
     Args:

@@ -76,7 +76,7 @@ class TimeMap:
         return np.asarray(offsets[which] + speeds[which] * times)
 
 
-def map_of_instants(
+def fit_map_to_instants(
     instants: FloatArray, frame_s: float, assumed_speed: float | None = None
 ) -> TimeMap:
     """The map of instants that a person sees in both shots, each to about a live frame.
@@ -93,10 +93,10 @@ def map_of_instants(
         return TimeMap("No instant is linked yet.", by_hand=True)
     rows = instants[np.argsort(instants[:, 1], kind="stable")]
     if np.ptp(rows[:, 1]) == 0:
-        return _assumed(
+        return _make_map_with_assumed_speed(
             rows, assumed_speed, "Instants of one frame of the replay do not tell its speed"
         )
-    pieces = _pieces(rows, frame_s)
+    pieces = _fit_piecewise_maps(rows, frame_s)
     if any(piece.speed is None or piece.speed <= 0 for piece in pieces):
         return TimeMap(
             "The linked instants run backwards: what is later in the replay is earlier live.",
@@ -110,7 +110,9 @@ def map_of_instants(
                 f"({speed:.2g} ± {sigma:.2g}); link one farther away"
             )
             if len(pieces) == 1:
-                return replace(_assumed(rows, assumed_speed, reason), too_close=True)
+                return replace(
+                    _make_map_with_assumed_speed(rows, assumed_speed, reason), too_close=True
+                )
             reason = f"{reason}."
         elif not _SLOWEST <= speed <= _FASTEST:
             reason = (
@@ -126,7 +128,9 @@ def map_of_instants(
     return TimeMap(reason, by_hand=True, pieces=tuple(pieces))
 
 
-def _assumed(rows: FloatArray, assumed_speed: float | None, why: str) -> TimeMap:
+def _make_map_with_assumed_speed(
+    rows: FloatArray, assumed_speed: float | None, why: str
+) -> TimeMap:
     """The map of instants at a speed that is assumed, with the reason why."""
     speed = 1.0 if assumed_speed is None else assumed_speed
     offset = float((rows[:, 0] - speed * rows[:, 1]).mean())
@@ -137,7 +141,7 @@ def _speed_sigma(piece: TimeMap) -> float:
     return 0.0 if piece.covariance is None else float(np.sqrt(piece.covariance[1, 1]))
 
 
-def _pieces(rows: FloatArray, frame_s: float) -> list[TimeMap]:
+def _fit_piecewise_maps(rows: FloatArray, frame_s: float) -> list[TimeMap]:
     """The maps of the fewest stretches of instants, by replay time, that lines fit; neighbours share one."""
     count = len(rows)
     cost, start = np.full(count, np.inf), np.zeros(count, dtype=int)
@@ -146,19 +150,19 @@ def _pieces(rows: FloatArray, frame_s: float) -> list[TimeMap]:
         for first in range(last):
             if rows[first, 1] == rows[last, 1]:
                 continue
-            total = cost[first] + _CHANGE + _line(rows[first : last + 1], frame_s)[1]
+            total = cost[first] + _CHANGE + _fit_line(rows[first : last + 1], frame_s)[1]
             if total < cost[last]:
                 cost[last], start[last] = total, first
     found: list[TimeMap] = []
     last = count - 1
     while last > 0:
         first = int(start[last])
-        found.insert(0, _line(rows[first : last + 1], frame_s)[0])
+        found.insert(0, _fit_line(rows[first : last + 1], frame_s)[0])
         last = first
     return found
 
 
-def _line(rows: FloatArray, frame_s: float) -> tuple[TimeMap, float]:
+def _fit_line(rows: FloatArray, frame_s: float) -> tuple[TimeMap, float]:
     """The line through instants, and the sum of squares of its residuals in frames."""
     design = np.column_stack([np.ones(len(rows)), rows[:, 1]])
     (offset, speed), *_ = np.linalg.lstsq(design, rows[:, 0], rcond=None)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import InputError
-from app.geometry.arrays import row_by_row
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -19,7 +19,7 @@ from app.solving.calibrate import calibrate
 from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import Outcome, TrackedFrame
-from app.tracking.shot import Given, Tell, follow_shot
+from app.tracking.shot import GivenCamera, Tell, follow_shot
 from app.tracking.shot_solve import solve_shot
 
 
@@ -56,7 +56,7 @@ class FrameCamera:
 
 
 @dataclass(frozen=True)
-class Track:
+class CameraTrack:
     """The cameras of a clip.
 
     Attributes:
@@ -76,7 +76,7 @@ def track_clip(
     pitch: Pitch | None = None,
     policy: CalibrationPolicy | None = None,
     tell: Tell | None = None,
-) -> Track:
+) -> CameraTrack:
     """The camera of every frame of a clip.
 
     Args:
@@ -94,7 +94,7 @@ def track_clip(
     pitch = policy.painted(pitch or Pitch())
     clicked = replace(CLICKED, goal=pitch.goal) if pitch.goal == "laws" else CLICKED
     clip = clip if isinstance(clip, Clip) else Clip.open(clip)
-    given: dict[int, Given] = {}
+    given: dict[int, GivenCamera] = {}
     for number, drawn in lines.items():
         if not 0 <= number - clip.start < clip.count:
             raise InputError(
@@ -108,17 +108,17 @@ def track_clip(
                 hint="Draw more of the markings that this frame shows, or annotate another frame.",
             )
         spread = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
-        given[number - clip.start] = Given(clip.as_read(found.camera), spread)
+        given[number - clip.start] = GivenCamera(clip.scale_to_work_size(found.camera), spread)
     shot = follow_shot(clip, given, pitch, policy, tell)
     solved = solve_shot(shot.frames, shot.matches, clip.work, pitch, policy)
-    return Track(
-        [_in_video(frame, clip) for frame in solved.frames],
+    return CameraTrack(
+        [_to_video_frame(frame, clip) for frame in solved.frames],
         solved.shown,
-        [_in_video(frame, clip) for frame in solved.shown_frames],
+        [_to_video_frame(frame, clip) for frame in solved.shown_frames],
     )
 
 
-def _in_video(frame: TrackedFrame, clip: Clip) -> FrameCamera:
+def _to_video_frame(frame: TrackedFrame, clip: Clip) -> FrameCamera:
     """A frame in pixels and numbers of the video."""
     scale = clip.size.width / clip.work.width
     seen, covariance, error = frame.seen, frame.covariance, frame.error_px
@@ -127,8 +127,8 @@ def _in_video(frame: TrackedFrame, clip: Clip) -> FrameCamera:
         time=frame.time,
         outcome=frame.outcome,
         size=clip.size,
-        camera=None if frame.camera is None else clip.as_shown(frame.camera),
-        covariance=None if covariance is None else tuple(row_by_row(covariance)),
+        camera=None if frame.camera is None else clip.scale_to_video(frame.camera),
+        covariance=None if covariance is None else tuple(flatten_covariance(covariance)),
         supported=None if seen is None else seen.supported,
         explained=None if seen is None else seen.explained,
         error_px=None if error is None else error * scale,

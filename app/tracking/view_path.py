@@ -58,7 +58,7 @@ class PathComparison:
     turned: bool
 
 
-def view_path(times: Sequence[float], cameras: Sequence[Camera | None]) -> ViewPath:
+def compute_view_path(times: Sequence[float], cameras: Sequence[Camera | None]) -> ViewPath:
     """Where cameras look through the middle of their pictures, a place each ``STEP_S``.
 
     Args:
@@ -69,7 +69,7 @@ def view_path(times: Sequence[float], cameras: Sequence[Camera | None]) -> ViewP
     for time, camera in zip(times, cameras, strict=True):
         if camera is None or time - last < STEP_S - 1e-6:
             continue
-        place = camera.on_ground(np.array([camera.principal_point]))[0]
+        place = camera.project_to_ground(np.array([camera.principal_point]))[0]
         if np.isfinite(place).all():
             found.append((time, *place.tolist()))
             last = time
@@ -84,14 +84,18 @@ def compare_paths(live: ViewPath, replay: ViewPath) -> PathComparison | None:
     """
     if min(len(live), len(replay)) < 2 or np.ptp(live.times) < LEAST_S:
         return None
-    found = [one for turn in (False, True) if (one := _best(live, replay, turn)) is not None]
+    found = [
+        one
+        for turn in (False, True)
+        if (one := _find_best_alignment(live, replay, turn)) is not None
+    ]
     if not found:
         return None
     plain, turned = found
     return turned if turned.apart_m < _LEAST_GAIN * plain.apart_m else plain
 
 
-def _best(live: ViewPath, replay: ViewPath, turn: bool) -> PathComparison | None:
+def _find_best_alignment(live: ViewPath, replay: ViewPath, turn: bool) -> PathComparison | None:
     places = replay.places * _HALF_TURN if turn else replay.places
     times = replay.times - replay.times[0]
     best: PathComparison | None = None

@@ -26,7 +26,7 @@ MOST_RETURN = 0.6
 """Share of a change that is left once a flash is over."""
 
 
-def change_of(rows: Measured) -> FloatArray:
+def measure_frame_change(rows: Measured) -> FloatArray:
     """How much each frame is another picture than the one before, shape (N,)."""
     return np.asarray(rows["residual"] * rows["histogram"], np.float64)
 
@@ -41,7 +41,7 @@ def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     Returns:
         Numbers of frames, ascending; shape (N,).
     """
-    change, cells = change_of(rows), rows["cells"]
+    change, cells = measure_frame_change(rows), rows["cells"]
     reach = max(round(FLASH_SECONDS / step), 2)
     flashed = np.zeros(len(rows), np.bool_)
     found = []
@@ -49,11 +49,11 @@ def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     for number in candidates.tolist():
         if cells[number - 1 : number + 1].mean(axis=(1, 2, 3)).min() < DARK:
             continue
-        if (until := _returns(cells, number, reach)) is not None:
+        if (until := _find_flash_end(cells, number, reach)) is not None:
             # A picture that goes dark and comes back is no flash, and no cut either.
             flashed[number:until] = cells[number].mean() > cells[number - 1].mean()
             continue
-        if _returned(cells, number, reach) or flashed[number - 1]:
+        if _has_flash_ended(cells, number, reach) or flashed[number - 1]:
             continue
         near = slice(max(number - BESIDE, 0), number + BESIDE + 1)
         beside = np.where(flashed[near], 0.0, change[near])
@@ -63,22 +63,22 @@ def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     return np.array(found, np.int64), flashed
 
 
-def _apart(cells: Any, one: Any, others: Any) -> FloatArray:
+def _mean_cell_difference(cells: Any, one: Any, others: Any) -> FloatArray:
     """Mean difference of the cells of a frame from those of others, grey levels."""
     # Of a few frames at a time: those of a whole match would take 120 MB.
     return np.asarray(np.abs(cells[others].astype(np.int16) - cells[one]).mean(axis=(1, 2, 3)))
 
 
-def _returns(cells: Any, number: int, reach: int) -> int | None:
+def _find_flash_end(cells: Any, number: int, reach: int) -> int | None:
     """First frame after a flash that begins with a frame; None: it begins none."""
     after = np.arange(number, min(number + reach + 1, len(cells)))
-    away = _apart(cells, number - 1, after)
+    away = _mean_cell_difference(cells, number - 1, after)
     back = np.flatnonzero(away < MOST_RETURN * away[0])
     return int(after[back[0]]) if len(back) else None
 
 
-def _returned(cells: Any, number: int, reach: int) -> bool:
+def _has_flash_ended(cells: Any, number: int, reach: int) -> bool:
     """Whether a frame is like one shortly before the frame before it: a flash has ended."""
     before = np.arange(number - 1, max(number - 2 - reach, -1), -1)
-    away = _apart(cells, number, before)
+    away = _mean_cell_difference(cells, number, before)
     return bool((away < MOST_RETURN * away[0]).any())

@@ -77,8 +77,8 @@ class RecordingReader:
         if kept is not None:
             self._kept.move_to_end(number)
             return kept
-        image = self._decode(number)
-        self._keep(number, image)
+        image = self._decode_frame(number)
+        self._cache_frame(number, image)
         return image
 
     def has(self, number: int) -> bool:
@@ -92,12 +92,12 @@ class RecordingReader:
             NotFoundError, ImageError: As ``read_frames`` does.
         """
         if not self.has(number):
-            if not self._reader.move_closer(number, most):
+            if not self._reader.approach_frame(number, most):
                 return False
             self.read(number)
         return True
 
-    def _decode(self, number: int) -> Image:
+    def _decode_frame(self, number: int) -> Image:
         index = self._index
         if not 0 <= number < len(index):
             raise NotFoundError(
@@ -115,7 +115,7 @@ class RecordingReader:
             picture = cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC)
         return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)
 
-    def _keep(self, number: int, image: Image) -> None:
+    def _cache_frame(self, number: int, image: Image) -> None:
         self._kept[number] = image
         self._bytes += image.nbytes
         while self._bytes > self._most and self._kept:

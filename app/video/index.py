@@ -124,10 +124,10 @@ class RecordingIndex:
     @property
     def is_variable(self) -> bool:
         """Whether some frame is shown for another time than others, beyond what rounding does."""
-        return bool(self.uneven.any())
+        return bool(self.is_step_uneven.any())
 
     @property
-    def uneven(self) -> BoolArray:
+    def is_step_uneven(self) -> BoolArray:
         """Whether the time to the next frame is another one than usual, shape (N - 1,)."""
         steps = np.diff(self.times) / 1000.0
         # A container may count in milliseconds, or coarser.
@@ -193,11 +193,13 @@ def index_from_bytes(data: bytes, name: str = "the index") -> RecordingIndex:
     Raises:
         InputError: They are no index, or one of another version.
     """
-    with _opened(BytesIO(data), name) as arrays:
+    with _open_arrays(BytesIO(data), name) as arrays:
         rows: npt.NDArray[Any] = arrays["measured"]
         if rows.shape != (len(arrays["pts"]), MEASURES.itemsize):
             raise ValueError("the measurements have a wrong shape")
-        return _index(arrays, name, np.ascontiguousarray(rows).reshape(-1).view(MEASURES))
+        return _index_from_arrays(
+            arrays, name, np.ascontiguousarray(rows).reshape(-1).view(MEASURES)
+        )
 
 
 def read_index_seconds(path: Path) -> FloatArray:
@@ -207,14 +209,14 @@ def read_index_seconds(path: Path) -> FloatArray:
         InputError: It is no index, or one of another version.
         OSError: It cannot be read.
     """
-    with path.open("rb") as file, _opened(file, "the index") as arrays:
+    with path.open("rb") as file, _open_arrays(file, "the index") as arrays:
         if arrays.zip.testzip() is not None:
             raise ValueError("damaged")
-        return _index(arrays, "the index", np.empty(0, MEASURES)).seconds
+        return _index_from_arrays(arrays, "the index", np.empty(0, MEASURES)).seconds
 
 
 @contextmanager
-def _opened(file: BinaryIO, name: str) -> Iterator[Any]:
+def _open_arrays(file: BinaryIO, name: str) -> Iterator[Any]:
     try:
         with np.load(file, allow_pickle=False) as arrays:
             yield arrays
@@ -226,7 +228,7 @@ def _opened(file: BinaryIO, name: str) -> Iterator[Any]:
         ) from error
 
 
-def _index(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
+def _index_from_arrays(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
     head = json.loads(arrays["head"].tobytes())
     pts: npt.NDArray[Any] = arrays["pts"]
     keys: npt.NDArray[Any] = arrays["keys"]

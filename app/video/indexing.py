@@ -19,7 +19,14 @@ from app.geometry.arrays import FloatArray, IntArray
 from app.media.images import ImageHeader, check_size
 from app.media.video import MAX_FRAMES, FrameReader, grab_next_frame, open_video
 from app.video.index import RecordingFacts, RecordingIndex, find_time_base
-from app.video.measures import COMB_EVERY, COMB_SHARE, COMBED, FrameMeasurer, Rows, measure_combing
+from app.video.measures import (
+    COMB_EVERY,
+    COMB_SHARE,
+    COMBED,
+    FrameMeasurer,
+    GrowingMeasures,
+    measure_combing,
+)
 
 _A_WORD = 100
 """Frames between two words of how far the decoding is."""
@@ -49,8 +56,8 @@ def index_recording(
         ImageError: It is not a video that can be read, or a part of its file is missing.
         TooLargeError: Its frames are larger than the limits, or too many.
     """
-    _require_whole(path)
-    return _index(path, _digest(path), settings, tell)
+    _require_complete_file(path)
+    return _build_index(path, _hash_file(path), settings, tell)
 
 
 def index_times(path: Path) -> RecordingIndex:
@@ -61,10 +68,10 @@ def index_times(path: Path) -> RecordingIndex:
         ImageError: It is not a video that can be read.
         TooLargeError: It has too many frames.
     """
-    return _index(path, ("", path.stat().st_size if path.is_file() else 0), None, None)
+    return _build_index(path, ("", path.stat().st_size if path.is_file() else 0), None, None)
 
 
-def _index(
+def _build_index(
     path: Path,
     content: tuple[str, int],
     settings: Settings | None,
@@ -72,12 +79,12 @@ def _index(
 ) -> RecordingIndex:
     """The index of a video of a content (sha256, bytes); without settings nothing is measured."""
     sha256, size = content
-    rows, combs = Rows(), list[float]()
+    rows, combs = GrowingMeasures(), list[float]()
     times, intra, damaged = list[float](), list[bool](), 0
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is not a video that can be read")
-        coded = _coded_size(video)
+        coded = _read_coded_size(video)
         if settings is not None:
             check_size(ImageHeader("video", *coded), settings, path.name)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
@@ -91,7 +98,7 @@ def _index(
                 done, picture = video.retrieve()
                 if not done:
                     raise ImageError(f"frame {len(times)} of {path.name} cannot be decoded")
-                _require_size(picture, coded, len(times), path)
+                _require_constant_size(picture, coded, len(times), path)
                 measurer.measure(np.asarray(picture, np.uint8), row, before)
                 if len(times) % COMB_EVERY == COMB_EVERY - 1 and row["change"] > _MOVING:
                     combs.append(measure_combing(np.asarray(picture, np.uint8)))
@@ -103,10 +110,10 @@ def _index(
                 tell(len(times), max(total, len(times)) if total > 0 else None)
     if not times:
         raise ImageError(f"{path.name} has no frame that can be decoded")
-    shown = _repaired(np.array(times))
-    _require_same_behind_jump(path, shown)
+    shown = _repair_last_time(np.array(times))
+    _require_consistent_seek(path, shown)
     base, pts = find_time_base(shown)
-    width, height = _square(coded, aspect)
+    width, height = _compute_square_pixel_size(coded, aspect)
     facts = RecordingFacts(
         sha256=sha256,
         bytes=size,
@@ -122,10 +129,15 @@ def _index(
         decoder=f"OpenCV {cv2.__version__}",
         damaged=damaged,
     )
-    return RecordingIndex(facts, pts, _keys(shown, _key_times(path), np.array(intra)), rows.all())
+    return RecordingIndex(
+        facts,
+        pts,
+        _find_key_frames(shown, _read_key_frame_times(path), np.array(intra)),
+        rows.all(),
+    )
 
 
-def _digest(path: Path) -> tuple[str, int]:
+def _hash_file(path: Path) -> tuple[str, int]:
     digest, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
@@ -134,11 +146,11 @@ def _digest(path: Path) -> tuple[str, int]:
     return digest.hexdigest(), size
 
 
-def _coded_size(video: cv2.VideoCapture) -> tuple[int, int]:
+def _read_coded_size(video: cv2.VideoCapture) -> tuple[int, int]:
     return int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT))
 
 
-def _require_size(picture: Any, coded: tuple[int, int], number: int, path: Path) -> None:
+def _require_constant_size(picture: Any, coded: tuple[int, int], number: int, path: Path) -> None:
     height, width = picture.shape[:2]
     if (width, height) != coded:
         raise ImageError(
@@ -159,7 +171,7 @@ def read_pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]
     return over // common, under // common
 
 
-def _square(coded: tuple[int, int], aspect: tuple[int, int]) -> tuple[int, int]:
+def _compute_square_pixel_size(coded: tuple[int, int], aspect: tuple[int, int]) -> tuple[int, int]:
     """Size with square pixels; nothing becomes smaller."""
     width, height = coded
     over, under = aspect
@@ -168,7 +180,7 @@ def _square(coded: tuple[int, int], aspect: tuple[int, int]) -> tuple[int, int]:
     return width, round(height * under / over)
 
 
-def _key_times(path: Path) -> FloatArray:
+def _read_key_frame_times(path: Path) -> FloatArray:
     """Times of the key frames in milliseconds, without decoding anything."""
     found = []
     with open_video(path, [cv2.CAP_PROP_FORMAT, -1]) as packets:
@@ -178,7 +190,7 @@ def _key_times(path: Path) -> FloatArray:
     return np.array(found)
 
 
-def _keys(times: FloatArray, key_times: FloatArray, intra: Any) -> IntArray:
+def _find_key_frames(times: FloatArray, key_times: FloatArray, intra: Any) -> IntArray:
     """Numbers of the key frames: those that the container marks, and that are coded by themselves.
 
     Where an edit leaves the first packets out, times of packets begin earlier than those of frames;
@@ -188,14 +200,14 @@ def _keys(times: FloatArray, key_times: FloatArray, intra: Any) -> IntArray:
     return np.flatnonzero(marked if marked.sum() * 2 > len(key_times) else intra).astype(np.int64)
 
 
-def _repaired(times: FloatArray) -> FloatArray:
+def _repair_last_time(times: FloatArray) -> FloatArray:
     """Times where the last frame of a stream may have none, which then reads as 0."""
     if len(times) > 2 and times[-1] == 0 and times[-2] > 0:
         times[-1] = 2 * times[-2] - times[-3]
     return times
 
 
-def _require_same_behind_jump(path: Path, times: FloatArray) -> None:
+def _require_consistent_seek(path: Path, times: FloatArray) -> None:
     """Raise where a jump leads to other frames: times of an AVI are counted, before damage and behind it
     not alike."""
     with path.open("rb") as file:
@@ -226,7 +238,7 @@ def _has_seek_table(path: Path) -> bool:
         return not file.read(4).startswith(_UNINDEXED)
 
 
-def _require_whole(path: Path) -> None:
+def _require_complete_file(path: Path) -> None:
     """Raise where a file ends before its own headers say: the rest of a copy is missing.
 
     Raises:
@@ -237,7 +249,7 @@ def _require_whole(path: Path) -> None:
         if not size:
             raise ImageError(f"{path.name} is empty")
         with path.open("rb") as file:
-            declared = _declared_size(file, size)
+            declared = _read_declared_size(file, size)
     except OSError as error:
         raise ImageError(f"{path.name} cannot be read ({error.strerror})") from error
     if declared > size:
@@ -247,13 +259,13 @@ def _require_whole(path: Path) -> None:
         )
 
 
-def _declared_size(file: BinaryIO, size: int) -> int:
+def _read_declared_size(file: BinaryIO, size: int) -> int:
     """Size that MP4, AVI and Matroska files declare, bytes; of others, and where they say none, 0."""
     head = file.read(12)
     if head[:4] == b"RIFF" and head[8:] == b"AVI ":
         return 8 + int.from_bytes(head[4:8], "little")
     if head[:4] == b"\x1a\x45\xdf\xa3":
-        return _matroska_size(file)
+        return _read_matroska_size(file)
     place = 0
     if head[4:8] not in _FIRST_BOXES:
         return 0
@@ -275,7 +287,7 @@ _FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"styp")
 """With which MP4 and QuickTime files begin."""
 
 
-def _matroska_size(file: BinaryIO) -> int:
+def _read_matroska_size(file: BinaryIO) -> int:
     file.seek(4)
     place = 4
     for identity in (b"", b"\x18\x53\x80\x67"):

@@ -97,31 +97,31 @@ class FrameMeasurer:
         if past:
             before, colours_before = past[-1]
             row["change"] = cv2.absdiff(grey, before).mean()
-            row["histogram"] = _recoloured(colours, colours_before)
-            row["residual"], flow, left = self._residual(before, grey)
+            row["histogram"] = _measure_colour_change(colours, colours_before)
+            row["residual"], flow, left = self._compute_motion_residual(before, grey)
             row["torn"] = (cv2.resize(left, CELLS, interpolation=cv2.INTER_AREA) > TORN).sum()
-            row["motion"], row["together"] = _motion(flow)
+            row["motion"], row["together"] = _summarize_flow(flow)
             if len(past) > 1 and row_before is not None:
-                row_before["blend"] = _blend(past[-2][0], before, grey)
+                row_before["blend"] = _measure_blend(past[-2][0], before, grey)
         for at, lag in enumerate(self._lags):
             if len(past) >= lag:
                 before, colours_before = past[-lag]
-                row["recoloured"][at] = _recoloured(colours, colours_before)
-                row["apart"][at] = self._residual(before, grey)[0]
+                row["recoloured"][at] = _measure_colour_change(colours, colours_before)
+                row["apart"][at] = self._compute_motion_residual(before, grey)[0]
         past.append((grey, colours))
 
-    def _residual(self, before: Picture, grey: Picture) -> tuple[float, Any, Any]:
+    def _compute_motion_residual(self, before: Picture, grey: Picture) -> tuple[float, Any, Any]:
         """What no motion explains, by the contrast; the motion; what it leaves of each pixel."""
-        found = self._followed(before, grey, (0.0, 0.0))
+        found = self._compensate_motion(before, grey, (0.0, 0.0))
         if found[0] < UNEXPLAINED:
             return found
         # Optical flow loses a camera that turns fast, correlation does not.
         shift, _ = cv2.phaseCorrelate(grey.astype(np.float32), before.astype(np.float32), _WINDOW)
         if max(abs(shift[0]), abs(shift[1])) < 2.0:
             return found
-        return min(found, self._followed(before, grey, shift), key=lambda one: one[0])
+        return min(found, self._compensate_motion(before, grey, shift), key=lambda one: one[0])
 
-    def _followed(
+    def _compensate_motion(
         self, before: Picture, grey: Picture, shift: Sequence[float]
     ) -> tuple[float, Any, Any]:
         start = np.empty((*grey.shape, 2), np.float32)
@@ -139,11 +139,11 @@ def convert_lags_to_frames(fps: float) -> list[int]:
     return [max(round(lag * min(max(fps, 10.0), 120.0)), 2) for lag in LAGS]
 
 
-def _recoloured(colours: Any, before: Any) -> float:
+def _measure_colour_change(colours: Any, before: Any) -> float:
     return float(np.abs(colours - before).sum()) / (2 * SMALL[0] * SMALL[1])
 
 
-def _motion(flow: Any) -> tuple[float, float]:
+def _summarize_flow(flow: Any) -> tuple[float, float]:
     """Length of the median of a flow, and share of it that agrees with that."""
     sparse = flow[::3, ::3].reshape(-1, 2)
     middle = np.median(sparse, axis=0)
@@ -180,7 +180,7 @@ def hash_distance(one: npt.NDArray[np.uint64], other: npt.NDArray[np.uint64]) ->
     return np.bitwise_count(np.bitwise_xor(one, other))
 
 
-def _blend(before: Picture, grey: Picture, after: Picture) -> float:
+def _measure_blend(before: Picture, grey: Picture, after: Picture) -> float:
     apart = cv2.absdiff(before, after).mean()
     middle = cv2.addWeighted(before, 0.5, after, 0.5, 0)
     return float(cv2.absdiff(grey, middle).mean()) / max(float(apart), 0.5)
@@ -208,7 +208,7 @@ def measure_combing(picture: Picture) -> float:
     return float(rough[0] / max(rough[1], 4.0))
 
 
-class Rows:
+class GrowingMeasures:
     """Measures of a recording whose length is not known beforehand."""
 
     def __init__(self) -> None:

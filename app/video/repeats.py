@@ -30,7 +30,7 @@ class Freeze:
     last: int
 
 
-def repeated(rows: Measured) -> BoolArray:
+def find_repeated_frames(rows: Measured) -> BoolArray:
     """Which frames show the frame before once more, among others that move; shape (N,)."""
     change = rows["change"].astype(np.float64)
     still = np.zeros(len(rows), np.bool_)
@@ -42,14 +42,14 @@ def repeated(rows: Measured) -> BoolArray:
     return still
 
 
-def blended(rows: Measured) -> BoolArray:
+def find_blended_frames(rows: Measured) -> BoolArray:
     """Which frames are a mix of the frames beside them; shape (N,)."""
     after = np.append(rows["change"][1:], 0.0)
     moves = np.minimum(rows["change"], after) > BLEND_CHANGE
     return np.asarray(moves & (rows["blend"] < BLEND))
 
 
-def freezes(rows: Measured, step: float) -> list[Freeze]:
+def find_freezes(rows: Measured, step: float) -> list[Freeze]:
     """Stretches that stand still, digitally: a camera that rests has more noise than that."""
     least = max(round(FREEZE_SECONDS / step), 3)
     still = rows["change"] < REPEAT_CHANGE

@@ -38,7 +38,7 @@ def cluster_logos(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[
     clusters: list[list[int]] = []
     for at in range(len(intervals)):
         for number, members in enumerate(clusters):
-            if any(_alike(rows, intervals[at], intervals[other]) for other in members):
+            if any(_show_same_logo(rows, intervals[at], intervals[other]) for other in members):
                 members.append(at)
                 found[at] = number
                 break
@@ -50,18 +50,18 @@ def cluster_logos(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[
     ]
 
 
-def _alike(rows: Measured, one: tuple[int, int], other: tuple[int, int]) -> bool:
+def _show_same_logo(rows: Measured, one: tuple[int, int], other: tuple[int, int]) -> bool:
     """Whether some frames within two transitions are pictures of one thing, in the same order."""
     ours, theirs = (rows[first : last + 1] for first, last in (one, other))
     bits = hash_distance(ours["hash"][:, None], theirs["hash"][None, :])
     cells = [each["cells"].reshape(len(each), -1).astype(np.float32) for each in (ours, theirs)]
     apart = np.abs(cells[0][:, None] - cells[1][None, :]).mean(axis=2)
     same = (bits <= MOST_APART) & (apart < MOST_CELLS)
-    same &= _foreign(rows, one)[:, None] & _foreign(rows, other)[None, :]
+    same &= _find_foreign_frames(rows, one)[:, None] & _find_foreign_frames(rows, other)[None, :]
     return int(same.any(axis=1).sum()) >= LEAST_ALIKE and int(same.any(axis=0).sum()) >= LEAST_ALIKE
 
 
-def _foreign(rows: Measured, interval: tuple[int, int]) -> BoolArray:
+def _find_foreign_frames(rows: Measured, interval: tuple[int, int]) -> BoolArray:
     """Which frames of a transition show something that belongs to neither shot, and to no mix of them."""
     first, last = interval
     old, new = (
@@ -95,12 +95,12 @@ def find_shots_between_logos(
         places = [at for at, number in enumerate(clusters, 1) if number == cluster]
         if len(places) < LEAST_SEEN and len(places) != 2:
             continue
-        for start, stop in _pairs(places, seconds, main):
+        for start, stop in _pair_logo_wipes(places, seconds, main):
             replay[start:stop] = True
     return replay
 
 
-def _pairs(
+def _pair_logo_wipes(
     places: Sequence[int], seconds: Sequence[tuple[float, float]], main: Sequence[bool]
 ) -> list[tuple[int, int]]:
     """Wipes that open and close a replay: first shot behind each, and first shot after it.

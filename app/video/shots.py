@@ -21,7 +21,7 @@ from app.video.cuts import find_hard_cuts
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
-from app.video.repeats import Freeze, blended, freezes, repeated
+from app.video.repeats import Freeze, find_blended_frames, find_freezes, find_repeated_frames
 from app.video.replays import cluster_logos, find_shots_between_logos
 from app.video.transitions import Transition, find_soft_transitions
 
@@ -90,7 +90,7 @@ class RecordingShots:
 
 def find_shots(
     index: RecordingIndex,
-    look: Callable[[Sequence[int]], Sequence[LookedAt]] | None = None,
+    look: Callable[[Sequence[int]], Sequence[FrameContent]] | None = None,
     progress: ReportProgress | None = None,
 ) -> RecordingShots:
     """Shots of a recording.
@@ -103,7 +103,7 @@ def find_shots(
     rows = index.measured
     cuts, flashed = find_hard_cuts(rows, index.step)
     transitions = find_soft_transitions(rows, index.step, cuts, flashed)
-    shots = _divided(index, cuts.tolist(), transitions)
+    shots = _split_into_shots(index, cuts.tolist(), transitions)
     wipes = [one for one in transitions if one.kind == "wipe"]
     clusters = cluster_logos(rows, [(one.first, one.last) for one in wipes])
     logos = {one.last + 1: cluster for one, cluster in zip(wipes, clusters, strict=True)}
@@ -114,14 +114,14 @@ def find_shots(
         if progress is not None:
             progress(done + 1, len(shots), "Looking at shots.")
     before = [logos.get(shot.first) for shot in shots]
-    still, mixed = repeated(rows), blended(rows)
+    still, mixed = find_repeated_frames(rows), find_blended_frames(rows)
     slow = [(still | mixed)[shot.first : shot.last + 1].mean() > SLOW_SHARE for shot in shots]
     replays = find_shots_between_logos(
         before[1:],
         [(shot.start_s, shot.end_s) for shot in shots],
         [kind == "main" and not is_slow for kind, is_slow in zip(kinds, slow, strict=True)],
     )
-    stands = freezes(rows, index.step)
+    stands = find_freezes(rows, index.step)
     return RecordingShots(
         frames=len(index),
         fps=index.fps,
@@ -143,7 +143,7 @@ def find_shots(
     )
 
 
-def _divided(
+def _split_into_shots(
     index: RecordingIndex, cuts: Sequence[int], transitions: Sequence[Transition]
 ) -> list[Shot]:
     """Shots without kinds."""
@@ -196,10 +196,10 @@ def index_and_find_shots(
         path, settings, lambda done, total: tell((done, total, "Reading frames."))
     )
 
-    def progress(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         tell((done, total, sentence))
 
-    return find_shots_of_indexed(path, index, progress)
+    return find_shots_of_indexed(path, index, report_progress)
 
 
 def find_shots_of_indexed(
@@ -217,13 +217,13 @@ def find_shots_of_indexed(
     """
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 
-        def look(numbers: Sequence[int]) -> list[LookedAt]:
-            return [analyse_frame(_narrowed(reader.read(number))) for number in numbers]
+        def analyse_numbered_frames(numbers: Sequence[int]) -> list[FrameContent]:
+            return [analyse_frame(_narrow_image(reader.read(number))) for number in numbers]
 
-        return find_shots(index, look, progress)
+        return find_shots(index, analyse_numbered_frames, progress)
 
 
-def _narrowed(image: Image) -> Image:
+def _narrow_image(image: Image) -> Image:
     height, width = image.shape[:2]
     if width <= _LOOKED_WIDTH:
         return image
@@ -232,7 +232,7 @@ def _narrowed(image: Image) -> Image:
 
 
 @dataclass(frozen=True)
-class LookedAt:
+class FrameContent:
     """What a frame shows.
 
     Attributes:
@@ -250,7 +250,7 @@ def choose_frames_for_kind(first: int, last: int, seconds: float) -> list[int]:
     return sorted({first + round(place * (last - first)) for place in places})
 
 
-def analyse_frame(image: npt.NDArray[np.uint8]) -> LookedAt:
+def analyse_frame(image: npt.NDArray[np.uint8]) -> FrameContent:
     """What a frame shows.
 
     Args:
@@ -258,14 +258,14 @@ def analyse_frame(image: npt.NDArray[np.uint8]) -> LookedAt:
     """
     grass = float(find_field_of_play(image).mean())
     if grass < GRASS_MAIN:
-        return LookedAt(grass, False)
+        return FrameContent(grass, False)
     try:
-        return LookedAt(grass, propose_camera(image).outcome == "proposed")
+        return FrameContent(grass, propose_camera(image).outcome == "proposed")
     except (GeometryError, np.linalg.LinAlgError):
-        return LookedAt(grass, False)
+        return FrameContent(grass, False)
 
 
-def classify_shot(looks: Sequence[LookedAt]) -> ShotKind:
+def classify_shot(looks: Sequence[FrameContent]) -> ShotKind:
     """Kind of a shot by what its frames show; whether it is a replay is not told by that."""
     proposed = sum(look.proposed for look in looks)
     if proposed >= min(LEAST_MAIN, len(looks)):

@@ -80,7 +80,7 @@ def find_soft_transitions(
         cuts: First frames behind hard cuts.
         flashed: Which frames a flash lights.
     """
-    scene = _Scene(rows, step, cuts, flashed)
+    scene = _TransitionSearch(rows, step, cuts, flashed)
     found: list[Transition] = []
     for lag, numbers in scene.candidates():
         for number in numbers:
@@ -94,7 +94,7 @@ def find_soft_transitions(
     return scene.merged(sorted(chosen, key=lambda each: each.first))
 
 
-class _Scene:
+class _TransitionSearch:
     """Measures as they are looked at here."""
 
     def __init__(self, rows: Measured, step: float, cuts: IntArray, flashed: BoolArray):
@@ -147,17 +147,17 @@ class _Scene:
         at = int(np.searchsorted(self._bounds, number, "right"))
         low, high = int(self._bounds[at - 1]), int(self._bounds[at])
         found = (
-            self._fade(number, lag, low, high)
-            or self._logo(number, lag, low, high)
-            or self._wipe(number, lag, low, high)
-            or self._dissolve(number, lag, low, high)
+            self._detect_fade(number, lag, low, high)
+            or self._detect_logo(number, lag, low, high)
+            or self._detect_wipe(number, lag, low, high)
+            or self._detect_dissolve(number, lag, low, high)
         )
         if found is None or found.score > WORST_SCORE:
             return None
         lit = self._flashed[max(found.first - 1, 0) : found.last + 2]
         return None if lit.mean() > MOST_LIT else found
 
-    def _fade(self, number: int, lag: int, low: int, high: int) -> Transition | None:
+    def _detect_fade(self, number: int, lag: int, low: int, high: int) -> Transition | None:
         """Through black."""
         start, stop = max(number - lag, low), min(number + lag, high)
         light = self._cells[start:stop].mean(axis=1)
@@ -172,11 +172,11 @@ class _Scene:
             lit = self._cells[line].mean(axis=1)
             if len(line) < 4 or lit.max() < max(DARK, lit[0] / LEAST_LIGHT):
                 return None
-            ends.append(int(line[0]) + way * _knee(lit))
+            ends.append(int(line[0]) + way * _find_brightness_knee(lit))
         first, last = ends[0] + 1, ends[1] - 1
         return Transition(first, last, "fade", 0.0) if first <= last else None
 
-    def _logo(self, number: int, lag: int, low: int, high: int) -> Transition | None:
+    def _detect_logo(self, number: int, lag: int, low: int, high: int) -> Transition | None:
         """Something that belongs to neither shot covers cells, all of them in the middle."""
         start, stop = max(number - lag, low), min(number, high - 1)
         if lag < self._lags[1]:
@@ -190,26 +190,28 @@ class _Scene:
             return None
         reach = self._lags[2] * 4 // 5
         middle += start
-        first = self._outermost(middle, -1, max(middle - reach, low), low)
-        last = self._outermost(middle, 1, min(middle + reach, high - 1), high - 1)
-        if first is None or last is None or self._is_whip(slice(first, last + 1)):
+        first = self._find_outermost_logo_frame(middle, -1, max(middle - reach, low), low)
+        last = self._find_outermost_logo_frame(middle, 1, min(middle + reach, high - 1), high - 1)
+        if first is None or last is None or self._is_whip_pan(slice(first, last + 1)):
             return None
         torn = self._rows["torn"][first : last + 2]
         if torn.max() < LEAST_TORN or last - first < 2:
             return None
         return Transition(first, last, "wipe", 0.02)
 
-    def _outermost(self, middle: int, way: int, beside: int, limit: int) -> int | None:
+    def _find_outermost_logo_frame(
+        self, middle: int, way: int, beside: int, limit: int
+    ) -> int | None:
         """The outermost frame, on one side, that a logo shows in; None: the shot there is not calm."""
         torn = self._rows["torn"].astype(np.int64)
         outside = torn[np.arange(beside, limit + way, way)[: 2 * BESIDE]]
         if not len(outside) or np.percentile(outside, 80) > CALM_CELLS:
             return None
-        place = _walk(torn, middle, way, 1.5 * CALM_CELLS, beside, self._lags[1])
+        place = _find_last_torn_frame(torn, middle, way, 1.5 * CALM_CELLS, beside, self._lags[1])
         # A frame is torn from the one before: behind the last one there is no logo any more.
         return place if way < 0 else max(place - 1, middle)
 
-    def _wipe(self, number: int, lag: int, low: int, high: int) -> Transition | None:
+    def _detect_wipe(self, number: int, lag: int, low: int, high: int) -> Transition | None:
         """Cells are torn in each frame, which are not before or after."""
         torn = self._rows["torn"].astype(np.int64)
         before, after = max(number - lag, low + 1), min(number, high - 1)
@@ -219,8 +221,8 @@ class _Scene:
         if torn[peak] < LEAST_TORN:
             return None
         calm = [
-            self._usual(torn, before - lag - BESIDE, before, low),
-            self._usual(torn, after + 1, after + lag + BESIDE, high),
+            self._usual_torn_cells(torn, before - lag - BESIDE, before, low),
+            self._usual_torn_cells(torn, after + 1, after + lag + BESIDE, high),
         ]
         if max(calm) > MOST_CALM * torn[peak] and (
             torn[peak] < ALL_TORN or max(calm) > MOST_BUSY * torn[peak]
@@ -229,29 +231,31 @@ class _Scene:
         least = max(LEAST_CELLS, LEAST_SHARE * torn[peak])
         bars = [max(TORN_TIMES * usual + 2, least) for usual in calm]
         gap = max(self._lags[0] // 2, 2)
-        first = _walk(torn, peak, -1, bars[0], low + 1, gap)
-        last = _walk(torn, peak, 1, bars[1], high - 1, gap)
+        first = _find_last_torn_frame(torn, peak, -1, bars[0], low + 1, gap)
+        last = _find_last_torn_frame(torn, peak, 1, bars[1], high - 1, gap)
         if last - first < 1 or last - first > self._lags[2] + lag // 2:
             return None
         # The frame that is torn last shows the new picture alone.
         frames = slice(first, last)
-        if first - 1 < low or last >= high or self._is_whip(frames):
+        if first - 1 < low or last >= high or self._is_whip_pan(frames):
             return None
         old, new = self._cells[first - 1], self._cells[last]
-        kind, off, distance = _kind(self._cells[frames], old, new)
+        kind, off, distance = _classify_transition(self._cells[frames], old, new)
         if distance < LEAST_DISTANCE and off < 1.0:
             return None
         if max(calm) > MOST_CALM * torn[peak] and last - first < 3:
             return None
-        return Transition(first, last - 1, kind, self._score(first, last - 1, off, low, high))
+        return Transition(
+            first, last - 1, kind, self._compute_interval_cost(first, last - 1, off, low, high)
+        )
 
     @staticmethod
-    def _usual(torn: IntArray, start: int, stop: int, bound: int) -> float:
+    def _usual_torn_cells(torn: IntArray, start: int, stop: int, bound: int) -> float:
         start, stop = max(start, bound if start < bound < stop else 0), min(stop, len(torn))
         part = torn[start:stop]
         return float(np.percentile(part, 80)) if len(part) else 0.0
 
-    def _dissolve(self, number: int, lag: int, low: int, high: int) -> Transition | None:
+    def _detect_dissolve(self, number: int, lag: int, low: int, high: int) -> Transition | None:
         """All cells go evenly from one picture to the other."""
         beside = max(lag // 2, 8)
         start, stop = max(number - lag - beside, low), min(number + beside + 1, high)
@@ -261,39 +265,41 @@ class _Scene:
         old, new = cells[number - lag - start], cells[number - start]
         way = new - old
         shares = (cells - old) @ way / max(float(way @ way), 1.0)
-        fit = _ramp(shares, lag + 6)
+        fit = _fit_ramp(shares, lag + 6)
         if fit is None:
             return None
         first, last, jump, slope, rms = fit
         if not RAMP_JUMP[0] <= jump <= RAMP_JUMP[1] or slope > RAMP_SLOPE or rms > RAMP_RMS:
             return None
         frames = slice(start + first + 1, start + last)
-        if self._is_whip(frames):
+        if self._is_whip_pan(frames):
             return None
         old, new = cells[first], cells[last]
-        kind, off, distance = _kind(self._cells[frames], old, new)
+        kind, off, distance = _classify_transition(self._cells[frames], old, new)
         length = max(last - first, 4)
         unrest = np.abs(cells[max(first - length, 0)] - old).mean()
         unrest += np.abs(cells[min(last + length, len(cells) - 1)] - new).mean()
         unrest /= 2 * max(distance, 1.0)
         if distance < LEAST_DISTANCE or off > MOST_OFF or unrest > MOST_UNREST:
             return None
-        if kind == "wipe" and distance < ALIKE and not self._tears_more(frames, low, high):
+        if kind == "wipe" and distance < ALIKE and not self._has_more_torn_cells(frames, low, high):
             return None
-        score = self._score(frames.start, frames.stop - 1, off, low, high)
+        score = self._compute_interval_cost(frames.start, frames.stop - 1, off, low, high)
         return Transition(frames.start, frames.stop - 1, kind, score)
 
-    def _tears_more(self, frames: slice, low: int, high: int) -> bool:
+    def _has_more_torn_cells(self, frames: slice, low: int, high: int) -> bool:
         """Whether more cells are torn than on either side: a camera that runs along with somebody tears some all the time."""
         torn = self._rows["torn"].astype(np.int64)
         most = float(np.percentile(torn[frames], 80))
         sides = (
-            self._usual(torn, frames.start - self._lags[1], frames.start, low),
-            self._usual(torn, frames.stop + 1, frames.stop + self._lags[1], high),
+            self._usual_torn_cells(torn, frames.start - self._lags[1], frames.start, low),
+            self._usual_torn_cells(torn, frames.stop + 1, frames.stop + self._lags[1], high),
         )
         return most > max(sides)
 
-    def _score(self, first: int, last: int, off: float, low: int, high: int) -> float:
+    def _compute_interval_cost(
+        self, first: int, last: int, off: float, low: int, high: int
+    ) -> float:
         """How badly an interval parts two shots: it is no mix of them, they change beside it, it is long."""
         near = max(self._lags[0] * 2 // 3, 3)
         beside = (first - 1, last + 1, first - 1 - near, last + 1 + near)
@@ -308,7 +314,7 @@ class _Scene:
             + LENGTH * (last - first) / self._lags[2]
         )
 
-    def _is_whip(self, frames: slice) -> bool:
+    def _is_whip_pan(self, frames: slice) -> bool:
         """Whether a camera turns: everything moves fast one way, in most frames or at both ends."""
         rows = self._rows
         turning = (rows["motion"] > WHIP_MOTION) & (rows["together"] > WHIP_TOGETHER)
@@ -318,7 +324,9 @@ class _Scene:
         return bool((begins.any() and ends.any()) or inside.mean() > MOST_TURNING)
 
 
-def _walk(torn: IntArray, peak: int, way: int, bar: float, limit: int, gap: int) -> int:
+def _find_last_torn_frame(
+    torn: IntArray, peak: int, way: int, bar: float, limit: int, gap: int
+) -> int:
     """The last frame of those that are torn, from one on; a few calm ones among them are passed."""
     place = farthest = peak
     while place != limit and abs(place - farthest) < gap:
@@ -328,7 +336,7 @@ def _walk(torn: IntArray, peak: int, way: int, bar: float, limit: int, gap: int)
     return farthest
 
 
-def _kind(between: Any, old: Any, new: Any) -> tuple[TransitionKind, float, float]:
+def _classify_transition(between: Any, old: Any, new: Any) -> tuple[TransitionKind, float, float]:
     """Dissolve or wipe; how far from any mix of both pictures it gets; their distance."""
     old, new = old.astype(np.float64), new.astype(np.float64)
     way = new - old
@@ -345,7 +353,7 @@ def _kind(between: Any, old: Any, new: Any) -> tuple[TransitionKind, float, floa
     return ("dissolve" if even and off < MOST_OFF_MIXED else "wipe"), off, distance
 
 
-def _knee(light: FloatArray) -> int:
+def _find_brightness_knee(light: FloatArray) -> int:
     """Where light that rises from a dark frame stops to rise: index of the first frame with all of it."""
     half = int(np.flatnonzero(light >= 0.5 * light.max())[0])
     rising_part = light[: half + 1]
@@ -364,7 +372,7 @@ def _knee(light: FloatArray) -> int:
     return knee
 
 
-def _ramp(shares: FloatArray, longest: int) -> tuple[int, int, float, float, float] | None:
+def _fit_ramp(shares: FloatArray, longest: int) -> tuple[int, int, float, float, float] | None:
     """The broken line of three pieces that lies nearest to a curve.
 
     Returns:

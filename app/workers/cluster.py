@@ -86,7 +86,7 @@ class SchedulerPlace:
         return Security(require_encryption=True, tls_ca_file=ca, **roles)
 
 
-def read_place(address: str, keys: Path | None) -> SchedulerPlace:
+def parse_scheduler_address(address: str, keys: Path | None) -> SchedulerPlace:
     """Where a scheduler is, as it was typed.
 
     Args:
@@ -128,7 +128,7 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
             "tls:// needs certificates",
             hint=f"Name a folder with {', '.join(_KEYS)} (TOUCHLINE_CLUSTER_KEYS).",
         )
-    _require_keys(keys)
+    _require_key_files(keys)
     return SchedulerPlace(f"tls://{parts.netloc}", keys)
 
 
@@ -153,11 +153,11 @@ def run_task_on_worker(
     Raises:
         ClusterError: It is of another version.
     """
-    require_same(wanted, read_software_versions(), platform.node())
+    require_same_versions(wanted, read_software_versions(), platform.node())
     return work(*arguments)
 
 
-def require_same(wanted: dict[str, str], found: dict[str, str], where: str) -> None:
+def require_same_versions(wanted: dict[str, str], found: dict[str, str], where: str) -> None:
     """Raise ClusterError where a worker is of another version than who asks."""
     other = [
         f"{name} {found.get(name, 'missing')} instead of {value}"
@@ -171,7 +171,7 @@ def require_same(wanted: dict[str, str], found: dict[str, str], where: str) -> N
         )
 
 
-class Cluster(Executor):
+class ClusterExecutor(Executor):
     """The workers of a scheduler as an executor.
 
     Args:
@@ -245,7 +245,7 @@ class Cluster(Executor):
                 self._lost.set()
             else:
                 # Also a result that cannot be read, which would be none better a second time.
-                self._end_future(future, error=_explained_error(error))
+                self._end_future(future, error=_explain_error(error))
         else:
             self._end_future(future, value=value)
 
@@ -272,7 +272,7 @@ class Cluster(Executor):
             self._forget_cancelled()
             if lost:
                 self._lost.clear()
-                self._send_again()
+                self._resend_tasks()
             if time.monotonic() - looked < _COUNT_S:
                 continue
             looked = time.monotonic()
@@ -281,7 +281,7 @@ class Cluster(Executor):
             elif looked - seen > PATIENCE_S:
                 self._give_up(_no_worker_error(self._place))
 
-    def _send_again(self) -> None:
+    def _resend_tasks(self) -> None:
         """Join the scheduler anew, and send it all that is under way."""
         deadline = time.monotonic() + PATIENCE_S
         _close_client(self._client)
@@ -320,7 +320,7 @@ class Cluster(Executor):
             client.wait_for_workers(1, timeout=_WORKERS_S)
             found = client.run(read_software_versions)
             for where, one in found.items():
-                require_same(self._build, one, where)
+                require_same_versions(self._build, one, where)
         except ClusterError:
             _close_client(client)
             raise
@@ -385,7 +385,7 @@ def _close_client(client: Any) -> None:
         client.status = "closed"
 
 
-def _explained_error(error: BaseException) -> BaseException:
+def _explain_error(error: BaseException) -> BaseException:
     """The same error, or, where its workers died over a task, a sentence."""
     from distributed.scheduler import KilledWorker
 
@@ -397,7 +397,7 @@ def _explained_error(error: BaseException) -> BaseException:
     return error
 
 
-def _require_keys(folder: Path) -> None:
+def _require_key_files(folder: Path) -> None:
     for name in _KEYS:
         try:
             found = (folder / name).stat()

@@ -71,7 +71,7 @@ def _run_event_loop(program: Coroutine[Any, Any, None]) -> None:
 async def _run_scheduler(place: SchedulerPlace, say: Say) -> None:
     from distributed import Scheduler
 
-    end = _stop_event()
+    end = _make_stop_event()
     try:
         scheduler = await Scheduler(
             host=place.host,
@@ -91,17 +91,19 @@ async def _run_scheduler(place: SchedulerPlace, say: Say) -> None:
 async def _run_workers(
     place: SchedulerPlace, count: int, memory: int | None, folder: str, say: Say
 ) -> None:
-    end = _stop_event()
+    end = _make_stop_event()
     say(f"{count} workers look for the scheduler at {place.address}")
     limit = 0.9 / count if memory is None else memory
-    keepers = [asyncio.ensure_future(_keep_running(place, limit, folder)) for _ in range(count)]
+    keepers = [
+        asyncio.ensure_future(_keep_worker_running(place, limit, folder)) for _ in range(count)
+    ]
     await end.wait()
     for keeper in keepers:
         keeper.cancel()
     await asyncio.gather(*keepers, return_exceptions=True)
 
 
-async def _keep_running(place: SchedulerPlace, limit: float, folder: str) -> None:
+async def _keep_worker_running(place: SchedulerPlace, limit: float, folder: str) -> None:
     """A worker, and another one whenever it has ended."""
     from distributed import Nanny
 
@@ -121,7 +123,7 @@ async def _keep_running(place: SchedulerPlace, limit: float, folder: str) -> Non
         await asyncio.sleep(AGAIN_S)
 
 
-def _stop_event() -> asyncio.Event:
+def _make_stop_event() -> asyncio.Event:
     end, loop = asyncio.Event(), asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, end.set)
@@ -143,10 +145,10 @@ LOCAL = "tcp://127.0.0.1:8786"
 @commands.command()
 def scheduler(address: Address = None) -> None:
     """Carry work between servers and workers of other machines."""
-    from app.workers.cluster import read_place
+    from app.workers.cluster import parse_scheduler_address
 
     settings = read_settings()
-    place = read_place(address or settings.cluster or LOCAL, settings.cluster_keys)
+    place = parse_scheduler_address(address or settings.cluster or LOCAL, settings.cluster_keys)
     run_scheduler(place, say)
 
 
@@ -162,9 +164,9 @@ def worker(
     ] = None,
 ) -> None:
     """Solve on this machine for servers of others; it needs neither database nor frames."""
-    from app.workers.cluster import read_place
+    from app.workers.cluster import parse_scheduler_address
 
     settings = read_settings()
-    place = read_place(address or settings.cluster or LOCAL, settings.cluster_keys)
+    place = parse_scheduler_address(address or settings.cluster or LOCAL, settings.cluster_keys)
     given = None if memory is None else memory * 2**20
     run_workers(place, workers or settings.workers, given, say)

@@ -13,7 +13,7 @@ from typing import TypeVar
 from app.config import Settings
 from app.errors import InputError
 from app.worker_process import open_spawned_pool
-from app.workers.cluster import Cluster, read_place
+from app.workers.cluster import ClusterExecutor, parse_scheduler_address
 
 AHEAD = 8
 """Tasks under way, so that memory stays flat however many there are; an executor of more workers
@@ -86,7 +86,7 @@ def open_executor(settings: Settings, workers: int | None = None) -> Iterator[Ex
     """
     count = workers or settings.workers
     if settings.cluster is not None:
-        with _cluster_of(settings) as cluster:
+        with _open_cluster(settings) as cluster:
             yield cluster
     elif count == 1:
         yield None
@@ -98,7 +98,7 @@ def open_executor(settings: Settings, workers: int | None = None) -> Iterator[Ex
 def make_server_pool_opener(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
     """Where large jobs of a server are solved, opened when there is one; raises as ``open_executor``."""
     if settings.cluster is not None:
-        return lambda: _cluster_of(settings)
+        return lambda: _open_cluster(settings)
     # One processor is left for the requests.
     return lambda: open_process_pool(max(1, settings.workers - 1))
 
@@ -120,5 +120,5 @@ def open_process_pool(workers: int) -> Iterator[Executor]:
         yield pool
 
 
-def _cluster_of(settings: Settings) -> Cluster:
-    return Cluster(read_place(settings.cluster or "", settings.cluster_keys))
+def _open_cluster(settings: Settings) -> ClusterExecutor:
+    return ClusterExecutor(parse_scheduler_address(settings.cluster or "", settings.cluster_keys))

@@ -10,7 +10,7 @@ from app.geometry.arrays import FloatArray
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Solution
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.boxes import paper_table_1
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -32,7 +32,7 @@ FINDING_OF = {
 def bench_ball() -> None:
     """Everything about the ball that needs the truth."""
     scenes = make_scenes(GROUPS, SEED, faults=False)
-    solutions = {scene.group.key: solve(scene.group, PAPER) for scene in scenes}
+    solutions = {scene.group.key: solve_group(scene.group, PAPER) for scene in scenes}
     print_table(
         f"3D ball, {GROUPS} synthetic groups without faults",
         ("estimator", "solved", "error m, median", "mean", "p95", "truth in 95 % ellipsoid"),
@@ -81,7 +81,7 @@ def _faults() -> None:
     """How often a planted fault is named, or stopped by a gate."""
     planted, named, stopped = Counter[str](), Counter[str](), Counter[str]()
     for scene in make_scenes(GROUPS, SEED + 1, faults=True):
-        solution = solve(scene.group, PAPER)
+        solution = solve_group(scene.group, PAPER)
         kinds = {finding.kind for finding in solution.findings}
         for fault in scene.truth.faults:
             planted[fault.kind] += 1

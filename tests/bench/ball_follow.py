@@ -111,7 +111,7 @@ def followed_shot(
         given = hints
         if mended is not None:
             run = runs[mended]
-            given = replace(hints, seen=run.surest(), clicks=run.clicks)
+            given = replace(hints, seen=run.find_most_certain_click(), clicks=run.clicks)
         one = BallClick(frame, float(x), float(y))
         found = follow_ball(frames.read, one, before, after, given)
         told.seconds += time.process_time() - began
@@ -142,7 +142,7 @@ def followed_shot(
         if near is None:
             runs.append(run)
         else:
-            runs[near] = runs[near].mended(run)
+            runs[near] = runs[near].merge_run(run)
         told.ends += [run.before, run.after]
     judged(runs, seen, by_number, told)
     return told

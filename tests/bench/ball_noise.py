@@ -14,7 +14,7 @@ from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate, compute_calibration_key, measure_calibration
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 
@@ -56,7 +56,7 @@ def _errors(scene: Scene, make: Make, rng: np.random.Generator) -> tuple[float, 
             key = compute_calibration_key(view.station, group.pitch, PAPER.calibration)
             right = replace(found, camera=truth.camera)
             known[key] = measure_calibration(right, view.station.lines, group.pitch, view.size)
-    solution = solve(group, PAPER, known)
+    solution = solve_group(group, PAPER, known)
     places = [None if ball is None else ball.point for ball in (solution.ball, solution.best_ball)]
     mean, best = (
         np.nan if place is None else float(np.linalg.norm(np.subtract(place, scene.truth.ball)))

@@ -24,7 +24,7 @@ from app.soccer.policy import PAPER
 from app.solving.rig_proposal import propose_rig
 from app.tracking.ball_correct import correct_track
 from app.tracking.ball_solve import track_ball
-from app.tracking.ball_track import BallMeasurements, BallTrack, Correction
+from app.tracking.ball_track import BallMeasurements, BallTrack, EventCorrection
 from tests.bench.link import DATA, STANDS, Filmed, at_times, film, hawkeye, made_ball
 from tests.bench.rigs import rig_of
 from tests.bench.table import print_table
@@ -81,7 +81,7 @@ def edited(ball: FloatArray, seen: BallMeasurements, count: int = 20) -> tuple[f
     frames, taken = [], []
     for frame in np.linspace(60, len(times) - 60, count).astype(int).tolist():
         began = time.process_time()
-        patches = correct_track(track, seen, Pitch(), [Correction(frame, "kick", True)])
+        patches = correct_track(track, seen, Pitch(), [EventCorrection(frame, "kick", True)])
         taken.append(1000 * (time.process_time() - began))
         frames.append(sum(len(patch.part.frames) for patch in patches))
     return float(np.median(frames)), float(np.median(taken))
@@ -386,7 +386,7 @@ def _print_neighbours(clicks: Sequence[Click], rigs: Mapping[str, Mapping[str, C
             if not seen:
                 continue
             places = [
-                cameras[view].on_ground(np.array([[*views[view]] for views in seen]))
+                cameras[view].project_to_ground(np.array([[*views[view]] for views in seen]))
                 for view in (one, other)
             ]
             apart = places[0] - places[1]

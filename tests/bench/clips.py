@@ -25,7 +25,7 @@ from scipy.stats import chi2
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.paint.service import read_paint
 from app.features.policies.service import change_policy
@@ -174,7 +174,7 @@ def in_a_dataset(
         solve_dataset(store, "clips")
         found: dict[str, list[Known]] = {}
         for number, (clip, image, _) in enumerate(names, start=1):
-            solution = load(store, number).solution
+            solution = load_group_state(store, number).solution
             calibration = None if solution is None else solution.views[0].calibration
             if calibration is None or calibration.camera is None or calibration.source != "paint":
                 continue
@@ -193,7 +193,7 @@ def _grass(lines: Lines) -> Lines:
 
 def _on_paint(snapped: SnappedCamera) -> Lines:
     """What an accepted proposal draws."""
-    return to_paint_evidence(snapped.evidence).some_points()
+    return to_paint_evidence(snapped.evidence).thin_points()
 
 
 def meet(one: Known, other: Known) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path
 from app.config import Settings
 from app.db.store import Store
 from app.features.solutions.service import solve_dataset
-from app.workers.cluster import Cluster, SchedulerPlace
+from app.workers.cluster import ClusterExecutor, SchedulerPlace
 from app.workers.executors import open_process_pool
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
@@ -40,7 +40,7 @@ def bench_cluster() -> None:
             for count in (1, 2):
                 with members(fresh, folder, workers=count) as cluster:
                     cluster.wait_for_workers()
-                    pool = partial(Cluster, SchedulerPlace(cluster.address))
+                    pool = partial(ClusterExecutor, SchedulerPlace(cluster.address))
                     what = f"{count} worker{'s' * (count > 1)} of a cluster"
                     taken = _seconds(fresh, folder / "home", pool)
                     seconds.setdefault(what, []).append(taken)

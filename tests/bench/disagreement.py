@@ -22,7 +22,7 @@ from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration, Solution
 from app.solving.calibrate import calibrate_station, compute_calibration_key
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 
@@ -175,7 +175,7 @@ def judged(cases: Sequence[Case], known: dict[str, Calibration]) -> list[Judged]
             key = compute_calibration_key(view.station, case.group.pitch, PAPER.calibration)
             if key not in known:
                 known[key] = calibrate_station(view.station, case.group.pitch, PAPER.calibration)
-    return [Judged(case, solve(case.group, PAPER, known)) for case in cases]
+    return [Judged(case, solve_group(case.group, PAPER, known)) for case in cases]
 
 
 def bench_disagreement(groups: int = GROUPS, seed: int = SEED) -> None:

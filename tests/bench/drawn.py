@@ -13,7 +13,7 @@ import numpy as np
 from app.geometry.camera import Camera
 from app.sample import SEED
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.paint import WORSE_PX, Shot, field_error, shots_of
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -26,7 +26,7 @@ def bench_drawn() -> None:
     """Print the table."""
     errors, worse, named = [], 0, 0
     for scene in make_scenes(GROUPS, SEED):
-        findings = solve(scene.group, PAPER).findings
+        findings = solve_group(scene.group, PAPER).findings
         swapped = {item.view for item in findings if item.kind == "sides_swapped"}
         told = {item.view for item in findings}
         for key, shot in shots_of(scene):

@@ -12,14 +12,14 @@ from scipy.optimize import least_squares
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.likely_point import invert_symmetric
-from app.geometry.resection_kernels import solve_damped
+from app.geometry.resection_kernels import solve_damped_step
 from app.geometry.triangulation import smallest_singular_vectors, triangulate_pairs
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from tests.bench.table import print_table
 from tests.cameras import looking
@@ -68,7 +68,7 @@ def _refinement() -> list[list[object]]:
         marking: polyline[:: max(len(polyline) // 5, 1)]
         for marking, polyline in project_markings(camera, pitch, SIZE).items()
     }
-    observations = observations_of_lines(make_lines(lines), pitch, SIZE)
+    observations = make_observations(make_lines(lines), pitch, SIZE)
     problem = ResectionProblem.of(SIZE, CalibrationPolicy())
     start = problem.parameters(camera) + np.array([0.01, 0.01, 0.002, 1.0, 1.0, 0.5, 0.02, 0.0])
     ours = _best(lambda: problem.refine(observations, start[None]))
@@ -93,7 +93,7 @@ def _damped_steps() -> list[list[object]]:
         damped[:, diagonal, diagonal] *= 1 + damping[:, None]
         return np.linalg.solve(damped, -gradient[..., None])[..., 0]
 
-    ours = _best(lambda: _often(lambda: solve_damped(gradient, information, damping, step)))
+    ours = _best(lambda: _often(lambda: solve_damped_step(gradient, information, damping, step)))
     theirs = _best(lambda: _often(by_numpy))
     np.testing.assert_allclose(step, by_numpy(), rtol=1e-6)
     return [

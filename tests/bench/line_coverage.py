@@ -28,9 +28,9 @@ from app.soccer.pitch import CIRCLES, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
-from app.solving.dataset_noise import view_line_evidence, view_line_noise
+from app.solving.dataset_noise import collect_view_line_evidence, estimate_view_line_noise
 from app.solving.line_noise import LineEvidence, estimate_line_noise
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from tests.bench.cases import SIZE as MADE_SIZE
 from tests.bench.cases import Case, make_case
@@ -114,13 +114,13 @@ def left_out(
         found = calibrate(rest, PITCH, size, policies[0])
         if found.camera is None or found.covariance is None or found.unobservable:
             continue
-        seen = observations_of_lines(make_lines({marking: lines[marking]}), PITCH, size)
+        seen = make_observations(make_lines({marking: lines[marking]}), PITCH, size)
         parameters = ResectionProblem.of(size, policies[0]).parameters(found.camera)
         half = size.diagonal / 2
         offsets, slopes = curve_residuals(parameters, seen.curves, seen.curve_points(), half)
         told = []
         for policy in policies:
-            noise = view_line_noise(found, _used(found, rest), PITCH, size, policy)
+            noise = estimate_view_line_noise(found, _used(found, rest), PITCH, size, policy)
             carried = slopes[:, 0] @ noise.parameters @ slopes[:, 0].T
             told.append(LeftOut(marking, offsets[:, 0], carried, noise.variance, noise.share))
         yield told
@@ -140,7 +140,7 @@ def _evidence(
     for lines in frames:
         found = calibrate(lines, PITCH, size, policy)
         try:
-            yield view_line_evidence(found, _used(found, lines), PITCH, size, policy)
+            yield collect_view_line_evidence(found, _used(found, lines), PITCH, size, policy)
         except DegenerateGeometryError:
             continue
 

@@ -18,7 +18,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.play import RADIUS, step_ball
-from app.tracking.ball_rays import BallRays, ball_rays
+from app.tracking.ball_rays import BallRays, build_ball_rays
 from app.tracking.link import find_time_map
 from app.tracking.time_map import TimeMap
 from tests.bench.table import print_table
@@ -43,7 +43,7 @@ class Filmed:
     cameras: list[Camera]
 
     def rays(self) -> BallRays:
-        return ball_rays(self.times.tolist(), self.pixels.tolist(), self.cameras)
+        return build_ball_rays(self.times.tolist(), self.pixels.tolist(), self.cameras)
 
 
 @dataclass(frozen=True)

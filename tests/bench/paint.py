@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.paint.service import get_paint, read_paint
 from app.features.policies.service import change_policy
@@ -28,7 +28,7 @@ from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import parameters_from_camera
 from app.paint.agreement import measure_agreement
 from app.paint.grass import find_field_of_play
-from app.paint.ridges import find_line_like
+from app.paint.ridges import find_line_like_pixels
 from app.paint.snap import SnappedCamera, snap_camera
 from app.paint.view_paint import read_paint_of_image
 from app.sample.render import render_view
@@ -40,9 +40,9 @@ from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.soccer.solution import Calibration, Solution
 from app.solving.calibrate import calibrate, compute_calibration_key, measure_calibration
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 
@@ -111,7 +111,7 @@ def _through_a_dataset(scenes: Sequence[Scene]) -> list[Solution]:
         return [
             solution
             for number in range(1, len(groups) + 1)
-            if (solution := load(store, number).solution) is not None
+            if (solution := load_group_state(store, number).solution) is not None
         ]
 
 
@@ -182,7 +182,7 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
 
 
 def _ball_error(group: Group, scene: Scene, known: dict[str, Calibration]) -> float:
-    return _off(solve(group, PAPER, known), scene)
+    return _off(solve_group(group, PAPER, known), scene)
 
 
 def _off(solution: Solution, scene: Scene) -> float:
@@ -284,7 +284,7 @@ def _print_detector(shots: list[Shot]) -> None:
     wrong["a label exchanged, labels trusted"] = []
     for shot in shots:
         began = time.thread_time()
-        paint = find_line_like(shot.image, shot.field)
+        paint = find_line_like_pixels(shot.image, shot.field)
         middle = time.thread_time()
         right.append(measure_agreement(shot.truth, shot.field, paint).product)
         times.append([1000 * (middle - began), 1000 * (time.thread_time() - middle)])
@@ -362,7 +362,7 @@ def _print_real(folder: Path) -> None:
             continue
         _, snapped, spent = _snap(image, found)
         problem = ResectionProblem.of(size, PAPER.calibration)
-        seen = observations_of_lines(lines, PITCH, size)
+        seen = make_observations(lines, PITCH, size)
         apart = [
             float(np.median(problem.distances(problem.parameters(camera), seen))) / problem.unit
             for camera in (found.camera, snapped.camera)

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.paint.evidence import find_paint, read_picture, trace_visible_markings
 from app.paint.grass import find_field_of_play
-from app.paint.ridges import find_line_like
+from app.paint.ridges import find_line_like_pixels
 from app.sample.render import render_view
 from app.soccer.pitch import Pitch
 from tests.scenes import make_scenes
@@ -32,7 +32,9 @@ def main(out: str) -> None:
         reading, trace_visible_markings(reading, truth.camera, Pitch(), 14.0), 3.0
     )
     image[~field] //= 2
-    image[cv2.dilate(find_line_like(picture, field).astype(np.uint8), np.ones((2, 2))) > 0] = ORANGE
+    image[
+        cv2.dilate(find_line_like_pixels(picture, field).astype(np.uint8), np.ones((2, 2))) > 0
+    ] = ORANGE
     for x, y in evidence.pixels:
         cv2.circle(image, (round(float(x)), round(float(y))), 4, BLUE, 1, cv2.LINE_AA)
     cv2.imwrite(out, image, [cv2.IMWRITE_JPEG_QUALITY, 80])

@@ -20,7 +20,7 @@ from app.soccer.annotation import Lines
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from tests.bench.cases import SIZE, Case, Made, make_case
 from tests.bench.table import print_table
@@ -82,7 +82,7 @@ def _noncentrality(made: Made, sigma_px: float) -> float:
     """What no camera explains of the last view's clicks, in squared sigmas."""
     policy = replace(PAPER.calibration, robust_scale_px=WIDE_PX)
     problem = ResectionProblem.of(SIZE, policy)
-    observations = observations_of_lines(made.group.views[-1].station.lines, Pitch(), SIZE)
+    observations = make_observations(made.group.views[-1].station.lines, Pitch(), SIZE)
     parameters = problem.resect(observations).parameters
     bend = (parameters[KAPPA] - policy.distortion_mean) / policy.distortion_sigma
     apart = problem.distances(parameters, observations) / sigma_px

@@ -6,7 +6,11 @@ import numpy as np
 
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.match_picture import PictureFrame, choose_frames, estimate_match_picture
+from app.solving.match_picture import (
+    PictureFrame,
+    estimate_match_picture,
+    select_informative_frames,
+)
 from app.solving.picture_camera import picture_to_warp
 from tests.bench.cases import SIZE, Case, _aimed, _clicks, _deformed, _shows_enough
 from tests.bench.table import print_table
@@ -67,7 +71,7 @@ def _match(case: Case, seed: int, count: int) -> list[PictureFrame]:
         if not _shows_enough(camera, case.pitch):
             continue
         frame = PictureFrame(_clicks(rng, _deformed(camera, case), case), SIZE, Pitch())
-        frames += [frame] if choose_frames([frame]) else []
+        frames += [frame] if select_informative_frames([frame]) else []
     return frames
 
 

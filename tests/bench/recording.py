@@ -21,7 +21,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample import RECORDING_SECONDS
 from app.sample.recording import write_recording
-from app.tracking.ball_rays import BallRays, ball_rays
+from app.tracking.ball_rays import BallRays, build_ball_rays
 from app.tracking.clip import Clip
 from app.tracking.link import find_time_map
 from app.tracking.time_map import TimeMap
@@ -85,7 +85,7 @@ class KnownRecording:
         ]
         noisy = np.array([row["pixel"] for row in rows]) + dice.normal(0, noise_px, (len(rows), 2))
         times = [row["frame"] / self.truth["fps"] for row in rows]
-        return ball_rays(times, noisy.tolist(), [camera_of(row) for row in rows])
+        return build_ball_rays(times, noisy.tolist(), [camera_of(row) for row in rows])
 
     def middle_of(self, shot: int) -> float:
         """The middle of a shot, seconds."""
@@ -100,7 +100,7 @@ def camera_of(row: dict[str, Any]) -> Camera:
 
 def off_px(found: Camera, truth: Camera) -> float:
     """How far a camera lays the grass of a picture from where it is, the most of a grid."""
-    ground = truth.on_ground(GRID)
+    ground = truth.project_to_ground(GRID)
     seen = np.isfinite(ground).all(axis=1) & (np.abs(ground) < (52.5, 34)).all(axis=1)
     places = np.column_stack([ground[seen], np.zeros(seen.sum())])
     return float(np.hypot(*(found.project(places) - GRID[seen]).T).max())

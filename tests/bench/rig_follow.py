@@ -25,13 +25,13 @@ from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_ids
 from app.features.recordings.follow import BallFollower
 from app.features.solutions.service import solve_dataset
-from app.features.tracks.follow import follow_view
+from app.features.tracks.follow import follow_ball_from_view
 from app.formats.issia import DEFAULT_SIZE
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import ReaderReport
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
-from app.tracking.ball_follow import expected_diameter
+from app.tracking.ball_follow import expected_ball_diameter
 from app.video.frames import Image
 from tests.bench.table import print_table
 from tests.drawn_balls import drawn
@@ -122,7 +122,7 @@ def painted_groups(
             lens = next(view.station.given for view in group.views if view.key == key)
             assert lens is not None
             at = truth[number]
-            size = expected_diameter(lens, at.x, at.y) or 13.0
+            size = expected_ball_diameter(lens, at.x, at.y) or 13.0
             picture = painted(grounds[number % len(grounds)], at, size, number)
             cv2.imwrite(str(path), picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 90])
         views = []
@@ -194,7 +194,7 @@ def _follow(
         at = ImagePoint(truth[number].x + off[0], truth[number].y + off[1])
         met.clicks += 1
         try:
-            found = follow_view(store, frames, view, at)
+            found = follow_ball_from_view(store, frames, view, at)
         except InputError:
             continue
         break

@@ -24,7 +24,7 @@ from app.solving.ball_noise import RayResidual, compute_ray_residuals, estimate_
 from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.solving.triangulate import collect_ball_observations
 from tests.bench.table import print_table
 
@@ -134,7 +134,7 @@ def rig_of(groups: Sequence[Group]) -> tuple[list[RigCamera], list[RigFrame]]:
 
 
 def _row(name: str, groups: Sequence[Group], policy: Policy) -> list[object]:
-    solutions = [solve(group, policy) for group in groups]
+    solutions = [solve_group(group, policy) for group in groups]
     seen = [one for one in solutions if one.passes and one.chi_square is not None]
     gaps = np.sqrt([one.chi_square.value for one in seen if one.chi_square is not None])
     sigma = float(np.median([one.ball.sigma_m for one in seen if one.ball is not None]))
@@ -149,7 +149,7 @@ def _cameras(group: Group) -> dict[str, list[BallSource]]:
 
 
 def _misses(group: Group) -> tuple[RayResidual, ...]:
-    solution = solve(group, PAPER)
+    solution = solve_group(group, PAPER)
     if solution.ball is None:
         return ()
     calibrations = [view.calibration for view in solution.views]

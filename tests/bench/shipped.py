@@ -16,8 +16,8 @@ import numpy as np
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.datasets.queries import group_ids
-from app.features.datasets.service import need_dataset
+from app.features.datasets.queries import list_group_ids
+from app.features.datasets.service import require_dataset_id
 from app.features.groups.state import read_states
 from app.features.imports.ingest import import_groups
 from app.features.solve.jobs import solve_fully
@@ -66,7 +66,7 @@ def solved(store: Store, name: str, made: Sequence[Made]) -> list[Solution]:
     import_groups(store, name, groups, source="", actor="local", policy=TOUCHLINE)
     solve_fully(store, name, None, lambda *_: None)
     with store.read() as session:
-        states = read_states(session, group_ids(session, need_dataset(session, name)))
+        states = read_states(session, list_group_ids(session, require_dataset_id(session, name)))
     return [state.solution for state in states if state.solution is not None]
 
 

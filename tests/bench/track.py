@@ -31,7 +31,7 @@ from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings
 from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
-from app.tracking.picture import read_frames
+from app.tracking.picture import make_frame_pictures
 from app.tracking.track import FrameCamera, track_clip
 from tests.bench.table import print_table
 from tests.tripod_films import render_film
@@ -159,11 +159,11 @@ def clicked_hits(frame: FrameCamera, lines: Lines, pitch: TripodPitch | None = N
 def paint_distances(clip: Clip, found: list[FrameCamera]) -> list[float]:
     """Median distance of the paint of each tracked frame, pixels at 960 wide."""
     distances = []
-    for picture in read_frames(clip.frames()):
+    for picture in make_frame_pictures(clip.frames()):
         frame = found[picture.number]
         if frame.outcome != "tracked" or frame.camera is None:
             continue
-        camera = clip.as_read(frame.camera)
+        camera = clip.scale_to_work_size(frame.camera)
         unit = picture.reading.width / 960
         evidence = find_paint(
             picture.reading, trace_visible_markings(picture.reading, camera, Pitch()), 3.0 * unit

@@ -16,7 +16,7 @@ from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
 from app.solving.ball_noise import RayResidual
 from app.solving.dataset_noise import DatasetNoise, NoiseGroup, estimate_noise
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
 from tests.bench.table import print_table
@@ -131,7 +131,7 @@ def bench_truth() -> None:
 
 def judge(made: list[Made], policy: Policy) -> Row:
     """Solve groups and compare them with their truth."""
-    return compare(made, [solve(one.group, policy) for one in made])
+    return compare(made, [solve_group(one.group, policy) for one in made])
 
 
 def compare(made: Sequence[Made], solutions: Sequence[Solution]) -> Row:
@@ -179,7 +179,7 @@ def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
 
 def with_noise(made: list[Made]) -> Policy:
     """The policy ``paper`` with the noise that the groups themselves show."""
-    seen = [NoiseGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in made]
+    seen = [NoiseGroup.of(one.group, solve_group(one.group, PAPER), PAPER) for one in made]
     return noise_used(estimate_noise(seen, PAPER), replace(PAPER, name="estimated"))
 
 
@@ -201,7 +201,7 @@ def noise_used(noise: DatasetNoise, policy: Policy) -> Policy:
 
 def misses_in(made: Made, policy: Policy) -> tuple[RayResidual, ...]:
     """What the rays to the ball of a group leave unexplained."""
-    return NoiseGroup.of(made.group, solve(made.group, policy), policy).misses(policy)
+    return NoiseGroup.of(made.group, solve_group(made.group, policy), policy).misses(policy)
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

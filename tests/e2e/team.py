@@ -14,7 +14,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.independent_annotations.service import begin_annotation
 from app.features.people import links
 from app.features.people.roles import Role
@@ -71,10 +71,12 @@ def verdict(page: Page, group: int = 1) -> Any:
 def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
     """Hand in what a person made of a group; its ball moved by so many pixels."""
     copy = begin_annotation(store, group, person=person).group
-    state = load(store, copy)
+    state = load_group_state(store, copy)
     view = next(view for view in state.group.views if view.ball and view.ball.box)
     if moved and view.ball and view.ball.box:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-        state = submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
+        state = submit_edit(
+            store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person
+        )
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return compare_or_adopt_submission(store, copy)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from app.features.practice.lessons import LESSONS, Lesson, make_practice
+from app.features.practice.lessons import LESSONS, Lesson, make_practice_scenes
 from app.sample.scene import Scene
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -308,7 +308,9 @@ class TestFiveKeys:
         page.goto("/help/practice")
         page.get_by_role("button", name="Start again").click()
         expect(page.get_by_role("region", name="Practice")).to_contain_text("Lesson 1 of 8")
-        for number, (lesson, scene) in enumerate(zip(LESSONS, make_practice(), strict=True), 1):
+        for number, (lesson, scene) in enumerate(
+            zip(LESSONS, make_practice_scenes(), strict=True), 1
+        ):
             screen = Screen(page)
             expect(page.get_by_role("region", name="Practice")).to_contain_text(f"Lesson {number} ")
             screen.ready()

@@ -12,7 +12,7 @@ import pyotp
 from playwright.sync_api import Page, expect
 
 from app.db.store import Store
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.maintenance.service import clear_banner, set_banner
 from app.features.people.login_queries import delete_logins
 from app.features.people.roles import Role
@@ -297,5 +297,5 @@ def end_sessions(store: Store, name: str) -> None:
 
 
 def defer_the_fourth(store: Store) -> None:
-    etag = load(store, 4).etag
+    etag = load_group_state(store, 4).etag
     set_verdict(store, 4, "deferred", if_match=etag, actor="local")

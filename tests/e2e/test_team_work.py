@@ -9,7 +9,7 @@ from typing import Any
 from playwright.sync_api import Page, expect
 
 from app.db.store import Store
-from app.features.batches.leases import BatchMember, Leases
+from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, make_batch
 from app.features.people.roles import Role
 from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
@@ -245,7 +245,7 @@ class TestWork:
 
         def submitted(store: Store) -> tuple[int, int]:
             batch = make_batch(store, "sample", new, actor="local").id
-            leases, sina = Leases(store), BatchMember("sina")
+            leases, sina = LeaseService(store), BatchMember("sina")
             copy = leases.next(batch, sina).group
             leases.submit(batch, copy, sina, actor="sina")
             return batch, copy

@@ -17,11 +17,11 @@ from app.errors import InputError
 from app.evaluation.frame import Detection, iou
 from app.features.datasets.tables import ViewModel
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.sources import ImportSource, import_source
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.detect import DetectRequest, OnnxModel, run_detector
-from app.features.predictions.evaluation import run_tables
+from app.features.predictions.evaluation import parse_run_tables
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.service import delete_predictions, read_predictions_of_view
 from app.features.solutions.service import solve_dataset
@@ -139,22 +139,24 @@ class TestDetect:
     def test_they_can_be_evaluated(self, store, detected) -> None:
         request = EvaluationRequest(predictions=detected[0].id)
         found = run_evaluation(store, "drawn", request, actor="ann")
-        table = next(item for item in run_tables(found) if item.name == "detection")
+        table = next(item for item in parse_run_tables(found) if item.name == "detection")
         assert 0 < table.cell("all", "recall").value <= 1
 
     def test_a_person_accepts_one_and_it_is_solved(self, store, detected) -> None:
         state = _states(store)[0]
         view = state.group.views[0].key
-        cleared = submit(store, state.id, set_ball(view, None), if_match=state.etag, actor="ann")
+        cleared = submit_edit(
+            store, state.id, set_ball(view, None), if_match=state.etag, actor="ann"
+        )
         assert cleared.solution.ball is None or len(cleared.solution.ball.views) < len(
             state.group.views
         )
         report = accept_predicted_balls(store, "drawn", AcceptRequest(detected[0].id), actor="ann")
         assert (report.views, report.groups) == (1, 1)
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert after.group.view(view).ball.predicted_by == "tiny"
         assert after.solution is not None
-        undone = submit(
+        undone = submit_edit(
             store, state.id, set_ball(view, state.group.view(view).ball), if_match=after.etag,
             actor="ann",
         )  # fmt: skip
@@ -196,4 +198,4 @@ def _states(store: Store):
     from app.features.queue.service import list_groups
 
     page = list_groups(store, get_dataset(store, "drawn").id, limit=500)
-    return [load(store, row.id) for row in page.items]
+    return [load_group_state(store, row.id) for row in page.items]

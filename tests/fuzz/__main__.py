@@ -44,7 +44,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=None, help="default: another one every time")
     parser.add_argument("--under-way", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
-    if asked.under_way is not None:
+    if asked.is_in_progress is not None:
         return _work(asked)
     seed = int(time.time()) if asked.seed is None else asked.seed
     return supervise(asked.seconds, asked.kind or [], seed)
@@ -118,7 +118,7 @@ def _work(asked: argparse.Namespace) -> int:
             _require_sound(readers, case)
         while time.monotonic() < ends:
             case = damage(dice.choice(sound), dice)
-            asked.under_way.write_text(case.text())
+            asked.is_in_progress.write_text(case.text())
             whole = dice.randrange(USED) == 0
             fault = readers.try_out(case, whole=whole)
             tried[case.kind] += 1

@@ -21,7 +21,7 @@ from typing import Any
 from app.config import Settings
 from app.db.store import Store
 from app.errors import DatasetFormatError, ReviewError
-from app.evaluation.frame import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNameIndex, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.features.imports.sources import (
     STATIC,
@@ -34,7 +34,7 @@ from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml
 from app.features.queue.query import parse_query
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.guess_format import guess_format
 from app.formats.output import open_output_folder
 from app.formats.report import ReaderReport
@@ -43,7 +43,7 @@ from app.media.files import read_frame
 from app.soccer.choices import ImportFormat
 from app.soccer.group import Group, Media
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.terminal.options import read_text
 from tests.cameras import SIZE
 from tests.fuzz.case import Case
@@ -59,7 +59,7 @@ CLOCK_SECONDS = 90.0
 """Whatever waits for something does not take processor time."""
 GROUPS = 3
 """Groups of a case that are solved and written again."""
-LIMITS = Limits(members=1000, file_bytes=8 * 2**20, total_bytes=64 * 2**20)
+LIMITS = ImportLimits(members=1000, file_bytes=8 * 2**20, total_bytes=64 * 2**20)
 
 
 class TooSlowError(BaseException):
@@ -91,7 +91,7 @@ class Readers:
             for number, view in enumerate(("7.png", "7_1.png"), 1)
         ]
         static = NamedFrame(9, "358", "cam3", "issia", SIZE, station="cam3")
-        self.names = FrameNames.of([*frames, static])
+        self.names = FrameNameIndex.of([*frames, static])
 
     def close(self) -> None:
         """Close the database."""
@@ -162,7 +162,7 @@ def _groups_of(source: ImportSource, settings: Settings) -> Iterator[Group]:
 
 def _use(groups: list[Group]) -> None:
     """Solve what was read, and write it in every format that has room for it."""
-    records = [ExportRecord(group, solve(group, PAPER), "accepted") for group in groups]
+    records = [ExportRecord(group, solve_group(group, PAPER), "accepted") for group in groups]
     for name in FORMATS:
         if name == "touchline" or not records:
             continue

@@ -24,7 +24,7 @@ from app.formats.export_record import ExportRecord
 from app.soccer.annotation import Extras, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.balls import box_around
 from tests.cameras import SIZE, looking
 from tests.fuzz.case import Case, Files
@@ -85,7 +85,7 @@ def _exported(folder: Path) -> Iterator[Case]:
         if kind in ("touchline", "yolo"):
             continue
         group = static() if kind.startswith("issia") else broadcast()
-        record = ExportRecord(group, solve(group, PAPER), "accepted")
+        record = ExportRecord(group, solve_group(group, PAPER), "accepted")
         root = folder / kind
         root.mkdir()
         write_format(root, [record], WriteOptions(kind, everything=True))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import ClusterError
-from app.workers.cluster import Cluster, SchedulerPlace
+from app.workers.cluster import ClusterExecutor, SchedulerPlace
 from tests.certificates import write_keys
 from tests.databases import count_rows
 from tests.e2e.service import run_touchline
@@ -45,7 +45,7 @@ def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> 
         assert not is_healthy(services["scheduler"], make_secrets(tmp_path / "strange"), port)
         stranger = SchedulerPlace(cluster.address, write_keys(tmp_path / "others", "stranger"))
         with pytest.raises(ClusterError, match="no scheduler answers"):
-            Cluster(stranger)
+            ClusterExecutor(stranger)
         cluster.start("solve")
         until = time.monotonic() + SECONDS
         while not solutions(shared) and not cluster.is_done and time.monotonic() < until:

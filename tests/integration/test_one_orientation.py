@@ -20,7 +20,7 @@ from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _read_frame
 from app.formats.report import ReaderReport
 from app.media.files import decode_frame, read_frame, read_picture_header, read_pixels
-from app.media.frames import Frames, make_picture
+from app.media.frames import FrameProvider, make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 
@@ -71,7 +71,7 @@ def of_files(path: Path, settings: Settings) -> np.ndarray:
 
 
 def served(path: Path, settings: Settings) -> np.ndarray:
-    frames = Frames(settings)
+    frames = FrameProvider(settings)
     try:
         return plain(frames.read(Media(str(path)), None, False).data)
     finally:

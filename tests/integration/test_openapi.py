@@ -34,7 +34,7 @@ from app.features.comments.service import add_reply, begin_thread
 from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import request_export
 from app.features.groups.history import read_history
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.groups.view_queries import find_group_and_view_ids
 from app.features.imports.ingest import import_groups
 from app.features.imports.upload_queries import UploadWriter
@@ -43,12 +43,12 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
-from app.features.recordings.ball_runs import BallFollower, add_run, get_run
-from app.features.recordings.camera_tracking import Tracked, save_cameras
-from app.features.recordings.index import index_now
+from app.features.recordings.ball_runs import BallFollower, add_ball_run, get_ball_run
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
+from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.links import add_link, get_link
 from app.features.recordings.service import add_recording
-from app.features.recordings.shots import Shot, get_shots, put_shots
+from app.features.recordings.shots import Shot, get_shots, replace_shots
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
 from app.features.tracks.service import get_track
@@ -153,8 +153,8 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
 
 def add_evaluations(store: Store) -> None:
     """Two sets of predictions and two evaluations; the second of each is there to be deleted."""
-    view = load(store, 1).view_ids.popitem()[0]
-    frame = load(store, 1).group.match + "/" + view
+    view = load_group_state(store, 1).view_ids.popitem()[0]
+    frame = load_group_state(store, 1).group.match + "/" + view
     for name in (EVALUATION, DELETED_EVALUATION):
         path = store.settings.home / "predictions.csv"
         path.write_text(f"image,x,y,w,h,score\n{frame},600,300,{name},9,0.5\n")
@@ -170,15 +170,15 @@ def add_recordings(store: Store, follower: BallFollower) -> None:
     for path in (film, film.with_name("gone.avi")):
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
-    found = index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    found = index_recording_in_worker(store, 1, progress=lambda *_: None, stop=lambda: None)
     frames = [frame(number, "tracked") for number in range(6)]
-    save_cameras(store, found, (0, 5), Tracked(frames, ()), [], "local")
-    put_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")
+    save_cameras(store, found, (0, 5), TrackedStretch(frames, ()), [], "local")
+    replace_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")
     for first in (0, 1):
         number = add_link(store, (1, first, 9), (1, 10, 19), actor="local").id
     assert str(number) == DELETED_LINK
     for click in BALL_CLICKS:
-        number = add_run(store, follower, 1, BallClick(**click), actor="local").id
+        number = add_ball_run(store, follower, 1, BallClick(**click), actor="local").id
     assert str(number) == DELETED_RUN
 
 
@@ -274,16 +274,16 @@ class Attack:
         if case.operation.path.endswith("/policy"):
             case.body = {"name": "paper"}
         if case.operation.path.endswith("/pitches") and case.method == "PATCH":
-            match = load(self.store, 1).group.match
+            match = load_group_state(self.store, 1).group.match
             case.body = {"match": match, "length": 105.0, "width": 68.0}
         if case.operation.path.endswith("/pictures") and case.method == "PATCH":
-            case.body = {"match": load(self.store, 1).group.match, "picture": None}
+            case.body = {"match": load_group_state(self.store, 1).group.match, "picture": None}
         if case.operation.path.endswith("/datasets/{dataset}/pictures") and case.method == "POST":
             case.body = {}
         if case.operation.path.endswith("/positions") and case.method == "POST":
             case.body = {}
         if case.operation.path.endswith("/positions") and case.method == "DELETE":
-            case.query["match"] = load(self.store, 1).group.match
+            case.query["match"] = load_group_state(self.store, 1).group.match
         if case.operation.path.endswith("/edits"):
             case.body = {"if_match": "*", "items": [{"view": 1, "ball": None}]}
         if case.operation.path.endswith("/exports"):
@@ -338,7 +338,7 @@ class Attack:
         if case.operation.path.endswith("/frames"):
             case.query.pop("cursor", None)
         if "prediction" in path:
-            path["view"] = str([*load(self.store, 1).view_ids.values()][-1])
+            path["view"] = str([*load_group_state(self.store, 1).view_ids.values()][-1])
         if case.operation.path.endswith("/predictions/accept"):
             case.body = {"dataset": "small", "predictions": 1, "q": "", "dry_run": True}
         if case.operation.path.endswith("/evaluations") and case.method == "POST":
@@ -409,12 +409,12 @@ class Attack:
         if "link" in case.path_parameters:
             return get_link(self.store, 1, 1).etag
         if "run" in case.path_parameters:
-            return get_run(self.store, 1, 1).etag
+            return get_ball_run(self.store, 1, 1).etag
         if "recording" in case.path_parameters:
             return get_shots(self.store, 1).etag
         if "track" in case.path_parameters:
             return get_track(self.store, 1).etag
-        return load(self.store, 1).etag
+        return load_group_state(self.store, 1).etag
 
 
 class TestOperations:

@@ -26,11 +26,11 @@ from app.features.people.service import invite
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
-from app.features.recordings.camera_tracking import Tracked, save_cameras
-from app.features.recordings.index import index_now
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
+from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.links import add_link
 from app.features.recordings.service import add_recording
-from app.features.recordings.shots import Shot, put_shots
+from app.features.recordings.shots import Shot, replace_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.webhooks.messages import MessageKind
@@ -98,12 +98,16 @@ def fill(store: Store, home: Path) -> None:
         make_batch(store, "small", batch, actor="local")
         film = write_video(home / f"{number}.mp4", "mp4v", 20)
         recording = add_recording(store, "small", film, actor="local")
-        recording = index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+        recording = index_recording_in_worker(
+            store, recording.id, progress=lambda *_: None, stop=lambda: None
+        )
         for first in range(0, 9, 3):
             frames = [frame(first, "tracked"), frame(first + 1, "lost")]
-            save_cameras(store, recording, (first, first + 1), Tracked(frames, ()), [], "local")
+            save_cameras(
+                store, recording, (first, first + 1), TrackedStretch(frames, ()), [], "local"
+            )
         shots = [Shot(first, first + 4, "main", "cut") for first in range(0, 20, 5)]
-        put_shots(store, recording.id, shots, None, actor="local")
+        replace_shots(store, recording.id, shots, None, actor="local")
         if number == 0:
             for first in range(3):
                 add_link(store, (1, first, 8), (1, 10, 19), actor="local")

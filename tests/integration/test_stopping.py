@@ -21,7 +21,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.jobs.records import need_job
+from app.features.jobs.records import require_job
 from tests.databases import holding_the_write_lock
 from tests.e2e.service import serving
 from tests.homes import copy_home
@@ -160,7 +160,7 @@ class TestStopping:
             os.kill(number, signal.SIGTERM)
         server.wait(SECONDS)
         with closing(Store.open(Settings(home=home))) as store, store.read() as session:
-            found = need_job(session, job)
+            found = require_job(session, job)
         assert (found.state, found.problem) == ("running", None)
 
     def test_nothing_stays_of_an_upload_that_stalls(

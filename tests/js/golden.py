@@ -26,7 +26,7 @@ from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.sample.scene import Scene
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.scenes import make_scenes
 
 FILE = Path(__file__).with_name("golden.json")
@@ -185,7 +185,7 @@ def _boxes(name: str, camera: Camera, points: FloatArray) -> list[dict[str, Any]
 def _solved(scene: Scene) -> dict[str, Any]:
     """A whole group as the API shows it, without what is only drawn."""
     group = scene.group
-    document = SolutionDocument.of(solve(group, PAPER), group).model_dump(mode="json")
+    document = SolutionDocument.of(solve_group(group, PAPER), group).model_dump(mode="json")
     for view in document["views"]:
         view["calibration"]["markings"] = []
         # Seventy numbers a camera, of which the browser reads none.

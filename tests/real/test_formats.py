@@ -104,7 +104,7 @@ class TestIssia:
         groups = list(folder.groups())
         assert len(groups) == 2465
         assert sum(len(group.views) > 1 for group in groups) == 1801
-        points = {camera: track.ball_points for camera, track in folder.tracks.items()}
+        points = {camera: track.ball_point_count for camera, track in folder.tracks.items()}
         assert points == {1: 509, 2: 517, 3: 1377, 4: 1292, 5: 327, 6: 253}
         assert report.counts["persons"] == 131_392
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.evaluation.cameras import measure_error_without_marking
-from app.features.file_tools.matches import match_shares
+from app.features.file_tools.matches import collect_shared_match_places
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
@@ -39,7 +39,7 @@ def files():
 @pytest.fixture(scope="module")
 def shares(files):
     places = [find_camera_place(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
-    return match_shares(files, places, None)
+    return collect_shared_match_places(files, places, None)
 
 
 class TestShares:

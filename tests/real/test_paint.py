@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.features.file_tools.paint import measure_paint_agreement_of_files, snap_files
+from app.features.file_tools.paint import measure_paint_agreement_of_files, snap_cameras_to_paint
 from app.media.files import decode_frame
 from app.paint.view_proposal import propose_lines_in_image
 from app.soccer.frames import ImageSize
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real frames in {D
 
 
 def test_real_stills_are_snapped_or_say_why_not(tmp_path):
-    rows = snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
+    rows = snap_cameras_to_paint(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
     assert len(rows) >= 15
     snapped = [row for row in rows if row["outcome"] == "proposed"]
     assert len(snapped) >= 0.7 * len(rows)
@@ -34,7 +34,7 @@ def test_real_stills_are_snapped_or_say_why_not(tmp_path):
 
 
 def test_cameras_of_real_stills_agree_with_no_picture_of_something_else(tmp_path):
-    snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
+    snap_cameras_to_paint(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
     rows = measure_paint_agreement_of_files(tmp_path, [DATA / "stills"], settings=Settings())
     assert all(row["supported"] * row["explained"] > 0.2 for row in rows if row["supported"])
 

@@ -16,7 +16,7 @@ from app.soccer.group import Group
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.rig_proposal import RigProposal, propose_rig
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.rigs import rig_of
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -76,7 +76,7 @@ class TestIssia:
     def test_gaps_are_as_large_as_the_accepted_sigma_says(self, groups, proposal):
         """In the mean square, and 95 % of them as chi-square has it."""
         pairs = [group for group in groups if sum(v.ball is not None for v in group.views) == 2]
-        solved = [solve(with_sigma(group, proposal), PAPER) for group in pairs[::EVERY]]
+        solved = [solve_group(with_sigma(group, proposal), PAPER) for group in pairs[::EVERY]]
         squares = [it.chi_square.value for it in solved if it.passes and it.chi_square is not None]
         assert len(squares) > 150
         assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.2)

@@ -16,7 +16,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export_dataset
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.imports.merge import merge_edits
 from app.features.solutions.service import solve_dataset
@@ -78,7 +78,7 @@ def reject(store: Store) -> None:
     """A person looks at the odd frame and says no."""
     with store.read() as session:
         number = session.scalar(select(GroupModel.id).where(GroupModel.key == ODD))
-    etag = load(store, number).etag
+    etag = load_group_state(store, number).etag
     set_verdict(store, number, "rejected", "other", "below the grass", if_match=etag, actor="ann")
 
 

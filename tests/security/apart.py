@@ -254,8 +254,8 @@ def opened(home: Path) -> Iterator[Apart]:
     cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(passwords, "HASHER", cheap)
-        passwords._placeholder_hash.cache_clear()
+        passwords._make_placeholder_hash.cache_clear()
         app = create_app(settings)
         with TestClient(app, base_url=BASE, raise_server_exceptions=False) as client:
             yield Apart(app, client)
-        passwords._placeholder_hash.cache_clear()
+        passwords._make_placeholder_hash.cache_clear()

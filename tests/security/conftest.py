@@ -201,7 +201,7 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
         # Everybody of these tests comes from one address within a minute.
         patch.setattr("app.http.team.ADDRESS_LIMIT", parse("1000/minute"))
         patch.setattr("app.http.team.CHALLENGE_LIMIT", parse("1000/minute"))
-        passwords._placeholder_hash.cache_clear()
+        passwords._make_placeholder_hash.cache_clear()
         app = create_app(settings)
         with open_listening_socket("127.0.0.1", 0) as (socket, address):
             server = make_server(app)
@@ -213,7 +213,7 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
             yield made
             server.should_exit = True
             thread.join(SECONDS)
-        passwords._placeholder_hash.cache_clear()
+        passwords._make_placeholder_hash.cache_clear()
 
 
 @pytest.fixture

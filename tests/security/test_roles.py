@@ -184,7 +184,7 @@ class TestSessions:
             way = Way.of(settings, store)
         assert way is not None
         assert way.cookies.session_name.startswith("__Host-")
-        assert way.cookies.session_values("x")["secure"] is True
+        assert way.cookies.make_session_cookie("x")["secure"] is True
 
     def test_a_login_gives_a_new_session_and_ends_the_old(self, team: Team) -> None:
         old = team.add("fixed", Role.VIEWER)
@@ -426,7 +426,7 @@ class TestStreams:
         elif ends == "logged out":
             team.ask("DELETE", f"{API}/session", role=name)
         else:
-            monkeypatch.setattr(access.Access, "is_still_allowed", None)
+            monkeypatch.setattr(access.AccessControl, "is_still_allowed", None)
         # It says every now and then that it is still there.
         until = time.monotonic() + SECONDS
         while answer.read1(1000):

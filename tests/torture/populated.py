@@ -15,7 +15,7 @@ from app.db.log import read_log, verify_chain
 from app.db.store import Store
 from app.features.datasets.service import list_datasets
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.integrity.checks import examine_database
 from app.features.verdicts.queries import read_verdicts
 from app.features.verdicts.service import set_verdict
@@ -34,9 +34,9 @@ def people_work(settings: Settings, *, freezes: bool = True) -> None:
         for dataset in list_datasets(store) if freezes else ():
             freeze_dataset(store, dataset.id, FreezeRequest("first", groups="passing"), actor="ann")
         for group_id in _ids(store):
-            state = load(store, group_id)
+            state = load_group_state(store, group_id)
             edit = set_ball(state.group.views[0].key, BALL)
-            state = submit(store, group_id, edit, if_match=state.etag, actor="ann")
+            state = submit_edit(store, group_id, edit, if_match=state.etag, actor="ann")
             set_verdict(
                 store, group_id, "rejected", "other", "no ball", if_match=state.etag, actor="ben"
             )
@@ -47,7 +47,7 @@ def said(settings: Settings) -> dict[str, Any]:
     with closing(Store.open(settings)) as store:
         datasets = list_datasets(store)
         versions = [one for dataset in datasets for one in list_versions(store, dataset.id)]
-        states = [load(store, group_id) for group_id in _ids(store)]
+        states = [load_group_state(store, group_id) for group_id in _ids(store)]
         with store.read() as session:
             log = list(read_log(session))
             verdicts = read_verdicts(session, [state.id for state in states])

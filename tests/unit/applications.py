@@ -23,11 +23,11 @@ from app.geometry.camera import Camera
 from app.http.deps import Services
 from app.http.errors import install_error_handlers
 from app.http.headers import SecurityHeaders
-from app.http.idempotency import Idempotency
+from app.http.idempotency import IdempotencyHandler
 from app.http.pages import BrowserSite, install_pages
 from app.http.request_limits import RequestLimits
 from app.http.requests import MAX_JSON_BYTES
-from app.http.route import Gate
+from app.http.route import RequestPipeline
 from app.main import create_app
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Media, Station, View
@@ -101,7 +101,7 @@ def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClie
 def plain_app() -> FastAPI:
     """An application without routes of its own, which anybody may ask."""
     app = FastAPI(docs_url=None, redoc_url=None)
-    app.state.gate = Gate(None, Idempotency(), RequestLimits(), MAX_JSON_BYTES)
+    app.state.gate = RequestPipeline(None, IdempotencyHandler(), RequestLimits(), MAX_JSON_BYTES)
     return app
 
 

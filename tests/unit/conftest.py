@@ -155,7 +155,7 @@ def workers_start_anew(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def every_migration(monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty home is migrated as the product does it: for tests of that."""
-    monkeypatch.setattr(migrate, "make_schema", make_schema)
+    monkeypatch.setattr(migrate, "apply_missing_migrations", make_schema)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

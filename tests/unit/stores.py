@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.queue.service import list_groups
 from app.features.solutions.queries import SolutionModel
@@ -236,7 +236,7 @@ def upgrade_solver(store: Store) -> Callable[[], None]:
 @pytest.fixture
 def state(store: Store, fill: Fill, make_group: MakeGroup) -> GroupState:
     """A solved group that passes."""
-    return load(store, fill(make_group())[0])
+    return load_group_state(store, fill(make_group())[0])
 
 
 @pytest.fixture

@@ -135,7 +135,7 @@ class TestCompiled:
         def refuse(*_arguments: object, **_options: object) -> None:
             raise RuntimeError("cannot cache function 'f': no locator available for file 'x.py'")
 
-        monkeypatch.setattr("app.features.file_tools.calibrate.score_files", refuse)
+        monkeypatch.setattr("app.features.file_tools.calibrate.score_camera_files", refuse)
         code, _, err = run("score", line_files, line_files)
         assert code == 1
         assert "NUMBA_CACHE_DIR" in err
@@ -148,7 +148,7 @@ class TestClosed:
         def refuse(*_arguments: object, **_options: object) -> None:
             raise PermissionError(errno.EACCES, "Permission denied", "/srv/closed/x.json")
 
-        monkeypatch.setattr("app.features.file_tools.calibrate.score_files", refuse)
+        monkeypatch.setattr("app.features.file_tools.calibrate.score_camera_files", refuse)
         code, _, err = run("score", line_files, line_files)
         assert code == 1
         assert re.search(r"has no permission to read \W?/srv/closed/x\.json", err)

@@ -17,7 +17,7 @@ import yaml
 
 from app.config import Settings, StoreSettings
 from app.object_store.store import read_keys
-from app.workers.cluster import read_place
+from app.workers.cluster import parse_scheduler_address
 from tests.team_at_scale import FOLDER, make_secrets, settings_of, together
 
 
@@ -224,7 +224,7 @@ class TestSecrets:
         assert identity["credentials"] == [{"accessKey": key, "secretKey": secret}]
         assert {right.partition(":")[2] for right in identity["actions"]} == {store.bucket}
         assert settings.cluster is not None
-        assert read_place(settings.cluster, settings.cluster_keys).security()
+        assert parse_scheduler_address(settings.cluster, settings.cluster_keys).security()
         password = (secrets / "database_password").read_text()
         assert f":{password}@" in settings.database
 

@@ -26,7 +26,7 @@ import app
 from app.evaluation.result import Axis, Figure, Panel, Series, figure_to_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
-from app.features.jobs.queries import _json_column as job_text
+from app.features.jobs.queries import _to_json_column as job_text
 from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
@@ -35,8 +35,8 @@ from app.formats.parquet import import_pyarrow
 from app.geometry.camera import Camera
 from app.json_text import canonical_json_text, json_text, replace_non_finite
 from app.log import replace_non_finite_numbers
-from app.soccer.finding import Finding, Fix
-from app.soccer.solution import BestBall, Gate, MarkingFit, Solution, Suspect
+from app.soccer.finding import Finding, SuggestedFix
+from app.soccer.solution import BestBall, Gate, MarkingFit, Solution, SuspectLabel
 from app.terminal.terminal import print_json, print_values
 from tests.unit.formats.conftest import camera, issia_group, soccer_group, solved  # noqa: F401
 
@@ -94,11 +94,13 @@ def whole(solution: Solution) -> Solution:
         solution.views[0].calibration,
         error_px=1.0,
         markings=(filled(MarkingFit),),
-        suspects=(filled(Suspect),),
+        suspects=(filled(SuspectLabel),),
         covariance=(1.0,) * 64,
     )
     views = (dataclasses.replace(solution.views[0], calibration=first), *solution.views[1:])
-    finding = Finding("sides_swapped", "?", None, None, None, 1.0, 1.0, 1.0, Fix("swap_sides"))
+    finding = Finding(
+        "sides_swapped", "?", None, None, None, 1.0, 1.0, 1.0, SuggestedFix("swap_sides")
+    )
     best = BestBall((0.0, 0.0, 0.0), (0.0,) * 9, 1.0, ("a",), (), (("a", 1.0),))
     gates = (Gate("ball", True, 1.0, 1.0, 1.0, "?"),)
     return dataclasses.replace(

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from app.progress import make_partial_progress, told
+from app.progress import make_partial_progress, report_each_item
 
 
 class TestTelling:
@@ -21,10 +21,10 @@ class TestTelling:
 class TestTold:
     def test_each_item_is_told_as_it_comes(self) -> None:
         places: list[tuple] = []
-        items = told("ab", 2, lambda *place: places.append(place), "Reading.")
+        items = report_each_item("ab", 2, lambda *place: places.append(place), "Reading.")
         assert (next(items), places) == ("a", [(0, 2, "Reading.")])
         assert list(items) == ["b"]
         assert places[1:] == [(1, 2, "Reading."), (2, 2, "Reading.")]
 
     def test_nobody_needs_to_hear_it(self) -> None:
-        assert list(told("ab", 2, None, "Reading.")) == ["a", "b"]
+        assert list(report_each_item("ab", 2, None, "Reading.")) == ["a", "b"]

@@ -15,7 +15,7 @@ import pysqlite3.dbapi2 as sqlite
 import pytest
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.locks import hold_server_lock
 from app.db.store import Store
 from tests.unit.db.homes import say
@@ -34,7 +34,7 @@ def home(tmp_path: Path) -> Path:
 @pytest.fixture
 def run(touchline: Run, monkeypatch: pytest.MonkeyPatch) -> Run:
     # A home that is served all the same shall fail the test, and not hold it.
-    monkeypatch.setattr("app.http.server.run", lambda app, _: app.state.services.close())
+    monkeypatch.setattr("app.http.server.serve_application", lambda app, _: app.state.services.close())
     return touchline
 
 
@@ -104,7 +104,7 @@ class TestServe:
     def test_several_processes_over_a_file_are_refused(
         self, run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.http.server.serve_with", lambda *_arguments: None)
+        monkeypatch.setattr("app.http.server.serve_with_processes", lambda *_arguments: None)
         code, out, err = run("serve", "--port", "0", "--workers", "2")
         assert (code, out) == (1, "")
         assert "need a PostgreSQL database" in err
@@ -149,7 +149,7 @@ class TestReadOnlyHome:
             ["serve", "--port", "0"],
             ["findings", "--dataset", "x"],
         ]
-        if dialect_of(Settings(home=home)).is_file:
+        if get_dialect(Settings(home=home)).is_file:
             commands.append(["backup", str(tmp_path / "b.zip")])
         done = subprocess.run(
             without_power([sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]),

@@ -9,9 +9,9 @@ import pytest
 
 import app
 from app.wording import (
-    counted,
     format_degrees,
     format_metres,
+    format_named_count,
     format_percent,
     format_pixels,
     plural,
@@ -44,8 +44,8 @@ class TestCounted:
         ],
     )
     def test_names_one_thing_in_the_singular(self, name, one):
-        assert counted(1, name) == one
-        assert counted(3, name) == f"3 {name.replace('_', ' ')}"
+        assert format_named_count(1, name) == one
+        assert format_named_count(3, name) == f"3 {name.replace('_', ' ')}"
 
 
 class TestProduct:

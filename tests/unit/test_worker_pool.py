@@ -113,7 +113,7 @@ class TestSubmit:
         with pytest.raises(ImageError, match="tried before"):
             task.future.result(60)
         assert not (tmp_path / "late").exists()
-        assert not pool.is_whole
+        assert not pool.has_all_processes
 
     def test_a_worker_that_ends_is_explained_and_replaced(self, pool: WorkerPool) -> None:
         def explain(error: WorkerEnded) -> Exception:

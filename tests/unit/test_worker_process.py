@@ -345,7 +345,7 @@ def counts() -> WorkerCounts:
 
 class TestWorkerCounts:
     def test_a_task_is_busy_until_it_is_done(self, counts: WorkerCounts) -> None:
-        with counts.working(), counts.working():
+        with counts.track_task(), counts.track_task():
             assert counts.busy == 2
         assert counts.busy == 0
         assert set(counts.ended.values()) == {0}
@@ -355,13 +355,13 @@ class TestWorkerCounts:
         self, counts: WorkerCounts, reason: EndReason
     ) -> None:
         for _ in range(2):
-            with pytest.raises(WorkerEnded), counts.working():
+            with pytest.raises(WorkerEnded), counts.track_task():
                 raise WorkerEnded(reason, LITTLE)
         assert counts.ended == {**dict.fromkeys(get_args(EndReason), 0), reason: 2}
         assert counts.busy == 0
 
     def test_a_task_that_refuses_ended_no_worker(self, counts: WorkerCounts) -> None:
-        with pytest.raises(ValueError, match="a word"), counts.working():
+        with pytest.raises(ValueError, match="a word"), counts.track_task():
             raise ValueError("a word")
         assert set(counts.ended.values()) == {0}
         assert counts.busy == 0

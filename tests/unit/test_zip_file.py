@@ -11,7 +11,7 @@ import pytest
 from app import zip_file as module
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
-from app.zip_file import count_truncated, list_first_member_names
+from app.zip_file import count_unlisted_members, list_first_member_names
 
 
 def entry(name: str, comment: bytes = b"") -> bytes:
@@ -108,7 +108,7 @@ class TestCountTruncated:
         with zipfile.ZipFile(path, "a") as archive:
             archive.comment = comment
         with zipfile.ZipFile(path) as archive:
-            assert count_truncated(archive) == 0
+            assert count_unlisted_members(archive) == 0
 
     def test_counts_more_members_than_a_short_number_holds(self, tmp_path: Path) -> None:
         path = tmp_path / "many.zip"
@@ -116,11 +116,11 @@ class TestCountTruncated:
             for number in range(65_536):
                 archive.writestr(zipfile.ZipInfo(str(number)), b"")
         with zipfile.ZipFile(path) as archive:
-            assert count_truncated(archive) == 0
+            assert count_unlisted_members(archive) == 0
             archive.infolist().pop()
-            assert count_truncated(archive) == 1
+            assert count_unlisted_members(archive) == 1
 
     def test_goes_on_where_an_old_program_began_to_count_anew(self, path: Path) -> None:
         with zipfile.ZipFile(path) as archive:
             archive.infolist().extend([zipfile.ZipInfo("more")] * 65_536)
-            assert count_truncated(archive) == 0
+            assert count_unlisted_members(archive) == 0

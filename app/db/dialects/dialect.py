@@ -40,7 +40,7 @@ AGAIN = ""
 """The word that stands for all that may have been said while nobody could listen."""
 
 
-class ProcessSharing(Protocol):
+class ProcessCoordinator(Protocol):
     """What a process knows of the others.
 
     Attributes:
@@ -75,33 +75,33 @@ class ProcessSharing(Protocol):
         """End all claims, and stop listening."""
 
 
-class SingleProcess:
+class SingleProcessCoordinator:
     """The one server of a database: everything is its own, and nobody listens."""
 
     is_shared = False
 
     def claim(self, name: str) -> bool:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
         return True
 
     def holds(self, name: str) -> bool:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
         return True
 
     def release(self, name: str) -> None:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
 
     def publish(self, session: Session, word: str) -> None:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
 
     def subscribe(self, hearer: Hearer) -> None:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
 
     def listen(self) -> None:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
 
     def close(self) -> None:
-        """See ``ProcessSharing``."""
+        """See ``ProcessCoordinator``."""
 
 
 WRITE = {"touchline_write": True}
@@ -171,27 +171,31 @@ class Dialect(Protocol):
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
-    ) -> ProcessSharing:
+    ) -> ProcessCoordinator:
         """What processes with this database say to each other; ``reported`` names what fails."""
 
-    def require_promises(self, engine: Engine) -> None:
+    def require_supported_configuration(self, engine: Engine) -> None:
         """Raise StorageError where the database does not keep what we promise."""
 
     def failure(self, error: DBAPIError) -> tuple[DatabaseFailure, str]:
         """Why a statement failed, and the engine's name for it."""
 
-    def interrupted(
+    def interrupt_when(
         self, session: Session, ends: Callable[[], bool]
     ) -> AbstractContextManager[None]:
         """End what the database is at, and what is done here, once a function says so."""
 
-    def migrating(self, connection: Connection, *, new: bool) -> AbstractContextManager[None]:
+    def migration_context(
+        self, connection: Connection, *, new: bool
+    ) -> AbstractContextManager[None]:
         """Run migrations; ``new``: of a database that is empty."""
 
     def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
         """Count ids on from rows that were copied, and belong to the installation of a key."""
 
-    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
+    def find_file_faults(
+        self, session: Session, most: int = 5, *, thorough: bool = False
+    ) -> list[str]:
         """What is wrong with pages and indexes of the file, each a line; a server looks after its own.
 
         Args:
@@ -207,7 +211,7 @@ class Dialect(Protocol):
 _MODULES = {"sqlite": "sqlite", "postgresql": "postgresql", "postgres": "postgresql"}
 
 
-def dialect_of(settings: Settings) -> Dialect:
+def get_dialect(settings: Settings) -> Dialect:
     """How the database of a home is spoken to.
 
     Raises:
@@ -220,26 +224,26 @@ def dialect_of(settings: Settings) -> Dialect:
             hint="Set TOUCHLINE_DATABASE_URL to postgresql://USER:PASSWORD@HOST/DATABASE, or leave"
             " it unset.",
         )
-    return _dialect_by_name(_MODULES[kind])
+    return _load_dialect(_MODULES[kind])
 
 
-def dialect_in(session: Session) -> Dialect:
+def get_session_dialect(session: Session) -> Dialect:
     """How the database of a session is spoken to."""
-    return _dialect_by_name(session.dialect.name)
+    return _load_dialect(session.dialect.name)
 
 
-def _dialect_by_name(name: str) -> Dialect:
+def _load_dialect(name: str) -> Dialect:
     # Only the one that is used is imported: a driver takes its time.
     return cast(Dialect, import_module(f"app.db.dialects.{name}").DIALECT)
 
 
-def require_processes(settings: Settings, count: int) -> None:
+def require_multiprocess_support(settings: Settings, count: int) -> None:
     """Refuse several processes where the database is a file of one.
 
     Raises:
         InputError: It is.
     """
-    if count > 1 and dialect_of(settings).is_file:
+    if count > 1 and get_dialect(settings).is_file:
         raise InputError(
             "several server processes need a PostgreSQL database, and this database is an"
             " SQLite file",
@@ -258,7 +262,7 @@ def make_engine(settings: Settings, *, lasting: bool = True) -> Engine:
     Raises:
         InputError: The URL is neither one of SQLite nor of PostgreSQL.
     """
-    return dialect_of(settings).make_engine(settings, lasting=lasting)
+    return get_dialect(settings).make_engine(settings, lasting=lasting)
 
 
 @contextmanager
@@ -270,7 +274,7 @@ def report_storage_errors(settings: Settings) -> Iterator[None]:
     try:
         yield
     except DBAPIError as error:
-        kind, name = dialect_of(settings).failure(error)
+        kind, name = get_dialect(settings).failure(error)
         if kind is DatabaseFailure.TEXT:
             raise unstorable_text_error() from error
         if kind is not DatabaseFailure.OTHER or isinstance(error, OperationalError):
@@ -328,23 +332,23 @@ def insert_or_replace(model: Any) -> Insert:
     return statement.on_conflict_do_update(index_elements=keys, set_=changed)
 
 
-def select_numbers(ids: Iterable[int]) -> Select[Any]:
+def select_from_number_list(ids: Iterable[int]) -> Select[Any]:
     """Some numbers as a question: one parameter, however many there are, for a statement takes a
     limited number of them."""
-    return _numbers_in(json_text(list(ids)))
+    return _select_from_json_numbers(json_text(list(ids)))
 
 
-def select_bound_numbers(name: str) -> Select[Any]:
-    """As ``select_numbers``, in a statement that is made once: a parameter that is a JSON array."""
-    return _numbers_in(bindparam(name, type_=String()))
+def select_from_number_parameter(name: str) -> Select[Any]:
+    """As ``select_from_number_list``, in a statement that is made once: a parameter that is a JSON array."""
+    return _select_from_json_numbers(bindparam(name, type_=String()))
 
 
-def _numbers_in(array: Any) -> Select[Any]:
-    listed = _Numbers(array).table_valued("value")
+def _select_from_json_numbers(array: Any) -> Select[Any]:
+    listed = _JsonNumberRows(array).table_valued("value")
     return select(listed.c.value)
 
 
-def select_texts(values: Iterable[str]) -> Select[Any]:
+def select_from_text_list(values: Iterable[str]) -> Select[Any]:
     """Some texts as a question."""
     listed = select_json_array_items(json_text(list(values)))
     return select(listed.c.value)
@@ -352,24 +356,24 @@ def select_texts(values: Iterable[str]) -> Select[Any]:
 
 def select_json_array_items(array: Any) -> TableValuedAlias:
     """Rows (key, value) of a JSON array of texts in a text; keys count from 0."""
-    return _Items(array).table_valued("key", "value")
+    return _JsonArrayRows(array).table_valued("key", "value")
 
 
 def select_json_object_values(mapping: Any) -> TableValuedAlias:
     """Rows (value) of a JSON object whose values are texts, in a text."""
-    return _Values(mapping).table_valued("value")
+    return _JsonObjectValueRows(mapping).table_valued("value")
 
 
-class _Numbers(FunctionElement[Any]):
+class _JsonNumberRows(FunctionElement[Any]):
     inherit_cache = True
     type = Integer()
 
 
-class _Items(FunctionElement[Any]):
+class _JsonArrayRows(FunctionElement[Any]):
     inherit_cache = True
 
 
-class _Values(FunctionElement[Any]):
+class _JsonObjectValueRows(FunctionElement[Any]):
     inherit_cache = True
 
 
@@ -390,14 +394,14 @@ class larger_of(FunctionElement[Any]):  # noqa: N801 - written like SQLAlchemy's
     type = Integer()
 
 
-class any_of(FunctionElement[bytes]):  # noqa: N801 - written like SQLAlchemy's functions
+class any_value_of(FunctionElement[bytes]):  # noqa: N801 - written like SQLAlchemy's functions
     """One of the bytes of each group of rows, which have all the same."""
 
     inherit_cache = True
     type = LargeBinary()
 
 
-class pairs_of(FunctionElement[str]):  # noqa: N801 - written like SQLAlchemy's functions
+class json_pairs_of(FunctionElement[str]):  # noqa: N801 - written like SQLAlchemy's functions
     """The pairs of two columns of all rows, as a JSON array of arrays in a text."""
 
     inherit_cache = True
@@ -410,15 +414,15 @@ class DeferReferences(Executable, ClauseElement):
     inherit_cache = True
 
 
-@compiles(_Numbers)
-@compiles(_Items)
-@compiles(_Values)
+@compiles(_JsonNumberRows)
+@compiles(_JsonArrayRows)
+@compiles(_JsonObjectValueRows)
 def _compile_json_each(element: Any, compiler: Any, **kw: Any) -> str:
     return f"json_each({compiler.process(element.clauses, **kw)})"
 
 
-@compiles(_Numbers, "postgresql")
-def _compile_numbers(element: Any, compiler: Any, **kw: Any) -> str:
+@compiles(_JsonNumberRows, "postgresql")
+def _compile_json_numbers(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return (
         "(SELECT CAST(item AS BIGINT) AS value"
@@ -426,8 +430,8 @@ def _compile_numbers(element: Any, compiler: Any, **kw: Any) -> str:
     )
 
 
-@compiles(_Items, "postgresql")
-def _compile_items(element: Any, compiler: Any, **kw: Any) -> str:
+@compiles(_JsonArrayRows, "postgresql")
+def _compile_json_array(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return (
         "LATERAL (SELECT place - 1 AS key, item AS value"
@@ -436,34 +440,36 @@ def _compile_items(element: Any, compiler: Any, **kw: Any) -> str:
     )
 
 
-@compiles(_Values, "postgresql")
-def _compile_values(element: Any, compiler: Any, **kw: Any) -> str:
+@compiles(_JsonObjectValueRows, "postgresql")
+def _compile_json_object_values(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return f"LATERAL (SELECT pair.value FROM jsonb_each_text(CAST({json} AS JSONB)) AS pair)"
 
 
 @compiles(json_member, "postgresql")
-def _compile_member(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_json_member(element: Any, compiler: Any, **kw: Any) -> str:
     column, path = element.clauses
     column, path = compiler.process(column, **kw), compiler.process(path, **kw)
     return f"(CAST({column} AS JSONB) ->> substr({path}, 3))"
 
 
-def _compile_as(kind: type[ClauseElement], form: str, *engine: str) -> None:
+def _register_sql_template(kind: type[ClauseElement], form: str, *engine: str) -> None:
     """Have an element written in a form, whose ``{}`` are its arguments."""
 
     @compiles(kind, *engine)
-    def _write(element: Any, compiler: Any, **kw: Any) -> str:
+    def compile_from_template(element: Any, compiler: Any, **kw: Any) -> str:
         return form.format(compiler.process(element.clauses, **kw))
 
 
-_compile_as(json_member, "json_extract({})")
-_compile_as(larger_of, "max({})")
-_compile_as(larger_of, "greatest({})", "postgresql")
-_compile_as(any_of, "min({})")
-_compile_as(any_of, "(array_agg({}))[1]", "postgresql")
-_compile_as(pairs_of, "json_group_array(json_array({}))")
-_compile_as(pairs_of, "CAST(coalesce(json_agg(json_build_array({})), '[]') AS TEXT)", "postgresql")
+_register_sql_template(json_member, "json_extract({})")
+_register_sql_template(larger_of, "max({})")
+_register_sql_template(larger_of, "greatest({})", "postgresql")
+_register_sql_template(any_value_of, "min({})")
+_register_sql_template(any_value_of, "(array_agg({}))[1]", "postgresql")
+_register_sql_template(json_pairs_of, "json_group_array(json_array({}))")
+_register_sql_template(
+    json_pairs_of, "CAST(coalesce(json_agg(json_build_array({})), '[]') AS TEXT)", "postgresql"
+)
 
 
 @compiles(DeferReferences)

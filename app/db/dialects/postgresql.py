@@ -29,8 +29,8 @@ from sqlalchemy.dialects.postgresql.psycopg import PGDialect_psycopg
 from sqlalchemy.exc import ArgumentError, DataError, DBAPIError, NoSuchModuleError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import AUTOCOMMIT, DatabaseFailure, ProcessSharing
-from app.db.dialects.postgresql_sharing import Reported, ServerSharing
+from app.db.dialects.dialect import AUTOCOMMIT, DatabaseFailure, ProcessCoordinator
+from app.db.dialects.postgresql_sharing import PostgreSQLCoordinator, Reported
 from app.db.session import Session
 from app.errors import InputError, StorageError
 
@@ -87,7 +87,7 @@ SCAN = "queue_scanned"
 have to keep it up at every edit."""
 
 
-def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
+def adapt_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     """Carry out what only SQLite understands; returns the statement that is left to be executed.
 
     Args:
@@ -102,7 +102,7 @@ def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     if statement.startswith(f"CREATE INDEX {SCAN} "):
         return _NOTHING
     if found := _TRIGGER.fullmatch(statement):
-        cursor.execute(trigger_statements(**found.groupdict()))
+        cursor.execute(build_trigger_statements(**found.groupdict()))
         return _NOTHING
     if found := _DROP.fullmatch(statement):
         # The trigger goes with its function.
@@ -110,7 +110,7 @@ def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     return statement
 
 
-def trigger_statements(
+def build_trigger_statements(
     name: str,
     moment: str,
     verb: str,
@@ -130,7 +130,7 @@ def trigger_statements(
     elif body == "SELECT RAISE(IGNORE)":
         body = "RETURN NULL"
     if when is not None:
-        body = f"IF {_is_distinct_condition(when)} THEN {body}; END IF"
+        body = f"IF {_translate_is_not_condition(when)} THEN {body}; END IF"
     made = (
         f"CREATE FUNCTION {name}() RETURNS trigger LANGUAGE plpgsql AS"
         f" $$ BEGIN {body}; RETURN {row}; END $$;"
@@ -148,7 +148,7 @@ def trigger_statements(
     return made
 
 
-def _is_distinct_condition(condition: str) -> str:
+def _translate_is_not_condition(condition: str) -> str:
     """SQLite's IS NOT between values."""
     return re.sub(r"IS NOT (?=NEW\.|OLD\.)", "IS DISTINCT FROM ", condition)
 
@@ -182,7 +182,7 @@ _FAILURES = {
 """By SQLSTATE (PostgreSQL, Appendix A)."""
 
 
-class PostgreSQL:
+class PostgreSQLDialect:
     """A database of a server; files of the home stay in the home."""
 
     name = "PostgreSQL"
@@ -194,7 +194,7 @@ class PostgreSQL:
         """See ``Dialect``."""
         try:
             engine = create_engine(
-                _psycopg_url(settings.database),
+                _parse_psycopg_url(settings.database),
                 # A server that was started again is found again.
                 pool_pre_ping=True,
                 # One at a time writes what need not last.
@@ -228,11 +228,11 @@ class PostgreSQL:
     def nonblocking_engine(self, settings: Settings) -> None:
         """See ``Dialect``."""
 
-    def sharing(self, engine: Engine, reported: Reported) -> ProcessSharing:
+    def sharing(self, engine: Engine, reported: Reported) -> ProcessCoordinator:
         """See ``Dialect``."""
-        return ServerSharing(engine, reported)
+        return PostgreSQLCoordinator(engine, reported)
 
-    def require_promises(self, engine: Engine) -> None:
+    def require_supported_configuration(self, engine: Engine) -> None:
         """See ``Dialect``."""
         with engine.connect() as connection:
             show = connection.exec_driver_sql
@@ -264,18 +264,18 @@ class PostgreSQL:
         return _FAILURES.get(state, DatabaseFailure.OTHER), state
 
     @contextmanager
-    def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
+    def interrupt_when(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
         """See ``Dialect``; a thread looks, for the driver waits for the server meanwhile."""
         driver: Any = session.connection.driver_connection
         done = threading.Event()
 
-        def look() -> None:
+        def cancel_when_ended() -> None:
             while not done.wait(LOOK_SECONDS):
                 if ends():
                     driver.cancel_safe()
                     return
 
-        watcher = threading.Thread(target=look, name="postgresql-watcher", daemon=True)
+        watcher = threading.Thread(target=cancel_when_ended, name="postgresql-watcher", daemon=True)
         watcher.start()
         try:
             yield
@@ -287,13 +287,13 @@ class PostgreSQL:
             watcher.join()
 
     @contextmanager
-    def migrating(self, connection: Connection, *, new: bool) -> Iterator[None]:
+    def migration_context(self, connection: Connection, *, new: bool) -> Iterator[None]:
         """See ``Dialect``: what is written for SQLite is said in PostgreSQL's words."""
 
         def translate(
             _connection: Any, cursor: Any, statement: str, parameters: Any, *_: Any
         ) -> tuple[str, Any]:
-            return run_sqlite_statement(cursor, statement, new=new), parameters
+            return adapt_sqlite_statement(cursor, statement, new=new), parameters
 
         event.listen(connection, "before_cursor_execute", translate, retval=True)
         try:
@@ -311,7 +311,9 @@ class PostgreSQL:
                     f' max(id) IS NOT NULL) FROM "{name}"'
                 )
 
-    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
+    def find_file_faults(
+        self, session: Session, most: int = 5, *, thorough: bool = False
+    ) -> list[str]:
         """See ``Dialect``; a server looks after its own files."""
         return []
 
@@ -320,10 +322,10 @@ class PostgreSQL:
         return 0
 
 
-DIALECT = PostgreSQL()
+DIALECT = PostgreSQLDialect()
 
 
-def _psycopg_url(url: str) -> URL:
+def _parse_psycopg_url(url: str) -> URL:
     """The URL for psycopg.
 
     Raises:
@@ -345,12 +347,12 @@ def _set_up_connection(lasting: bool, connection: Any, _record: object) -> None:
     from psycopg.types.numeric import FloatLoader
 
     # Sums of whole numbers are numeric, and Decimal in Python; SQLite's are int.
-    class _Number(FloatLoader):
+    class _NumericLoader(FloatLoader):
         def load(self, data: Any) -> Any:
             text = bytes(data)
             return int(text) if text.lstrip(b"-").isdigit() else float(text)
 
-    connection.adapters.register_loader("numeric", _Number)
+    connection.adapters.register_loader("numeric", _NumericLoader)
     was, connection.autocommit = connection.autocommit, True
     # With ``off`` a power cut loses acknowledged edits.
     connection.execute(f"SET synchronous_commit = {'on' if lasting else 'off'}")
@@ -363,20 +365,20 @@ def _close_connections_after_disposal(engine: Engine) -> None:
     """Close what a thread gives back after the engine was disposed of: no pool would."""
     disposals = 0
 
-    def disposed(_engine: Engine) -> None:
+    def count_disposal(_engine: Engine) -> None:
         nonlocal disposals
         disposals += 1
 
-    def connected(_connection: Any, record: Any) -> None:
+    def tag_connection(_connection: Any, record: Any) -> None:
         record.info["disposals"] = disposals
 
-    def returned(_connection: Any, record: Any) -> None:
+    def invalidate_stale_connection(_connection: Any, record: Any) -> None:
         if record.info.get("disposals", disposals) != disposals:
             record.invalidate()
 
-    event.listen(engine, "engine_disposed", disposed)
-    event.listen(engine, "connect", connected)
-    event.listen(engine, "checkin", returned)
+    event.listen(engine, "engine_disposed", count_disposal)
+    event.listen(engine, "connect", tag_connection)
+    event.listen(engine, "checkin", invalidate_stale_connection)
 
 
 def _begin_transaction(connection: Connection) -> None:

@@ -30,7 +30,7 @@ AGAIN_SECONDS = 1.0
 Reported = Callable[[], AbstractContextManager[None]]
 
 
-class ServerSharing:
+class PostgreSQLCoordinator:
     """What processes share through one PostgreSQL.
 
     Args:
@@ -119,7 +119,7 @@ class ServerSharing:
                 # A machine that vanished lets go of its claims within half a minute.
                 for setting in ("idle = 15", "interval = 5", "count = 3"):
                     self._claiming.execute(text(f"SET tcp_keepalives_{setting}"))
-            return self._claiming.execute(text(statement), {"key": _lock_number(name)}).scalar()
+            return self._claiming.execute(text(statement), {"key": _hash_lock_name(name)}).scalar()
         except DBAPIError:
             self._close_claiming_connection()
             raise
@@ -136,7 +136,7 @@ class ServerSharing:
         while not self._closing.is_set():
             try:
                 with self._engine.connect() as connection:
-                    self._reconnect_loop(connection)
+                    self._receive_notifications(connection)
             except Exception as error:
                 log.warning(
                     "notifications of other processes cannot be received",
@@ -144,23 +144,23 @@ class ServerSharing:
                 )
                 self._closing.wait(AGAIN_SECONDS)
 
-    def _reconnect_loop(self, connection: Connection) -> None:
+    def _receive_notifications(self, connection: Connection) -> None:
         try:
             connection.execute(text(f"LISTEN {CHANNEL}"))
-            self._notify_hearers(AGAIN)
+            self._notify_subscribers(AGAIN)
             driver: Any = connection.connection.driver_connection
             while not self._closing.is_set():
                 for notice in driver.notifies(timeout=POLL_SECONDS):
                     origin, _, word = notice.payload.partition(" ")
                     if origin != self._origin:
-                        self._notify_hearers(word)
+                        self._notify_subscribers(word)
                     if self._closing.is_set():
                         return
         finally:
             # Nobody else shall get a connection that listens.
             connection.invalidate()
 
-    def _notify_hearers(self, word: str) -> None:
+    def _notify_subscribers(self, word: str) -> None:
         for hearer in self._hearers:
             try:
                 hearer(word)
@@ -171,6 +171,6 @@ class ServerSharing:
 _NOTIFY = text("SELECT pg_notify(:channel, :said)")
 
 
-def _lock_number(name: str) -> int:
+def _hash_lock_name(name: str) -> int:
     """The lock of a name, 64 bits with a sign."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], signed=True)

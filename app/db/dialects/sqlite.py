@@ -17,7 +17,7 @@ from app.config import Settings
 from app.db.dialects.dialect import (
     AUTOCOMMIT,
     DatabaseFailure,
-    SingleProcess,
+    SingleProcessCoordinator,
     unstorable_text_error,
 )
 from app.db.session import Session
@@ -64,7 +64,7 @@ _FAILURES = {
 """By how SQLite's name of an error begins."""
 
 
-class SQLite:
+class SQLiteDialect:
     """A file of the home."""
 
     name = "SQLite"
@@ -88,16 +88,16 @@ class SQLite:
     def nonblocking_engine(self, settings: Settings) -> Engine:
         """See ``Dialect``; readers of a write-ahead log wait for nobody, but while it is recovered."""
         engine = _make_engine(settings, True, pool_size=1, max_overflow=0, pool_timeout=0)
-        event.listen(engine, "connect", _disable_waiting)
+        event.listen(engine, "connect", _disable_busy_timeout)
         return engine.execution_options(**AUTOCOMMIT)
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
-    ) -> SingleProcess:
+    ) -> SingleProcessCoordinator:
         """See ``Dialect``; one server has a file."""
-        return SingleProcess()
+        return SingleProcessCoordinator()
 
-    def require_promises(self, engine: Engine) -> None:
+    def require_supported_configuration(self, engine: Engine) -> None:
         """See ``Dialect``."""
         with engine.connect() as connection:
             for name, (value, expected) in PRAGMAS.items():
@@ -117,7 +117,7 @@ class SQLite:
         return next(found, DatabaseFailure.OTHER), name
 
     @contextmanager
-    def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
+    def interrupt_when(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
         """See ``Dialect``."""
         driver: Any = session.connection.driver_connection
         driver.set_progress_handler(ends, STEPS)
@@ -129,7 +129,7 @@ class SQLite:
         finally:
             driver.set_progress_handler(None, 0)
 
-    def migrating(self, connection: Connection, *, new: bool) -> nullcontext[None]:
+    def migration_context(self, connection: Connection, *, new: bool) -> nullcontext[None]:
         """See ``Dialect``; the migrations are written for SQLite."""
         return nullcontext()
 
@@ -137,7 +137,9 @@ class SQLite:
         """See ``Dialect``; ids follow the rows, and the first page says whose they are (``recovery.preopen_check``)."""
         connection.exec_driver_sql(f"PRAGMA application_id = {int(key[:7], 16)}")
 
-    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
+    def find_file_faults(
+        self, session: Session, most: int = 5, *, thorough: bool = False
+    ) -> list[str]:
         """See ``Dialect``."""
         check = "integrity_check" if thorough else "quick_check"
         found = session.scalars(text(f"PRAGMA {check}({most})")).all()
@@ -148,10 +150,10 @@ class SQLite:
         return len(session.execute(text("PRAGMA foreign_key_check")).all())
 
 
-DIALECT = SQLite()
+DIALECT = SQLiteDialect()
 
 
-class _HintedStatement(SQLiteCompiler):
+class _TableHintCompiler(SQLiteCompiler):
     """Writes hints on a table (INDEXED BY), which SQLAlchemy leaves out for SQLite."""
 
     def get_from_hint_text(self, table: FromClause, text: str | None) -> str | None:
@@ -168,7 +170,7 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
             hint="Install the version of pysqlite3 that requirements.txt requires.",
         )
     engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
-    engine.dialect.statement_compiler = _HintedStatement
+    engine.dialect.statement_compiler = _TableHintCompiler
     event.listen(engine, "connect", partial(_set_pragmas, lasting))
     event.listen(engine, "begin", _begin_transaction)
     event.listen(engine, "commit", _count_write)
@@ -186,7 +188,7 @@ def _refuse_null_characters(
                 raise unstorable_text_error()
 
 
-def _disable_waiting(connection: Any, _record: object) -> None:
+def _disable_busy_timeout(connection: Any, _record: object) -> None:
     connection.execute(_WAIT_NOT)
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.durable import replace_file, sync_to_disk
 from app.errors import DamagedError
 from app.json_text import json_text
@@ -61,7 +61,7 @@ class DatabaseAnchor:
         return json_text(asdict(self)).encode().ljust(ANCHOR_BYTES - 1) + b"\n"
 
 
-def anchor_file(database: Path) -> Path:
+def find_anchor_file(database: Path) -> Path:
     """Where the anchor of a database is."""
     return database.with_name("home.json")
 
@@ -79,7 +79,7 @@ def read_anchor(database: Path) -> DatabaseAnchor | None:
 
 
 def _read_anchor_file(database: Path) -> DatabaseAnchor | None:
-    path = anchor_file(database)
+    path = find_anchor_file(database)
     try:
         return DatabaseAnchor(**json.loads(path.read_bytes()))
     except FileNotFoundError:
@@ -91,15 +91,15 @@ def _read_anchor_file(database: Path) -> DatabaseAnchor | None:
         ) from error
 
 
-def make_anchor(database: Path, anchor: DatabaseAnchor) -> None:
+def write_anchor(database: Path, anchor: DatabaseAnchor) -> None:
     """Write an anchor so that it is there after a power cut."""
-    replace_file(anchor_file(database), anchor.to_bytes())
+    replace_file(find_anchor_file(database), anchor.to_bytes())
 
 
-def move_anchor(database: Path, anchor: DatabaseAnchor) -> None:
+def overwrite_anchor(database: Path, anchor: DatabaseAnchor) -> None:
     """Write an anchor over the one that is there; one that was taken away stays away."""
     try:
-        handle = os.open(anchor_file(database), os.O_WRONLY)
+        handle = os.open(find_anchor_file(database), os.O_WRONLY)
     except FileNotFoundError:
         return
     try:
@@ -111,7 +111,7 @@ def move_anchor(database: Path, anchor: DatabaseAnchor) -> None:
 def sync_anchor(database: Path) -> None:
     """Wait until the anchor is on the disk."""
     with suppress(FileNotFoundError):
-        sync_to_disk(anchor_file(database))
+        sync_to_disk(find_anchor_file(database))
 
 
 def read_anchor_of_database(connection: Connection) -> DatabaseAnchor | None:
@@ -132,21 +132,21 @@ def read_anchor_of_database(connection: Connection) -> DatabaseAnchor | None:
 def require_own_database(engine: Engine, settings: Settings) -> None:
     """Raise DamagedError where a database is not the one that its home had."""
     with suppress(DamagedError):
-        _require_own(engine, settings)
+        _require_matching_database(engine, settings)
         return
     time.sleep(AGAIN_SECONDS)
-    _require_own(engine, settings)
+    _require_matching_database(engine, settings)
 
 
-def _require_own(engine: Engine, settings: Settings) -> None:
+def _require_matching_database(engine: Engine, settings: Settings) -> None:
     anchor = read_anchor(settings.database_file)
     if anchor is not None:
         with engine.connect() as connection:
-            if dialect_of(settings).is_file:
+            if get_dialect(settings).is_file:
                 file = settings.database_file
-                _require_anchored(connection, anchor, str(file), RESTORE.format(file=file))
+                _require_matches_anchor(connection, anchor, str(file), RESTORE.format(file=file))
             else:
-                _require_anchored(connection, anchor, settings.database_name, RESTORE_SERVER)
+                _require_matches_anchor(connection, anchor, settings.database_name, RESTORE_SERVER)
 
 
 def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
@@ -164,14 +164,14 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
         or stored is None
         or _anchor_without_log_end(stored) != _anchor_without_log_end(anchor)
     ):
-        make_anchor(settings.database_file, anchor)
+        write_anchor(settings.database_file, anchor)
 
 
 def _anchor_without_log_end(anchor: DatabaseAnchor) -> DatabaseAnchor:
     return replace(anchor, entries=0, hash="")
 
 
-def _require_anchored(
+def _require_matches_anchor(
     connection: Connection, anchor: DatabaseAnchor, database: str, hint: str
 ) -> None:
     tables = inspect(connection).get_table_names()

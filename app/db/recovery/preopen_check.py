@@ -116,7 +116,7 @@ def read_header(database: Path) -> DatabaseHeader | None:
         return DatabaseHeader.parse(file.read(_HEADER_BYTES))
 
 
-def read_log(path: Path) -> WriteAheadLog:
+def read_write_ahead_log(path: Path) -> WriteAheadLog:
     """The log of a path; an empty one where there is none, or nothing whole in it."""
     try:
         with path.open("rb") as file:
@@ -138,8 +138,11 @@ def _read_transactions(file: IO[bytes]) -> WriteAheadLog:
     if magic not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or not _is_page_size(page_bytes):
         return WriteAheadLog()
     order = ">u4" if magic == _BIG_ENDIAN else "<u4"
-    weights, frame_bytes = _fibonacci(page_bytes // 4 + 4), _FRAME_HEADER.size + page_bytes
-    sums = _checksum((0, 0), start[:24], order, weights)
+    weights, frame_bytes = (
+        _list_fibonacci_numbers(page_bytes // 4 + 4),
+        _FRAME_HEADER.size + page_bytes,
+    )
+    sums = _update_checksum((0, 0), start[:24], order, weights)
     # Of a log whose own sum is wrong no frame is believed.
     is_whole = sums == (sum_1, sum_2)
     commits, headers = 0, []
@@ -147,7 +150,7 @@ def _read_transactions(file: IO[bytes]) -> WriteAheadLog:
     while is_whole and len(frame := file.read(frame_bytes)) == frame_bytes:
         number, pages, *own_salts, sum_1, sum_2 = _FRAME_HEADER.unpack_from(frame)
         content = frame[_FRAME_HEADER.size :]
-        sums = _checksum(sums, frame[:8] + content, order, weights)
+        sums = _update_checksum(sums, frame[:8] + content, order, weights)
         is_whole = own_salts == salts and sums == (sum_1, sum_2)
         if is_whole and number == 1:
             pending = DatabaseHeader.parse(content)
@@ -160,7 +163,7 @@ def _read_transactions(file: IO[bytes]) -> WriteAheadLog:
     return WriteAheadLog(commits, page_bytes, tuple(headers))
 
 
-def _checksum(
+def _update_checksum(
     sums: tuple[int, int], data: bytes, order: str, weights: NDArray[np.uint32]
 ) -> tuple[int, int]:
     """SQLite's running checksum of a log: for each pair (a, b) of words, s += a + t, then t += b + s.
@@ -180,7 +183,7 @@ def _checksum(
 
 
 @cache
-def _fibonacci(count: int) -> NDArray[np.uint32]:
+def _list_fibonacci_numbers(count: int) -> NDArray[np.uint32]:
     """..., 5, 3, 2, 1, 1 modulo 2^32, so many."""
     numbers = [1, 1]
     while len(numbers) < count:
@@ -192,12 +195,12 @@ VERSION_TABLE = "alembic_version"
 """Every database of ours has it."""
 
 
-def log_file(database: Path) -> Path:
+def find_write_ahead_log_file(database: Path) -> Path:
     """The write-ahead log beside a database."""
     return database.with_name(f"{database.name}-wal")
 
 
-def require_sound(settings: Settings) -> None:
+def require_consistent_home_files(settings: Settings) -> None:
     """Raise where the files of a home do not belong together.
 
     Nobody may have the database open meanwhile: both files change under a writer.
@@ -213,7 +216,7 @@ def require_sound(settings: Settings) -> None:
             _require_unused_home(settings)
             return
         header = read_header(database)
-        log = read_log(log_file(database))
+        log = read_write_ahead_log(find_write_ahead_log_file(database))
     except OSError as error:
         raise StorageError(
             f"{error.filename or database} cannot be read ({error.strerror})",
@@ -225,17 +228,17 @@ def require_sound(settings: Settings) -> None:
             hint="Run touchline restore BACKUP with your newest backup; the damaged file is kept"
             " under another name.",
         )
-    _require_whole(database, header, log)
+    _require_complete_database(database, header, log)
     if read_anchor(database) is None:
         _require_no_foreign_tables(database)
-    if _file_size(log_file(database)):
-        _require_log_end_of_anchor(settings)
+    if _file_size(find_write_ahead_log_file(database)):
+        _require_log_reaches_anchor(settings)
 
 
-def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
+def _require_complete_database(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
     if not log.belongs_to(header):
         raise DamagedError(
-            f"{log_file(database)} is the write-ahead log of another database, not of"
+            f"{find_write_ahead_log_file(database)} is the write-ahead log of another database, not of"
             f" {database}: opening them together would damage the data",
             hint="If you copied a backup into this folder, run touchline restore with that backup"
             f" instead. touchline restore {database} opens the database without the log. Both"
@@ -250,7 +253,7 @@ def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -
         )
 
 
-def _require_log_end_of_anchor(settings: Settings) -> None:
+def _require_log_reaches_anchor(settings: Settings) -> None:
     """Raise DamagedError where database and log together are not what the home knows.
 
     A connection that only reads leaves both as they are when it is closed.
@@ -269,7 +272,7 @@ def _require_log_end_of_anchor(settings: Settings) -> None:
 def _require_no_foreign_tables(database: Path) -> None:
     """Raise StorageError where a file that would get our tables has those of another program."""
     # Where its log is empty, SQLite need not make files for it either.
-    alone = "" if _file_size(log_file(database)) else "&immutable=1"
+    alone = "" if _file_size(find_write_ahead_log_file(database)) else "&immutable=1"
     file = f"file:{quote(str(database))}?mode=ro{alone}"
     question = "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name"
     try:
@@ -302,22 +305,22 @@ def list_signs_of_use(settings: Settings) -> list[str]:
     """What a home without a database holds that only a database explains."""
     database = settings.database_file
     anchor = read_anchor(database)
-    log = log_file(database)
+    log = find_write_ahead_log_file(database)
     aside = next(settings.home.glob(f"{ASIDE}*/{database.name}"), None)
     signs = [
         None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
         f"{log.name} holds changes" if _file_size(log) else None,
-        _count_files_sentence(settings.uploads, "*/upload.json"),
-        _count_files_sentence(settings.exports, "*.json"),
-        _count_files_sentence(settings.home / "backups", "*.zip"),
-        *(_count_files_sentence(settings.home / name, "*") for name in ("sample", "practice")),
+        _describe_file_count(settings.uploads, "*/upload.json"),
+        _describe_file_count(settings.exports, "*.json"),
+        _describe_file_count(settings.home / "backups", "*.zip"),
+        *(_describe_file_count(settings.home / name, "*") for name in ("sample", "practice")),
         *(f"{name} is there" for name in KEYS if (settings.home / name).exists()),
         None if aside is None else f"{aside.parent.name}/ holds its database",
     ]
     return [sign for sign in signs if sign is not None]
 
 
-def _count_files_sentence(folder: Path, pattern: str) -> str | None:
+def _describe_file_count(folder: Path, pattern: str) -> str | None:
     count = sum(1 for _ in folder.glob(pattern))
     return f"{folder.name}/ holds {count:,}" if count else None
 
@@ -333,16 +336,16 @@ MOVED = (
 LOG_MOVED = "Stop the server before anything else opens the database: what was saved goes into its file then."
 
 
-class OpenedFile:
+class OpenDatabaseFile:
     """The file of a database that is open from now on."""
 
     def __init__(self, database: Path):
-        self._database, self._log = database, log_file(database)
-        self._opened = _file_identity(database)
+        self._database, self._log = database, find_write_ahead_log_file(database)
+        self._opened = _read_file_identity(database)
 
     def require_there(self) -> None:
         """Raise DamagedError where another file lies in the database's place, or none."""
-        found = _file_identity(self._database)
+        found = _read_file_identity(self._database)
         if found is None:
             raise DamagedError(
                 f"{self._database.name} was moved or deleted while it was open", hint=MOVED
@@ -352,7 +355,7 @@ class OpenedFile:
                 f"{self._database.name} was replaced by another file while it was open", hint=MOVED
             )
 
-    def require_log(self) -> None:
+    def require_write_ahead_log(self) -> None:
         """Raise DamagedError where the write-ahead log is gone.
 
         For who is in a transaction: SQLite deletes it when nobody has the database open any more.
@@ -363,7 +366,7 @@ class OpenedFile:
             )
 
 
-def _file_identity(file: Path) -> tuple[int, int] | None:
+def _read_file_identity(file: Path) -> tuple[int, int] | None:
     """What tells a file from all others at its place; None where there is none to be seen."""
     try:
         found = file.stat()

@@ -9,7 +9,7 @@ from app.db.store import Store
 from app.errors import ForbiddenError, NotFoundError
 from app.features.agreement.queries import OPEN, list_agreements, list_group_agreements
 from app.features.agreement.service import (
-    Comparison,
+    AnnotationsComparison,
     adopt_and_decide,
     compare_states,
     list_undecided_annotations,
@@ -17,15 +17,15 @@ from app.features.agreement.service import (
 )
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load_solved
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.submit import load_solved_group
+from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import Action, role_allows
 from app.features.people.service import list_members
 from app.json_text import Moment
-from app.soccer.actors import LOCAL_USER, person_of
+from app.soccer.actors import LOCAL_USER, person_of_actor
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class AgreementCase:
     original: GroupState
     batch: int | None
     annotations: tuple[IndependentAnnotation, ...]
-    comparison: Comparison
+    comparison: AnnotationsComparison
     refused: str | None
     own: bool
 
@@ -89,7 +89,7 @@ def read_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
     Raises:
         NotFoundError: Nothing of it waits for a decision.
     """
-    original = load_solved(store, group_id)
+    original = load_solved_group(store, group_id)
     with store.read() as session:
         row = next(
             (one for one in list_group_agreements(session, group_id) if one.state == OPEN), None
@@ -103,8 +103,8 @@ def read_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
             f"group {group_id} does not wait for adjudication: fewer than two annotations are"
             " submitted"
         )
-    states = [load_solved(store, annotation.copy_id) for annotation in annotations]
-    own = person_of(actor) in {annotation.person for annotation in annotations}
+    states = [load_solved_group(store, annotation.copy_id) for annotation in annotations]
+    own = person_of_actor(actor) in {annotation.person for annotation in annotations}
     refused = None
     if own and (others := _possible_judges(store, original.dataset_id, annotations)):
         refused = f"you annotated this group yourself; {_join_names(others)} can decide"
@@ -125,7 +125,7 @@ def adjudicate_case(
     *,
     as_start: bool = False,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
 ) -> GroupState:
     """Take one of the annotations, or begin a third one from it.
 
@@ -166,7 +166,7 @@ def adopt_into_group(
     annotation: IndependentAnnotation,
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
 ) -> GroupState:
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 
@@ -210,7 +210,7 @@ def return_for_correction(
         raise NotFoundError(
             f"annotation {annotation_id} is not among the annotations that wait for adjudication"
         )
-    if annotation.person == person_of(actor) != LOCAL_USER:
+    if annotation.person == person_of_actor(actor) != LOCAL_USER:
         raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
     return return_annotation(store, annotation_id, reason, actor=actor)
 

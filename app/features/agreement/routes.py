@@ -13,15 +13,15 @@ from app.evaluation.annotation_distance import (
     ViewDistance,
 )
 from app.evaluation.rater_agreement import (
+    AgreementCoefficient,
     AgreementLimits,
-    Coefficient,
     Disagreement,
-    Spread,
+    MedianAndTail,
 )
 from app.features.agreement import adjudicate
 from app.features.agreement import service as limits
 from app.features.agreement.adjudicate import AgreementCase, OpenCase
-from app.features.agreement.service import AnnotationPair, Comparison, compare_groups
+from app.features.agreement.service import AnnotationPair, AnnotationsComparison, compare_groups
 from app.features.agreement.summary import (
     GroupAgreement,
     PeopleAgreement,
@@ -29,13 +29,19 @@ from app.features.agreement.summary import (
     summarize_agreement,
 )
 from app.features.groups.routes import ETAG
-from app.features.groups.schemas import GroupDocument, group_response
+from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.independent_annotations.routes import AnnotationReturn
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    make_document_response,
+    make_empty_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -85,7 +91,7 @@ class GroupComparisonDocument(Document):
     worst_views: list[str] = Field(description="Keys of the views, the worst first.")
 
     @staticmethod
-    def of(found: Comparison) -> GroupComparisonDocument:
+    def of(found: AnnotationsComparison) -> GroupComparisonDocument:
         """The document of a comparison."""
         groups = [GroupDocument.of(state) for state in found.states]
         return GroupComparisonDocument.model_validate({**vars(found), "groups": groups})
@@ -121,18 +127,18 @@ class LimitsEdit(BaseModel):
 class SpreadsDocument(Document):
     """Distances of lines, balls, diameters (px), 3D balls (m), JaC, cameras (m)."""
 
-    line_px: Spread
-    ball_px: Spread
-    diameter_px: Spread
-    ball_m: Spread
-    jac: Spread
-    position_m: Spread
+    line_px: MedianAndTail
+    ball_px: MedianAndTail
+    diameter_px: MedianAndTail
+    ball_m: MedianAndTail
+    jac: MedianAndTail
+    position_m: MedianAndTail
 
 
 class PeopleAgreementDocument(Document, shows=PeopleAgreement):
     """How far two people agree, or all of them."""
 
-    kappa: Coefficient | None = Field(
+    kappa: AgreementCoefficient | None = Field(
         description="Cohen's of two; Fleiss' of all, where each group has equally many verdicts."
     )
     spreads: SpreadsDocument
@@ -161,7 +167,7 @@ class AgreementDocument(Document):
     open: int = Field(description="Groups that wait for a decision.")
     decided: int
     limits: AgreementLimits
-    alpha: Coefficient
+    alpha: AgreementCoefficient
     overall: PeopleAgreementDocument
     pairs: list[PeopleAgreementDocument]
     groups: list[GroupAgreementDocument] = Field(description="The worst first.")
@@ -237,7 +243,7 @@ def compare(
     ],
 ) -> Response:
     """Two annotations of the same frames, and how far they lie apart; saves nothing."""
-    return document(
+    return make_document_response(
         GroupComparisonDocument.of(compare_groups(store, [group, other], AgreementLimits()))
     )
 
@@ -275,7 +281,7 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(document)
+@respond_with(make_document_response)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
@@ -303,7 +309,7 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
-    return document(CaseDocument.of(adjudicate.read_case(store, group, actor=actor)))
+    return make_document_response(CaseDocument.of(adjudicate.read_case(store, group, actor=actor)))
 
 
 @router.post(
@@ -313,7 +319,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
     return adjudicate.adjudicate_case(

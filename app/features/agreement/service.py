@@ -36,8 +36,8 @@ from app.features.batches.own_annotations import adopt_submitted_annotations
 from app.features.batches.service import get_batch
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load_solved, solve_and_keep
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.submit import load_solved_group, solve_and_store_group
+from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations.adopt import adopt_annotation, copy_verdict_to_original
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
@@ -74,7 +74,7 @@ class AnnotationPair:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class AnnotationsComparison:
     """Annotations of the same frames.
 
     Attributes:
@@ -90,17 +90,19 @@ class Comparison:
     worst_views: tuple[str, ...]
 
 
-def compare_groups(store: Store, group_ids: Sequence[int], limits: AgreementLimits) -> Comparison:
+def compare_groups(
+    store: Store, group_ids: Sequence[int], limits: AgreementLimits
+) -> AnnotationsComparison:
     """Groups of the same frames beside each other; saves nothing.
 
     Raises:
         NotFoundError: There is no such group.
         InputError: They have no view in common.
     """
-    return compare_states([load_solved(store, number) for number in group_ids], limits)
+    return compare_states([load_solved_group(store, number) for number in group_ids], limits)
 
 
-def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Comparison:
+def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> AnnotationsComparison:
     """The same of groups that are read already.
 
     Raises:
@@ -118,8 +120,12 @@ def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Com
             )
         verdicts = (_verdict_from_state(first), _verdict_from_state(second))
         pairs.append(AnnotationPair(a, b, distance, find_disagreements(distance, verdicts, limits)))
-    pairs.sort(key=lambda pair: (-_largest_weight(pair.disagreements), -len(pair.disagreements)))
-    return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
+    pairs.sort(
+        key=lambda pair: (-_find_largest_weight(pair.disagreements), -len(pair.disagreements))
+    )
+    return AnnotationsComparison(
+        tuple(states), tuple(pairs), limits, _rank_worst_views(states, pairs)
+    )
 
 
 def _verdict_from_state(state: GroupState) -> str | None:
@@ -127,18 +133,23 @@ def _verdict_from_state(state: GroupState) -> str | None:
     return None if verdict == "unreviewed" else verdict
 
 
-def _largest_weight(found: Sequence[Disagreement]) -> float:
+def _find_largest_weight(found: Sequence[Disagreement]) -> float:
     return max((item.weight for item in found), default=0.0)
 
 
-def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) -> tuple[str, ...]:
+def _rank_worst_views(
+    states: Sequence[GroupState], pairs: Sequence[AnnotationPair]
+) -> tuple[str, ...]:
     """Views by the weight of what is said of them, then by the largest distance in them."""
     order: dict[str, tuple[float, float]] = {view.key: (0, 0) for view in states[0].group.views}
     for pair in pairs:
         for view in pair.distance.views:
             in_view = [item for item in pair.disagreements if item.view == view.view]
             weight, apart = order.get(view.view, (0.0, 0.0))
-            order[view.view] = (max(weight, _largest_weight(in_view)), max(apart, view.largest_px))
+            order[view.view] = (
+                max(weight, _find_largest_weight(in_view)),
+                max(apart, view.largest_px),
+            )
     return tuple(sorted(order, key=lambda key: [-value for value in order[key]]))
 
 
@@ -180,7 +191,7 @@ class StoredComparison:
 
 
 def compare_or_adopt_submission(
-    store: Store, copy_id: int, paint: PaintFollower | None = None
+    store: Store, copy_id: int, paint: PaintUpdater | None = None
 ) -> str | None:
     """What follows from a copy that was submitted: where nobody else annotates the group it is taken
     over, else the group is weighed; None where there is nothing to weigh yet.
@@ -199,15 +210,15 @@ def compare_or_adopt_submission(
             adopt_submitted_annotations(
                 store, get_batch(store, annotation.batch_id), annotation.person
             )
-        return compare_submitted(store, annotation.group_id, annotation.batch_id, paint)
+        return compare_submitted_annotations(store, annotation.group_id, annotation.batch_id, paint)
     except ReviewError as error:
         # It is tried again with the person's next group, and when the server starts.
         log.warning("a submitted annotation waits to be taken over", copy=copy_id, error=str(error))
         return None
 
 
-def compare_submitted(
-    store: Store, group_id: int, batch_id: int | None, paint: PaintFollower | None = None
+def compare_submitted_annotations(
+    store: Store, group_id: int, batch_id: int | None, paint: PaintUpdater | None = None
 ) -> str | None:
     """Compare what was submitted of a group; where it agrees, the first annotation is taken over.
 
@@ -219,16 +230,16 @@ def compare_submitted(
         required = (
             REQUIRED if batch_id is None else read_required_verdicts(session, batch_id) or REQUIRED
         )
-        known = _stored_agreement(session, group_id, batch_id)
+        known = _find_stored_agreement(session, group_id, batch_id)
     if len(annotations) < max(REQUIRED, required) or (known and known.state != OPEN):
         return None
-    original = solve_and_keep(store, group_id)
+    original = solve_and_store_group(store, group_id)
     with store.read() as session:
         limits = read_limits(session, original.dataset_id)
     found = compare_states(
-        [solve_and_keep(store, annotation.copy_id) for annotation in annotations], limits
+        [solve_and_store_group(store, annotation.copy_id) for annotation in annotations], limits
     )
-    values = _agreement_columns(original, annotations, found)
+    values = _build_agreement_columns(original, annotations, found)
     if not any(pair.disagreements for pair in found.pairs):
         try:
             adopt_and_decide(
@@ -251,7 +262,7 @@ def compare_submitted(
     return OPEN if _open_case(store, annotations, values) else None
 
 
-def compare_uncompared_groups(store: Store, paint: PaintFollower | None = None) -> int:
+def compare_uncompared_groups(store: Store, paint: PaintUpdater | None = None) -> int:
     """Compare what was submitted before a server was stopped, and was not compared any more; and
     take over what waits for that.
 
@@ -265,7 +276,7 @@ def compare_uncompared_groups(store: Store, paint: PaintFollower | None = None) 
     compared = 0
     for group_id, batch_id in left:
         try:
-            compared += compare_submitted(store, group_id, batch_id, paint) is not None
+            compared += compare_submitted_annotations(store, group_id, batch_id, paint) is not None
         except ReviewError as error:
             log.error("annotations could not be compared", group=group_id, error=str(error))
     return compared
@@ -296,7 +307,7 @@ def adopt_and_decide(
     *,
     outcome: str,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     judge: bool = False,
     found: Mapping[str, Any] | None = None,
 ) -> GroupState:
@@ -321,7 +332,7 @@ def adopt_and_decide(
     }
     values["state"] = AGREED if itself else DECIDED
 
-    def done(session: Session) -> None:
+    def record_decision(session: Session) -> None:
         if found is not None:
             put_agreement(session, found)
         dataset = save_adjudication(session, group_id, batch_id or 0, values)
@@ -333,10 +344,12 @@ def adopt_and_decide(
             note = f"as {taken.person} judged it"
             copy_verdict_to_original(session, taken, actor=actor, note=note)
 
-    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=done)
+    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=record_decision)
 
 
-def _stored_agreement(session: Session, group_id: int, batch_id: int | None) -> AgreementRow | None:
+def _find_stored_agreement(
+    session: Session, group_id: int, batch_id: int | None
+) -> AgreementRow | None:
     """What a group came to in a batch, where its annotations were compared already."""
     rows = list_group_agreements(session, group_id)
     return next((row for row in rows if row.batch_id == (batch_id or 0)), None)
@@ -349,7 +362,7 @@ def _open_case(
     group_id, batch_id = values["group_id"], annotations[0].batch_id
     with store.write() as session:
         now_there = list_annotations_of_group(session, group_id)
-        known = _stored_agreement(session, group_id, batch_id)
+        known = _find_stored_agreement(session, group_id, batch_id)
         if any(annotation not in now_there for annotation in annotations) or (
             known and known.state != OPEN
         ):
@@ -381,8 +394,8 @@ def _announce_disagreement(
     )
 
 
-def _agreement_columns(
-    original: GroupState, annotations: Sequence[IndependentAnnotation], found: Comparison
+def _build_agreement_columns(
+    original: GroupState, annotations: Sequence[IndependentAnnotation], found: AnnotationsComparison
 ) -> dict[str, Any]:
     """What is kept of a comparison, as a row that waits for a decision."""
     pairs = tuple(

@@ -11,9 +11,9 @@ from app.db.json_columns import decompress_json
 from app.db.store import Store
 from app.evaluation.rater_agreement import (
     MEASURES,
+    AgreementCoefficient,
     AgreementLimits,
-    Coefficient,
-    Spread,
+    MedianAndTail,
     cohen_kappa,
     fleiss_kappa,
     krippendorff_alpha,
@@ -23,7 +23,7 @@ from app.features.agreement.queries import AGREED, DECIDED, OPEN, AgreementRow, 
 from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits
 from app.features.datasets.service import dataset_id
 from app.features.solutions.codec import from_json
-from app.formats.csv_text import csv_line
+from app.formats.csv_text import format_csv_line
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class PeopleAgreement:
 
     people: tuple[str, ...]
     groups: int
-    kappa: Coefficient | None
-    spreads: Mapping[str, Spread]
+    kappa: AgreementCoefficient | None
+    spreads: Mapping[str, MedianAndTail]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class GroupAgreement:
     verdicts: tuple[str | None, ...]
     worst: float
     disagreements: int
-    spreads: Mapping[str, Spread]
+    spreads: Mapping[str, MedianAndTail]
     outcome: str | None
     taken: str | None
     decided: str | None
@@ -70,7 +70,7 @@ class GroupAgreement:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class DatasetAgreement:
     """How far people agree in a dataset, or in one batch of it.
 
     Attributes:
@@ -84,7 +84,7 @@ class Agreement:
     open: int
     decided: int
     limits: AgreementLimits
-    alpha: Coefficient
+    alpha: AgreementCoefficient
     overall: PeopleAgreement
     pairs: list[PeopleAgreement]
     groups: list[GroupAgreement]
@@ -106,7 +106,9 @@ class _ComparedGroup:
         return dict(sorted(verdicts.items()))
 
 
-def summarize_agreement(store: Store, dataset: str | int, batch: int | None = None) -> Agreement:
+def summarize_agreement(
+    store: Store, dataset: str | int, batch: int | None = None
+) -> DatasetAgreement:
     """How far people agree in a dataset.
 
     Args:
@@ -128,21 +130,21 @@ def summarize_agreement(store: Store, dataset: str | int, batch: int | None = No
     pairs = [
         found
         for two in combinations(people, 2)
-        if (found := _agreement_of_two(two, read)) is not None
+        if (found := _summarize_pair_agreement(two, read)) is not None
     ]
-    return Agreement(
+    return DatasetAgreement(
         states.count(AGREED),
         states.count(OPEN),
         states.count(DECIDED),
         limits,
         krippendorff_alpha(judged),
-        _agreement_of_all(people, read),
+        _summarize_overall_agreement(people, read),
         sorted(pairs, key=lambda one: (-one.groups, one.people)),
-        [_group_agreement(one) for one in read],
+        [_summarize_group_agreement(one) for one in read],
     )
 
 
-def agreement_to_csv(found: Agreement) -> str:
+def agreement_to_csv(found: DatasetAgreement) -> str:
     """A row for each group, the worst first; text that would be a formula is none."""
     names = [f"{name}_{end}" for name in MEASURES for end in ("median", "tail")]
     head = (
@@ -157,7 +159,7 @@ def agreement_to_csv(found: Agreement) -> str:
         "worst",
     )
     tail = ("outcome", "taken", "decided", "decided_by")
-    lines = [csv_line((*head, *names, *tail))]
+    lines = [format_csv_line((*head, *names, *tail))]
     for one in found.groups:
         numbers = [
             value
@@ -171,11 +173,11 @@ def agreement_to_csv(found: Agreement) -> str:
             *numbers,
             *(one.outcome, one.taken, one.decided, one.decided_by),
         )
-        lines.append(csv_line(values))
+        lines.append(format_csv_line(values))
     return "".join(lines)
 
 
-def _agreement_of_two(
+def _summarize_pair_agreement(
     two: tuple[str, str], read: Sequence[_ComparedGroup]
 ) -> PeopleAgreement | None:
     found = [pair for one in read for pair in one.pairs if tuple(sorted(pair.people)) == two]
@@ -188,7 +190,9 @@ def _agreement_of_two(
     return PeopleAgreement(two, len(found), kappa, measure_spreads(pair.distance for pair in found))
 
 
-def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> PeopleAgreement:
+def _summarize_overall_agreement(
+    people: Sequence[str], read: Sequence[_ComparedGroup]
+) -> PeopleAgreement:
     verdicts = [[value for value in one.verdicts.values() if value is not None] for one in read]
     verdicts = [values for values in verdicts if len(values) > 1]
     equal = len({len(values) for values in verdicts}) == 1
@@ -201,7 +205,7 @@ def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> 
     )
 
 
-def _group_agreement(one: _ComparedGroup) -> GroupAgreement:
+def _summarize_group_agreement(one: _ComparedGroup) -> GroupAgreement:
     row = one.row
     people: dict[int, str] = defaultdict(str)
     for pair in one.pairs:

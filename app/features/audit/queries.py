@@ -81,10 +81,10 @@ def list_audit_rows(
         .limit(limit)
     )
     rows: Sequence[Any] = session.execute(statement).all()
-    return [_audit_row(row) for row in rows]
+    return [_build_audit_row(row) for row in rows]
 
 
-def _audit_row(row: Any) -> AuditRow:
+def _build_audit_row(row: Any) -> AuditRow:
     values = dict(row._mapping)
     key = values.pop("key")
     return AuditRow(**{**values, "label": row.label or key, "body": decompress_json(row.body)})

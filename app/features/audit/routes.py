@@ -17,12 +17,12 @@ from app.features.audit.queries import AuditQuery
 from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.formats.csv_text import csv_line
+from app.formats.csv_text import format_csv_line
 from app.http.access import get_current_login
 from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
 from app.http.documents import ListDocument, encode_document
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
 from app.json_text import MAX_ID
@@ -47,13 +47,13 @@ class AuditDocument(ListDocument[AuditEntry]):
     )
 
 
-async def led_datasets_of_request(request: Request) -> Visibility:
+async def find_led_datasets_of_request(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
     login = get_current_login(request.scope)
     return EVERYTHING if login is None else login.roles.led_datasets()
 
 
-Led = Annotated[Visibility, Depends(led_datasets_of_request)]
+Led = Annotated[Visibility, Depends(find_led_datasets_of_request)]
 
 
 def parse_audit_query(
@@ -77,12 +77,12 @@ def parse_audit_query(
         group,
         person or None,
         None if family is None else KINDS[family],
-        _time_text(since),
-        _time_text(until),
+        _format_time(since),
+        _format_time(until),
     )
 
 
-def _time_text(at: datetime | None) -> str | None:
+def _format_time(at: datetime | None) -> str | None:
     if at is None:
         return None
     try:
@@ -96,7 +96,7 @@ Asked = Annotated[AuditQuery, Depends(parse_audit_query)]
 
 
 @router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
-@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=RoleScope.SOMEWHERE)
 def get_audit(
     store: AppStore,
     led: Led,
@@ -130,7 +130,7 @@ def get_audit(
         200: {"content": {"text/csv": {}, "application/x-ndjson": {}}, "description": "The file."},
     },
 )
-@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=RoleScope.SOMEWHERE)
 def export_audit(
     ending: Literal["csv", "jsonl"], store: AppStore, led: Led, query: Asked, search: Search = ""
 ) -> StreamingResponse:
@@ -143,9 +143,9 @@ def export_audit(
 
 
 def _csv_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
-    yield csv_line(COLUMNS)
+    yield format_csv_line(COLUMNS)
     for entry in found:
-        yield csv_line(getattr(entry, name) for name in COLUMNS)
+        yield format_csv_line(getattr(entry, name) for name in COLUMNS)
 
 
 def _json_lines(found: Iterator[AuditEntry]) -> Iterator[str]:

@@ -197,7 +197,7 @@ def read_audit(
         while looked < MOST_LOOKED_AT:
             rows = list_audit_rows(session, query, visibility, before, batch)
             for row in rows:
-                entry = _audit_entry(row)
+                entry = _build_audit_entry(row)
                 if _contains_words(entry, words):
                     if len(found) == limit:
                         return AuditPage(found, before)
@@ -224,16 +224,16 @@ def iterate_audit_entries(
     The first page is read at once: a question that cannot be asked is refused before anything is sent.
     """
 
-    def page_after(before: int | None) -> AuditPage:
+    def read_page_after(before: int | None) -> AuditPage:
         return read_audit(store, query, visibility, search=search, before=before, limit=_BATCH)
 
-    def entries(page: AuditPage) -> Iterator[AuditEntry]:
+    def iterate_entries(page: AuditPage) -> Iterator[AuditEntry]:
         yield from page.items
         while page.next is not None:
-            page = page_after(page.next)
+            page = read_page_after(page.next)
             yield from page.items
 
-    return entries(page_after(None))
+    return iterate_entries(read_page_after(None))
 
 
 def _contains_words(entry: AuditEntry, words: list[str]) -> bool:
@@ -244,7 +244,7 @@ def _contains_words(entry: AuditEntry, words: list[str]) -> bool:
     return all(word in text for word in words)
 
 
-def _audit_entry(row: AuditRow) -> AuditEntry:
+def _build_audit_entry(row: AuditRow) -> AuditEntry:
     body = row.body if isinstance(row.body, dict) else {}
     network = body.get("address") if row.kind == "person" else None
     return AuditEntry(
@@ -253,7 +253,7 @@ def _audit_entry(row: AuditRow) -> AuditEntry:
         actor=row.actor,
         family=_FAMILIES.get(row.kind, Family.OTHER),
         kind=row.kind,
-        sentence=_SENTENCES.get(row.kind, _plain_sentence)(row, body),
+        sentence=_SENTENCES.get(row.kind, _describe_kind)(row, body),
         dataset=row.dataset,
         group_id=row.group_id if row.label is not None else None,
         group=row.label,
@@ -278,18 +278,18 @@ def _page_address(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     return f"/datasets/{row.dataset}{pages.get(row.kind, '')}"
 
 
-def _plain_sentence(row: AuditRow, _body: Mapping[str, Any]) -> str:
+def _describe_kind(row: AuditRow, _body: Mapping[str, Any]) -> str:
     return row.kind.replace("_", " ")
 
 
-def _edit_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_edit(row: AuditRow, body: Mapping[str, Any]) -> str:
     edit = body.get("edit")
     edits = edit if isinstance(edit, dict) else body
     verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
-    return verb + "; ".join(_single_edit_sentence(row, one) for one in iterate_single_edits(edits))
+    return verb + "; ".join(_describe_single_edit(row, one) for one in iterate_single_edits(edits))
 
 
-def _single_edit_sentence(row: AuditRow, edit: Mapping[str, Any]) -> str:
+def _describe_single_edit(row: AuditRow, edit: Mapping[str, Any]) -> str:
     name = str(edit.get("edit", row.kind))
     view = f" of view {edit['view']}" if edit.get("view") else ""
     lines = edit.get("lines")
@@ -301,7 +301,7 @@ def _single_edit_sentence(row: AuditRow, edit: Mapping[str, Any]) -> str:
     return f"{what}{view}{names}"
 
 
-def _dismissal_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = "dismissed the finding" if body.get("dismissed") else "reopened the finding"
     kind = str(body.get("kind")).replace("_", " ")
     place = f" in {body['view']}" if body.get("view") else ""
@@ -309,7 +309,7 @@ def _dismissal_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{did} {kind}{place}{why}"
 
 
-def _verdict_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
     parts = [str(body.get("state"))]
     if body.get("reason"):
         parts.append(f"because of {str(body['reason']).replace('_', ' ')}")
@@ -318,13 +318,13 @@ def _verdict_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return " ".join(parts) + (f": {body['note']}" if body.get("note") else "")
 
 
-def _bulk_verdict_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_bulk_verdict(row: AuditRow, body: Mapping[str, Any]) -> str:
     verb = "undid verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'changed')}"
     count = body.get("changed", body.get("groups"))
     return f"{verb} {plural(count, 'group') if isinstance(count, int) else 'many groups'} at once"
 
 
-def _comment_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = {"said": "commented", "edited": "changed a comment", "deleted": "deleted a comment"}
     did |= {"resolved": "resolved a thread", "reopened": "reopened a thread"}
     verb = did.get(str(body.get("did")), "commented")
@@ -334,7 +334,7 @@ def _comment_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
 _WAYS = {"passkey": " by passkey", "sign_on": " by single sign-on"}
 
 
-def _person_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_person_change(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = "password chosen" if body.get("did") == "password" else body.get("did")
     token = f" “{body['token']}”" if isinstance(body.get("token"), str) else ""
     way = _WAYS.get(str(body.get("way")), "")
@@ -342,11 +342,11 @@ def _person_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{body.get('person')}: {did}{way}{token}{role}"
 
 
-def _job_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_job(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"requested: {body.get('title')}"
 
 
-def _event_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _describe_event(_row: AuditRow, body: Mapping[str, Any]) -> str:
     more = [str(value) for name, value in body.items() if name != "did" and value is not None]
     return f"{body.get('did')}: {', '.join(more)}" if more else str(body.get("did"))
 
@@ -361,7 +361,7 @@ _STARTS = {
 }
 
 
-def _own_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+def _describe_known_work(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
@@ -392,8 +392,8 @@ def _own_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     return sentences.get((row.kind, str(did)))
 
 
-def _work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
-    sentence = _own_work_sentence(row, body)
+def _describe_work(row: AuditRow, body: Mapping[str, Any]) -> str:
+    sentence = _describe_known_work(row, body)
     if sentence is not None:
         return sentence
     parts = ("name", "batch", "group", "take", "person")
@@ -401,30 +401,30 @@ def _work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{row.kind} {body.get('did', 'written')}" + (f": {', '.join(about)}" if about else "")
 
 
-def _sentence_with_name(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
-    def sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _make_describer_with_name(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
+    def describe(_row: AuditRow, body: Mapping[str, Any]) -> str:
         return f"{verb} {body['name']}" if isinstance(body.get("name"), str) else verb
 
-    return sentence
+    return describe
 
 
 _SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
-    **dict.fromkeys(KINDS[Family.EDIT], _edit_sentence),
-    **dict.fromkeys(KINDS[Family.WORK], _work_sentence),
-    "verdict": _verdict_sentence,
-    "dismissal": _dismissal_sentence,
-    "verdict_batch": _bulk_verdict_sentence,
-    "verdict_batch_undo": _bulk_verdict_sentence,
-    "comment": _comment_sentence,
-    "person": _person_sentence,
-    "job": _job_sentence,
-    "deed": _event_sentence,
-    "policy": _sentence_with_name("set the policy"),
-    "freeze": _sentence_with_name("froze the version"),
-    "dataset": _sentence_with_name("made the dataset"),
-    "dataset_deleted": _sentence_with_name("deleted the dataset"),
-    "import": _sentence_with_name("imported"),
-    "station": _sentence_with_name("imported a static camera"),
-    "camera": _sentence_with_name("imported a camera"),
-    "spare": _sentence_with_name("imported frames without a ball"),
+    **dict.fromkeys(KINDS[Family.EDIT], _describe_edit),
+    **dict.fromkeys(KINDS[Family.WORK], _describe_work),
+    "verdict": _describe_verdict,
+    "dismissal": _describe_dismissal,
+    "verdict_batch": _describe_bulk_verdict,
+    "verdict_batch_undo": _describe_bulk_verdict,
+    "comment": _describe_comment,
+    "person": _describe_person_change,
+    "job": _describe_job,
+    "deed": _describe_event,
+    "policy": _make_describer_with_name("set the policy"),
+    "freeze": _make_describer_with_name("froze the version"),
+    "dataset": _make_describer_with_name("made the dataset"),
+    "dataset_deleted": _make_describer_with_name("deleted the dataset"),
+    "import": _make_describer_with_name("imported"),
+    "station": _make_describer_with_name("imported a static camera"),
+    "camera": _make_describer_with_name("imported a camera"),
+    "spare": _make_describer_with_name("imported frames without a ball"),
 }

@@ -32,8 +32,8 @@ def list_(dataset: Dataset, json_: Json = False) -> None:
         from app.features.batches.service import list_batches
 
         with open_store() as store:
-            found = [_batch_values(batch) for batch in list_batches(store, dataset)]
-    print_rows(found, json_, lambda value: value, _format_value)
+            found = [_batch_to_json(batch) for batch in list_batches(store, dataset)]
+    print_rows(found, json_, lambda value: value, _format_batch)
 
 
 @commands.command()
@@ -84,7 +84,7 @@ def give(
     with open_store() as store:
         new = NewBatch(query=query, due=day, **fields)
         print_values(
-            _batch_values(make_batch(store, dataset, new, actor=get_current_actor())), json_
+            _batch_to_json(make_batch(store, dataset, new, actor=get_current_actor())), json_
         )
 
 
@@ -93,15 +93,15 @@ def show(batch: Number, json_: Json = False) -> None:
     """Show how far a batch is."""
     server = get_current_server()
     if server is not None:
-        from app.terminal.remote import read_batch
+        from app.terminal.remote import fetch_batch
 
         with connect_to_server(server) as client:
-            print_values(read_batch(client, batch), json_)
+            print_values(fetch_batch(client, batch), json_)
         return
     from app.features.batches.service import get_batch
 
     with open_store() as store:
-        print_values(_batch_values(get_batch(store, batch)), json_)
+        print_values(_batch_to_json(get_batch(store, batch)), json_)
 
 
 @commands.command()
@@ -165,7 +165,7 @@ def change(
         found = change_batch(
             store, batch, actor=get_current_actor(), gold_every=gold_every, no_gold=no_gold
         )
-    print_values(_batch_values(found), json_)
+    print_values(_batch_to_json(found), json_)
 
 
 @commands.command()
@@ -183,16 +183,16 @@ def close(batch: Number, json_: Json = False) -> None:
 
     with open_store() as store:
         print_values(
-            _batch_values(change_batch(store, batch, actor=get_current_actor(), state=CLOSED)),
+            _batch_to_json(change_batch(store, batch, actor=get_current_actor(), state=CLOSED)),
             json_,
         )
 
 
-def _batch_values(batch: Any) -> dict[str, Any]:
+def _batch_to_json(batch: Any) -> dict[str, Any]:
     return {name: getattr(batch, name) for name in BATCH}
 
 
-def _format_value(value: dict[str, Any]) -> str:
+def _format_batch(value: dict[str, Any]) -> str:
     people = ", ".join([*value["annotators"], *value["reviewers"]]) or "everybody"
     due = "" if value["due"] is None else f"   due {value['due']}"
     return (

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 
 from sqlalchemy import bindparam, delete, exists, select, update
 
-from app.db.dialects.dialect import select_bound_numbers
+from app.db.dialects.dialect import select_from_number_parameter
 from app.db.session import Session
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
@@ -19,7 +19,7 @@ _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
 _TELLS = exists().where(WebhookModel.dataset_id == _BATCH.c.dataset_id, WebhookModel.off.is_(None))
 """Somebody wants to know what becomes of a batch."""
 # What every verdict asks is put together once: that takes longer than to answer it.
-_GIVEN = BatchGroupModel.group_id.in_(select_bound_numbers("ids"))
+_GIVEN = BatchGroupModel.group_id.in_(select_from_number_parameter("ids"))
 _IN_BATCH = exists().where(BatchGroupModel.batch_id == _BATCH.c.id, _GIVEN)
 _TOUCHED = select(
     _BATCH.c.id, (_TELLS & _IN_BATCH.where(BatchGroupModel.settled.is_(None))).label("is_near")
@@ -33,7 +33,7 @@ _SETTLE = (
     .values(settled=bindparam("over"))
 )
 _CLOSE = delete(LeaseModel).where(
-    LeaseModel.group_id.in_(select_bound_numbers("ids")), LeaseModel.batch_id.in_(_SINGLE)
+    LeaseModel.group_id.in_(select_from_number_parameter("ids")), LeaseModel.batch_id.in_(_SINGLE)
 )
 
 
@@ -61,7 +61,7 @@ def complete_judged_groups(
         if settled is not None:
             session.execute(_CLOSE, given)
             near = [row.id for row in touched if row.is_near]
-            _announce_done(session, near, actor=actor, at=at)
+            _announce_finished_batches(session, near, actor=actor, at=at)
 
 
 def complete_group_in_batch(
@@ -73,10 +73,12 @@ def complete_group_in_batch(
     nearly_done = select(_BATCH.c.id).where(_BATCH.c.id == batch_id, _TELLS, exists().where(*waits))
     near = list(session.scalars(nearly_done))
     session.execute(update(BatchGroupModel).where(*waits).values(settled=at))
-    _announce_done(session, near, actor=actor, at=at)
+    _announce_finished_batches(session, near, actor=actor, at=at)
 
 
-def _announce_done(session: Session, batch_ids: Collection[int], *, actor: str, at: str) -> None:
+def _announce_finished_batches(
+    session: Session, batch_ids: Collection[int], *, actor: str, at: str
+) -> None:
     """Tell of those of some batches in which no group waits any more."""
     if not batch_ids:
         return

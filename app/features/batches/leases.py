@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from app.db.log import NewLogEntry, append_entries
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, HeldGroupError, NotFoundError
 from app.features.batches.own_annotations import (
@@ -37,8 +37,8 @@ from app.features.batches.queries import (
 from app.features.batches.service import WORK, Batch, Part, Presence, read_batch
 from app.features.independent_annotations.adopt import log_return, strip_and_check_reason
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.service import ReturnedGroup, read_returned
-from app.features.people.visibility_queries import is_blind
+from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
+from app.features.people.visibility_queries import has_hidden_groups
 
 LASTS = timedelta(minutes=3)
 """A lease whose page says nothing ends after this."""
@@ -97,7 +97,7 @@ class Lease:
     of: int | None = None
 
 
-class Leases:
+class LeaseService:
     """Everything that is asked of leases.
 
     Args:
@@ -121,30 +121,30 @@ class Leases:
             ConflictError: It is given to others, or closed.
         """
         with self._store.write(lasting=False) as session:
-            batch = _open_batch(session, batch_id)
+            batch = _read_open_batch(session, batch_id)
             if not makes_own_annotations(batch, worker.parts(batch)):
-                return self._next(session, batch, worker, after)
+                return self._lease_next_shared_group(session, batch, worker, after)
             back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
                 row = _require_batch_group(session, batch, mine)
-                return self._renewed(session, batch, row, Part.ANNOTATOR, worker)
+                return self._renew_lease(session, batch, row, Part.ANNOTATOR, worker)
         annotation = begin_next_own_annotation(self._store, batch, worker.name)
         if annotation is None:
             return Lease(batch, None, Part.ANNOTATOR)
         with self._store.read() as session:
-            return _copy_lease(session, batch, annotation, worker)
+            return _make_lease_of_copy(session, batch, annotation, worker)
 
-    def _next(
+    def _lease_next_shared_group(
         self, session: Session, batch: Batch, worker: BatchMember, after: int | None
     ) -> Lease:
-        at = self._now()
+        at = self._current_time_text()
         delete_ended_leases(session, at)
         found = find_next_open_group(session, batch, worker, at, after=after)
         if found is None:
             return Lease(batch, None)
         row, part = found
-        return self._renewed(session, batch, row, part, worker)
+        return self._renew_lease(session, batch, row, part, worker)
 
     def take(
         self, batch_id: int, group: int, worker: BatchMember, *, take_over: bool = False
@@ -163,18 +163,18 @@ class Leases:
             ConflictError: The batch is closed or given to others.
         """
         with self._store.write(lasting=False) as session:
-            batch = _open_batch(session, batch_id)
+            batch = _read_open_batch(session, batch_id)
             own = find_own_annotation(session, batch, group, worker.name)
             if own is not None:
-                return _copy_lease(session, batch, own, worker)
-            _require_given(session, batch, group, worker)
-            parts, row = _need_parts(batch, worker), _require_batch_group(session, batch, group)
-            others = _blocking_leases(session, batch, group, worker, self._now())
+                return _make_lease_of_copy(session, batch, own, worker)
+            _require_group_access(session, batch, group, worker)
+            parts, row = _require_parts(batch, worker), _require_batch_group(session, batch, group)
+            others = _list_blocking_leases(session, batch, group, worker, self._current_time_text())
             if others and not take_over:
-                here = _read_presences(session, batch, group, self._now())
+                here = _read_presences(session, batch, group, self._current_time_text())
                 raise HeldGroupError(f"{others[0].person} has this group open", here)
             end_leases(session, [row.id for row in others])
-            return self._renewed(session, batch, row, _choose_part(parts, row), worker)
+            return self._renew_lease(session, batch, row, _choose_part(parts, row), worker)
 
     def give_back(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """End a lease; it does not matter whether there is one.
@@ -185,7 +185,9 @@ class Leases:
         with self._store.write(lasting=False) as session:
             batch = hide_others_progress(session, read_batch(session, batch_id, with_here=False))
             end_person_lease(session, batch_id, group, worker.name)
-            return Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
+            return Lease(
+                batch, group, here=_read_presences(session, batch, group, self._current_time_text())
+            )
 
     def submit(
         self, batch_id: int, group: int, worker: BatchMember, *, actor: str, done: bool = True
@@ -198,7 +200,7 @@ class Leases:
                 batch is closed.
         """
         with self._store.read() as session:
-            batch = _open_batch(session, batch_id)
+            batch = _read_open_batch(session, batch_id)
             own = find_own_annotation(session, batch, group, worker.name)
         if own is not None:
             lease = Lease(batch, group)
@@ -207,8 +209,8 @@ class Leases:
                 session.respond(lease)
             return lease
         with self._store.write() as session:
-            batch = _open_batch(session, batch_id)
-            _require_given(session, batch, group, worker)
+            batch = _read_open_batch(session, batch_id)
+            _require_group_access(session, batch, group, worker)
             row = _require_batch_group(session, batch, group)
             if Part.ANNOTATOR not in worker.parts(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
@@ -219,12 +221,16 @@ class Leases:
                     f"{by} has submitted this group", hint="Continue with the next group."
                 )
             mark_submitted(
-                session, batch_id, group, at=self._now() if done else None, by=worker.name
+                session,
+                batch_id,
+                group,
+                at=self._current_time_text() if done else None,
+                by=worker.name,
             )
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
-            append_entries(session, [NewLogEntry(WORK, actor, self._now(), body)])
-            return self._ended_lease(session, batch_id, group, worker)
+            append_entries(session, [NewLogEntry(WORK, actor, self._current_time_text(), body)])
+            return self._end_lease(session, batch_id, group, worker)
 
     def return_group(
         self, batch_id: int, group: int, worker: BatchMember, reason: str = "", *, actor: str
@@ -238,7 +244,7 @@ class Leases:
         """
         checked = strip_and_check_reason(reason)
         with self._store.write() as session:
-            batch = _open_batch(session, batch_id)
+            batch = _read_open_batch(session, batch_id)
             row = _require_batch_group(session, batch, group)
             if row.settled is not None:
                 raise ConflictError(
@@ -249,35 +255,35 @@ class Leases:
             person = row.submitted_by
             mark_submitted(session, batch_id, group, at=None, by=person, returned=True)
             log_return(session, WORK, group, person, checked, actor=actor, batch=batch_id)
-            return self._ended_lease(session, batch_id, group, worker)
+            return self._end_lease(session, batch_id, group, worker)
 
-    def _ended_lease(
-        self, session: Session, batch_id: int, group: int, worker: BatchMember
-    ) -> Lease:
+    def _end_lease(self, session: Session, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """The response once somebody's lease has ended with what they said of the group."""
         end_person_lease(session, batch_id, group, worker.name)
         batch = hide_others_progress(session, read_batch(session, batch_id))
-        lease = Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
+        lease = Lease(
+            batch, group, here=_read_presences(session, batch, group, self._current_time_text())
+        )
         session.respond(lease)
         return lease
 
-    def _renewed(
+    def _renew_lease(
         self, session: Session, batch: Batch, row: WaitingGroup, part: Part, worker: BatchMember
     ) -> Lease:
         at, group = self._clock(), row.group_id
-        until = text_of(at + LASTS)
-        save_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
-        here = _read_presences(session, batch, group, text_of(at))
+        until = format_utc_time(at + LASTS)
+        save_lease(session, batch.id, group, worker.name, at=format_utc_time(at), until=until)
+        here = _read_presences(session, batch, group, format_utc_time(at))
         if row.submitted_by is None:
             return Lease(batch, group, part, until, here)
         if row.submitted is not None:
             return Lease(batch, group, part, until, here, row.submitted_by)
         # Who submitted it has it back; their name stays with it.
-        back = read_returned(session, [group]).get(group)
+        back = read_returned_groups(session, [group]).get(group)
         return Lease(batch, group, part, until, here, returned=back)
 
-    def _now(self) -> str:
-        return text_of(self._clock())
+    def _current_time_text(self) -> str:
+        return format_utc_time(self._clock())
 
 
 def find_next_open_group(
@@ -303,7 +309,7 @@ def find_next_open_group(
     Raises:
         ConflictError: The batch is given to others.
     """
-    parts = _need_parts(batch, worker)
+    parts = _require_parts(batch, worker)
     row = None if after is None else find_batch_group(session, batch.id, after)
     place = 0 if row is None else int(row.place)
     for part in (Part.ANNOTATOR, Part.REVIEWER):
@@ -319,7 +325,7 @@ def find_next_open_group(
     return None
 
 
-def _copy_lease(
+def _make_lease_of_copy(
     session: Session, batch: Batch, annotation: IndependentAnnotation, worker: BatchMember
 ) -> Lease:
     """Of a copy, which nobody else can have open."""
@@ -327,7 +333,7 @@ def _copy_lease(
     return Lease(batch, annotation.copy_id, Part.ANNOTATOR, place=annotation.place, of=of)
 
 
-def _blocking_leases(
+def _list_blocking_leases(
     session: Session, batch: Batch, group: int, worker: BatchMember, at: str
 ) -> list[Any]:
     """The leases of others that stand in somebody's way; none where each has a copy of their own."""
@@ -344,14 +350,14 @@ def _read_presences(session: Session, batch: Batch, group: int, at: str) -> tupl
     )
 
 
-def _open_batch(session: Session, batch_id: int) -> Batch:
+def _read_open_batch(session: Session, batch_id: int) -> Batch:
     batch = read_batch(session, batch_id, with_here=False)
     if not batch.is_open:
         raise ConflictError(f'the batch "{batch.name}" is closed')
     return hide_others_progress(session, batch)
 
 
-def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
+def _require_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     parts = worker.parts(batch)
     if not parts:
         raise ConflictError(
@@ -368,24 +374,26 @@ def _choose_part(parts: set[Part], row: WaitingGroup) -> Part:
     return Part.REVIEWER
 
 
-def _require_given(session: Session, batch: Batch, group: int, worker: BatchMember) -> None:
+def _require_group_access(session: Session, batch: Batch, group: int, worker: BatchMember) -> None:
     """Who works on copies that tell nothing of their originals does not open these by the batch.
 
     Raises:
         NotFoundError: As of a group that is not in it.
     """
-    if not is_blind(batch.dataset_id) or not makes_own_annotations(batch, worker.parts(batch)):
+    if not has_hidden_groups(batch.dataset_id) or not makes_own_annotations(
+        batch, worker.parts(batch)
+    ):
         return
     if group not in list_returned_groups(session, batch, worker.name):
-        raise _no_group(batch, group)
+        raise _make_group_not_found_error(batch, group)
 
 
-def _no_group(batch: Batch, group: int) -> NotFoundError:
+def _make_group_not_found_error(batch: Batch, group: int) -> NotFoundError:
     return NotFoundError(f'the batch "{batch.name}" has no group {group}')
 
 
 def _require_batch_group(session: Session, batch: Batch, group: int) -> Any:
     row = find_batch_group(session, batch.id, group)
     if row is None:
-        raise _no_group(batch, group)
+        raise _make_group_not_found_error(batch, group)
     return row

@@ -10,12 +10,12 @@ from dataclasses import replace
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.batches.queries import list_returned_rows, read_batch_groups
+from app.features.batches.queries import list_returned_batch_groups, read_batch_groups
 from app.features.batches.queries import mark_submitted as hand_in_group
 from app.features.batches.service import Batch, Part, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
-    BatchTerms,
+    BatchAnnotationTerms,
     begin_next_annotation,
     count_gold_left,
     list_unseen_gold_outside_batches,
@@ -24,7 +24,7 @@ from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
     count_groups_left,
-    find_independent_annotation_row,
+    find_annotation_of_copy,
     list_annotations_of_batch,
 )
 from app.features.independent_annotations.service import read_annotation
@@ -34,7 +34,7 @@ from app.features.independent_annotations.submission_queries import (
 )
 from app.features.people.visibility_queries import READER, sees_all_work
 from app.features.queue.fields import query_reveals_hidden_work
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 OVER = ("accepted", "rejected")
 """Verdicts after which a group waits for nobody."""
@@ -57,7 +57,7 @@ def begin_next_own_annotation(
     adopt_submitted_annotations(store, batch, person)
     with store.read() as session:
         groups = _list_waiting_groups(session, batch)
-    terms = BatchTerms(
+    terms = BatchAnnotationTerms(
         batch.id,
         batch.dataset_id,
         groups,
@@ -71,13 +71,16 @@ def begin_next_own_annotation(
 
 def list_returned_groups(session: Session, batch: Batch, person: str) -> list[int]:
     """Groups whose annotation somebody submitted, was taken over, and was returned to them."""
-    return [row.group_id for row in list_returned_rows(session, [batch.id], person_of(person))]
+    return [
+        row.group_id
+        for row in list_returned_batch_groups(session, [batch.id], person_of_actor(person))
+    ]
 
 
 def count_own_groups_left(session: Session, batch: Batch, person: str) -> int:
     """Of how many groups somebody may still make an annotation of their own, begun ones and those
     that they have back included."""
-    name = person_of(person)
+    name = person_of_actor(person)
     begun, free = count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
     left = begun + free + len(list_returned_groups(session, batch, person))
     if batch.gold_every is None:
@@ -103,13 +106,13 @@ def hide_others_progress(session: Session, batch: Batch) -> Batch:
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
         return batch
-    return replace(with_own_counts(session, batch, reader.person), query="")
+    return replace(replace_with_own_counts(session, batch, reader.person), query="")
 
 
-def with_own_counts(session: Session, batch: Batch, person: str) -> Batch:
+def replace_with_own_counts(session: Session, batch: Batch, person: str) -> Batch:
     """A batch with the counts of somebody's own annotations: what they submitted is done."""
     annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
-    name = person_of(person)
+    name = person_of_actor(person)
     back = set(list_returned_groups(session, batch, person))
     done = [
         annotation.submitted
@@ -156,7 +159,7 @@ def count_own_groups(session: Session, batch: Batch, person: str) -> int | None:
     """
     if batch.gold_every is not None:
         return None
-    name = person_of(person)
+    name = person_of_actor(person)
     annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     done = len([row for row in annotations if row.person == name and row.submitted is not None])
     return done + sum(count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
@@ -173,25 +176,25 @@ def adopt_submitted_annotations(store: Store, batch: Batch, person: str) -> None
         ready = [
             row
             for row in list_annotations_of_batch(session, batch.id, batch.dataset_id)
-            if row.person == person_of(person)
+            if row.person == person_of_actor(person)
             and (row.kind, row.settled) == (INDEPENDENT, None)
             and row.submitted is not None
         ]
     for row in ready:
         waits = batch.annotators and row.verdict not in OVER
 
-        def note(session: Session, group: int = row.group_id) -> None:
-            hand_in_group(session, batch.id, group, at=now(), by=person_of(person))
+        def mark_group_submitted(session: Session, group: int = row.group_id) -> None:
+            hand_in_group(session, batch.id, group, at=now(), by=person_of_actor(person))
 
-        adopt_annotation(store, row.id, actor=person, also=note if waits else None)
+        adopt_annotation(store, row.id, actor=person, also=mark_group_submitted if waits else None)
 
 
 def find_own_annotation(
     session: Session, batch: Batch, group: int, person: str
 ) -> IndependentAnnotation | None:
     """The own annotation of a person in a batch whose copy a group is; None: it is none."""
-    row = find_independent_annotation_row(session, group)
-    if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
+    row = find_annotation_of_copy(session, group)
+    if row is None or (row.batch_id, row.person) != (batch.id, person_of_actor(person)):
         return None
     return read_annotation(session, row.id)
 

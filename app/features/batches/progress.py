@@ -10,20 +10,20 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Any
 
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.features.batches.leases import BatchMember
 from app.features.batches.own_annotations import (
     count_own_groups_left,
     hide_others_progress,
     makes_own_annotations,
-    with_own_counts,
+    replace_with_own_counts,
 )
 from app.features.batches.queries import (
     NumberedBatchGroup,
     find_last_work_time,
     list_datasets_with_open_batches,
-    list_returned_rows,
+    list_returned_batch_groups,
     list_unfinished_batches,
     list_work_entries,
     read_batch_groups,
@@ -34,16 +34,16 @@ from app.features.independent_annotations.queries import (
     list_annotations_of_batch,
     list_open_annotations,
 )
-from app.features.independent_annotations.service import ReturnedGroup, read_returned
+from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.webhooks.queries import (
     STALLED,
     list_active_webhooks,
-    list_listeners,
+    list_subscribed_webhooks,
     make_time_suffix,
     queue_webhook_messages,
 )
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 BY_ITSELF = "script:batches"
 """Who tells of it."""
@@ -95,7 +95,9 @@ def notify_of_stalled_batches(store: Store, at: datetime) -> int:
     """Tell webhooks of the batches that have stalled, of each stall once; returns how many messages."""
     with store.read() as session:
         wanted = {row.dataset_id for row in list_active_webhooks(session)}
-        datasets = [one for one in sorted(wanted) if list_listeners(session, one, STALLED)]
+        datasets = [
+            one for one in sorted(wanted) if list_subscribed_webhooks(session, one, STALLED)
+        ]
         found = _find_stalled_groups(session, datasets, at, store.settings.stalled_hours)
     if not found:
         return 0
@@ -120,7 +122,7 @@ def _notify_of_stall(session: Session, batch: Batch, stall: BatchStall, at: date
         STALLED,
         event,
         actor=BY_ITSELF,
-        at=text_of(at),
+        at=format_utc_time(at),
         batch_id=batch.id,
         also=details,
     )
@@ -133,7 +135,7 @@ PAUSE = timedelta(minutes=10)
 @dataclass(frozen=True)
 class MyBatch:
     """A batch of somebody's: ``left`` groups wait for them or for others beside them, and
-    ``returned`` are those that they had submitted and have back."""
+    ``invalidate_stale_connection`` are those that they had submitted and have back."""
 
     batch: Batch
     parts: list[Part]
@@ -142,7 +144,7 @@ class MyBatch:
 
 
 @dataclass(frozen=True)
-class Pace:
+class WorkPace:
     """What somebody has done in a batch.
 
     Attributes:
@@ -173,7 +175,7 @@ class TeamBatch:
 
     batch: Batch
     stalled: str | None
-    people: list[Pace] = field(default_factory=list)
+    people: list[WorkPace] = field(default_factory=list)
 
 
 def list_own_batches(
@@ -197,22 +199,22 @@ def list_own_batches(
                 left = (
                     count_own_groups_left(session, batch, worker.name)
                     if own
-                    else _count_left(batch, parts)
+                    else _count_groups_left(batch, parts)
                 )
-                back = _returned_groups(session, batch, worker.name)
-                seen = with_own_counts(session, batch, worker.name) if own else batch
+                back = _list_returned_groups(session, batch, worker.name)
+                seen = replace_with_own_counts(session, batch, worker.name) if own else batch
                 found.append(
                     MyBatch(hide_others_progress(session, seen), sorted(parts), left, back)
                 )
         return found
 
 
-def _returned_groups(session: Session, batch: Batch, name: str) -> list[ReturnedGroup]:
+def _list_returned_groups(session: Session, batch: Batch, name: str) -> list[ReturnedGroup]:
     """What of a batch somebody has back, in its order."""
-    person = person_of(name)
-    waiting = [row.group_id for row in list_returned_rows(session, [batch.id], person)]
+    person = person_of_actor(name)
+    waiting = [row.group_id for row in list_returned_batch_groups(session, [batch.id], person)]
     waiting += [copy.group_id for copy in list_open_annotations(session, [batch.id], person)]
-    back = read_returned(session, waiting) if waiting else {}
+    back = read_returned_groups(session, waiting) if waiting else {}
     return [back[group] for group in waiting if group in back]
 
 
@@ -224,16 +226,16 @@ def list_team_batches(
     with store.read() as session:
         batches = read_batches(session, [dataset_id(store, dataset)])
         hours = store.settings.stalled_hours
-        return [_team_batch(session, batch, moment, hours) for batch in batches]
+        return [_build_team_batch(session, batch, moment, hours) for batch in batches]
 
 
-def _count_left(batch: Batch, parts: Iterable[Part]) -> int:
+def _count_groups_left(batch: Batch, parts: Iterable[Part]) -> int:
     """Groups that somebody with these parts may still get."""
     left = batch.waiting if Part.ANNOTATOR in parts or not batch.annotators else 0
     return left + (batch.submitted if Part.REVIEWER in parts else 0)
 
 
-def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
+def _build_team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
     stall = find_stall(batch, find_last_activity(session, batch), at, hours)
     since = stall.since if stall is not None and stall.why is StallReason.IDLE else None
     entries = list_work_entries(session, batch.id, batch.created)
@@ -245,7 +247,7 @@ def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> T
 
 def _measure_paces(
     entries: Sequence[Any], groups: Sequence[NumberedBatchGroup], annotations: Sequence[Any]
-) -> list[Pace]:
+) -> list[WorkPace]:
     """What each person did, from the log and from what was submitted; of groups, and of own copies.
 
     What stands in the original under the name of somebody who has a copy was taken over from it: it
@@ -256,7 +258,7 @@ def _measure_paces(
     submitted: dict[str, set[int]] = defaultdict(set)
     taken_over = {(annotation.person, annotation.group_id) for annotation in annotations}
     for row in entries:
-        name = person_of(row.actor)
+        name = person_of_actor(row.actor)
         if (name, row.group_id) in taken_over:
             continue
         times[name].append(row.at)
@@ -280,9 +282,9 @@ def _measure_pace(
     times: Iterable[str],
     judged: Mapping[str, set[int]],
     submitted: Mapping[str, set[int]],
-) -> Pace:
+) -> WorkPace:
     done, given = judged.get(name, set()), submitted.get(name, set())
-    return Pace(
+    return WorkPace(
         name, len(given), len(done), len(done | given), sum_working_time(times).total_seconds() / 60
     )
 

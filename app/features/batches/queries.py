@@ -276,7 +276,7 @@ class BatchGroupRow(NamedTuple):
     group_id: int
 
 
-def list_returned_rows(
+def list_returned_batch_groups(
     session: Session, batch_ids: Collection[int], person: str
 ) -> Sequence[BatchGroupRow]:
     """Groups that were returned to a person and wait for them, in order."""
@@ -323,7 +323,7 @@ def mark_submitted(
 ) -> None:
     """A group of a batch is done by its annotator; ``at`` None: it is not, after all.
 
-    ``returned``: it goes back to them, so that their name stays with it.
+    ``invalidate_stale_connection``: it goes back to them, so that their name stays with it.
     """
     where = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
     values = {"submitted": at, "submitted_by": by if at is not None or returned else None}
@@ -363,27 +363,29 @@ def find_next_waiting_group(
             0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
-    waiting = _waiting_statement(submitted, bool(after))
+    waiting = _build_waiting_group_statement(submitted, bool(after))
     if seen := visible_groups_condition(dataset_id, BatchGroupModel.group_id):
         waiting = waiting.where(*seen)
     return session.row(WaitingGroup, waiting, given)
 
 
 @cache
-def _waiting_statement(submitted: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
+def _build_waiting_group_statement(
+    submitted: bool | None, goes_on: bool
+) -> Select[*tuple[Any, ...]]:
     """Made once for each case: it takes longer to put together than to answer."""
     table = BatchGroupModel
     person: BindParameter[str] = bindparam("person")
     after = bindparam("after", type_=Integer())
     lasts = LeaseModel.until > bindparam("at")
     mine, others = (
-        _leased_condition(LeaseModel.person == person, lasts),
+        _build_lease_condition(LeaseModel.person == person, lasts),
         LeaseModel.person != person,
     )
     where = [
         table.batch_id == bindparam("batch"),
         table.settled.is_(None),
-        ~_leased_condition(others, lasts),
+        ~_build_lease_condition(others, lasts),
     ]
     if submitted is not None:
         where.append(table.submitted.is_not(None) if submitted else table.submitted.is_(None))
@@ -404,7 +406,7 @@ def _waiting_statement(submitted: bool | None, goes_on: bool) -> Select[*tuple[A
     return select(*row).where(*where).order_by(*order, table.place).limit(1)
 
 
-def _leased_condition(*where: ColumnElement[bool]) -> ColumnElement[bool]:
+def _build_lease_condition(*where: ColumnElement[bool]) -> ColumnElement[bool]:
     return exists().where(LeaseModel.group_id == BatchGroupModel.group_id, *where)
 
 
@@ -459,19 +461,21 @@ class WorkEntry(NamedTuple):
 def list_work_entries(session: Session, batch_id: int, since: str) -> Sequence[WorkEntry]:
     """Entries of the log about a batch's groups, and people's own copies of them, since some time, in order."""
     columns = (LogModel.actor, LogModel.at, LogModel.group_id, LogModel.kind)
-    statement = select(*columns).where(*_worked_on_conditions(batch_id), LogModel.at >= since)
+    statement = select(*columns).where(
+        *_build_work_entry_conditions(batch_id), LogModel.at >= since
+    )
     return session.rows(WorkEntry, statement.order_by(LogModel.at))
 
 
 def find_last_work_time(session: Session, batch_id: int) -> str | None:
     """When somebody did something with a group of a batch last, or with a copy of one."""
     last: str | None = session.scalar(
-        select(func.max(LogModel.at)).where(*_worked_on_conditions(batch_id))
+        select(func.max(LogModel.at)).where(*_build_work_entry_conditions(batch_id))
     )
     return last
 
 
-def _worked_on_conditions(batch_id: int) -> tuple[ColumnElement[bool], ...]:
+def _build_work_entry_conditions(batch_id: int) -> tuple[ColumnElement[bool], ...]:
     mine = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id == batch_id)
     copies = select(IndependentAnnotationModel.copy_id).where(
         IndependentAnnotationModel.batch_id == batch_id
@@ -484,7 +488,7 @@ def select_groups_in_batches(batch_ids: Collection[int]) -> Select[int]:
     return select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(batch_ids))
 
 
-def batch_place_column(batch_id: int) -> ColumnElement[Any]:
+def select_place_in_batch(batch_id: int) -> ColumnElement[Any]:
     """The place of a row of the queue in a batch; NULL where it is in none of it."""
     return (
         select(BatchGroupModel.place)

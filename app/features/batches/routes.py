@@ -13,8 +13,8 @@ from app.db.store import Store
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches import own_annotations, progress
 from app.features.batches import service as batches
-from app.features.batches.leases import BatchMember, Lease, Leases
-from app.features.batches.progress import Pace
+from app.features.batches.leases import BatchMember, Lease, LeaseService
+from app.features.batches.progress import WorkPace
 from app.features.batches.service import (
     MOST_GROUPS,
     MOST_VERDICTS,
@@ -37,12 +37,12 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, S
 from app.http.documents import (
     Document,
     ListDocument,
-    document,
+    make_document_responder,
+    make_document_response,
     make_empty_response,
     respond_with,
-    respond_with_document,
 )
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import PresenceDocument, responses
 from app.http.route import Route
 from app.json_text import MAX_ID
@@ -210,7 +210,7 @@ class MyWork(ListDocument[MyBatchDocument]):
     """Open batches that are one's own, those that are due first, first."""
 
 
-class PaceDocument(Document, shows=Pace):
+class PaceDocument(Document, shows=WorkPace):
     """What somebody has done in a batch."""
 
     groups: int = Field(description="Handed in or judged, each counted once.")
@@ -245,7 +245,7 @@ router = APIRouter(tags=["work"], route_class=Route)
 
 
 @dataclass(frozen=True)
-class BatchMembers:
+class BatchMemberResolver:
     """Who asks, and what they may in a dataset; on a server without accounts there is no ``login``."""
 
     login: Login | None
@@ -258,16 +258,16 @@ class BatchMembers:
         annotates, reviews = (role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
         return BatchMember(self.login.name, annotates, reviews)
 
-    def of_batch(self, store: Store, batch: int) -> BatchMember:
+    def member_of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""
         return self.here(batches.find_dataset_of_batch(store, batch))
 
 
-async def _batch_workers(request: Request) -> BatchMembers:
-    return BatchMembers(get_current_login(request.scope))
+async def _get_batch_members(request: Request) -> BatchMemberResolver:
+    return BatchMemberResolver(get_current_login(request.scope))
 
 
-Members = Annotated[BatchMembers, Depends(_batch_workers)]
+Members = Annotated[BatchMemberResolver, Depends(_get_batch_members)]
 
 
 def _announce_lease(services: Services, lease: Lease) -> Lease:
@@ -277,7 +277,7 @@ def _announce_lease(services: Services, lease: Lease) -> Lease:
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
@@ -298,7 +298,7 @@ def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
 
 def _created_response(batch: Batch) -> Response:
     headers = {"Location": f"/api/v1/batches/{batch.id}"}
-    return document(WorkBatchDocument.model_validate(batch), 201, headers)
+    return make_document_response(WorkBatchDocument.model_validate(batch), 201, headers)
 
 
 @router.post(
@@ -353,7 +353,7 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, batch=OwnedKind.WORK)
-@respond_with(respond_with_document(WorkBatchDocument.model_validate))
+@respond_with(make_document_responder(WorkBatchDocument.model_validate))
 def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
     """Give a batch on to others, close it, or name it otherwise."""
     values = change.model_dump(exclude_unset=True)
@@ -391,8 +391,10 @@ def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members
 
     The lease lasts three minutes, and three more each time that it is taken again.
     """
-    worker = members.of_batch(services.store, batch)
-    return _announce_lease(services, Leases(services.store).next(batch, worker, after=origin.after))
+    worker = members.member_of_batch(services.store, batch)
+    return _announce_lease(
+        services, LeaseService(services.store).next(batch, worker, after=origin.after)
+    )
 
 
 @router.put(
@@ -406,8 +408,8 @@ def open_group(
     batch: Id, group: Id, how: LeaseRequest, services: AppServices, members: Members
 ) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
-    worker = members.of_batch(services.store, batch)
-    taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
+    worker = members.member_of_batch(services.store, batch)
+    taken = LeaseService(services.store).take(batch, group, worker, take_over=how.take_over)
     return _announce_lease(services, taken)
 
 
@@ -420,8 +422,8 @@ def open_group(
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
-    worker = members.of_batch(services.store, batch)
-    _announce_lease(services, Leases(services.store).give_back(batch, group, worker))
+    worker = members.member_of_batch(services.store, batch)
+    _announce_lease(services, LeaseService(services.store).give_back(batch, group, worker))
 
 
 @router.put(
@@ -431,7 +433,7 @@ def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> 
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@respond_with(respond_with_document(LeaseDocument.model_validate))
+@respond_with(make_document_responder(LeaseDocument.model_validate))
 def submit_group(
     batch: Id,
     group: Id,
@@ -441,10 +443,10 @@ def submit_group(
     background: BackgroundTasks,
 ) -> Lease:
     """Say that a group is annotated, so that a reviewer gets it."""
-    worker = members.of_batch(services.store, batch)
+    worker = members.member_of_batch(services.store, batch)
     background.add_task(compare_or_adopt_submission, services.store, group, services.paint)
     return _announce_lease(
-        services, Leases(services.store).submit(batch, group, worker, actor=actor)
+        services, LeaseService(services.store).submit(batch, group, worker, actor=actor)
     )
 
 
@@ -455,13 +457,13 @@ def submit_group(
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@respond_with(respond_with_document(LeaseDocument.model_validate))
+@respond_with(make_document_responder(LeaseDocument.model_validate))
 def withdraw_submission(
     batch: Id, group: Id, services: AppServices, actor: Actor, members: Members
 ) -> Lease:
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
-    worker = members.of_batch(services.store, batch)
-    lease = Leases(services.store).submit(batch, group, worker, actor=actor, done=False)
+    worker = members.member_of_batch(services.store, batch)
+    lease = LeaseService(services.store).submit(batch, group, worker, actor=actor, done=False)
     return _announce_lease(services, lease)
 
 
@@ -472,11 +474,11 @@ def withdraw_submission(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, batch=OwnedKind.WORK)
-@respond_with(respond_with_document(LeaseDocument.model_validate))
+@respond_with(make_document_responder(LeaseDocument.model_validate))
 def return_group(
     batch: Id, group: Id, why: ReturnReason, services: AppServices, actor: Actor, members: Members
 ) -> Lease:
     """Give a group back to the annotator who submitted it, and tell them why."""
-    worker = members.of_batch(services.store, batch)
-    lease = Leases(services.store).return_group(batch, group, worker, why.reason, actor=actor)
+    worker = members.member_of_batch(services.store, batch)
+    lease = LeaseService(services.store).return_group(batch, group, worker, why.reason, actor=actor)
     return _announce_lease(services, lease)

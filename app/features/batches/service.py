@@ -38,12 +38,12 @@ from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify_person
 from app.features.people.roles import Action, role_allows
 from app.features.people.service import list_members
-from app.features.queue.queries import Listing
+from app.features.queue.queries import GroupListing
 from app.features.queue.query import MAX_LISTED_LENGTH, Query, parse_query
-from app.features.tracks.queries import list_rows
+from app.features.tracks.queries import list_track_rows
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, queue_batch_messages
 from app.json_text import Moment
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 from app.wording import plural
 
 BatchKind = Literal["groups", "tracks"]
@@ -186,7 +186,7 @@ def get_batch(store: Store, batch_id: int) -> Batch:
 
 def find_dataset_of_batch(store: Store, batch_id: int) -> int:
     """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
-    with store.read_one() as session:
+    with store.read_for_one_statement() as session:
         row = find_batch(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
@@ -219,7 +219,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
     query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
     _check_request(new)
     if new.tracks is not None:
-        _check_tracks(new)
+        _check_track_batch(new)
     number = dataset_id(store, dataset)
     people = {
         Part.ANNOTATOR: _person_ids(store, number, Part.ANNOTATOR, new.annotators),
@@ -230,9 +230,9 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
             raise ConflictError(
                 f"a dataset has at most {MOST_BATCHES} batches", hint="Delete a closed batch first."
             )
-        ids = _choose_ids(session, number, new, query)
+        ids = _find_ids_to_assign(session, number, new, query)
         if new.gold_every is not None:
-            _require_gold(session, number)
+            _require_gold_groups(session, number)
         values = {
             "dataset_id": number,
             "name": new.name.strip(),
@@ -253,22 +253,22 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
             set_batch_people(session, made, part, chosen)
         batch = read_batch(session, made)
         _log_change(session, batch, "made", actor)
-        _notify_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
+        _notify_assigned_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
         queue_batch_messages(session, made, GIVEN_OUT, actor=actor, at=batch.created)
         session.respond(batch)
         return batch
 
 
-def _choose_ids(session: Session, dataset: int, new: NewBatch, query: Query) -> list[int]:
+def _find_ids_to_assign(session: Session, dataset: int, new: NewBatch, query: Query) -> list[int]:
     """Ids of the groups or tracks that are given out."""
     if new.tracks is None:
-        found = Listing(session, dataset, query.conditions).ids(query.order)
+        found = GroupListing(session, dataset, query.conditions).ids(query.order)
         given: Collection[int] = (
             list_groups_in_open_batches(session, dataset) if new.skip_given else set()
         )
     else:
         found = list(dict.fromkeys(new.tracks))
-        known = {row.id for row in list_rows(session, dataset)}
+        known = {row.id for row in list_track_rows(session, dataset)}
         if strange := [one for one in found if one not in known]:
             raise InputError(
                 f"track {strange[0]} does not belong to this dataset", pointer="/tracks"
@@ -303,7 +303,7 @@ def change_batch(
         InputError: Somebody named may not do that part, or gold groups would be too rare.
         ConflictError: The dataset has no gold group to mix in.
     """
-    _check_gold(gold_every)
+    _check_gold_interval(gold_every)
     before = get_batch(store, batch_id)
     values: dict[str, Any] = {}
     if name is not None:
@@ -323,7 +323,7 @@ def change_batch(
     with store.write() as session:
         read_batch(session, batch_id)
         if gold_every not in (None, before.gold_every):
-            _require_gold(session, before.dataset_id)
+            _require_gold_groups(session, before.dataset_id)
         if values:
             update_batch(session, batch_id, values)
         for part, chosen in people.items():
@@ -332,7 +332,7 @@ def change_batch(
         _log_change(session, batch, "closed" if state == CLOSED else "changed", actor)
         known = (*before.annotators, *before.reviewers)
         new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
-        _notify_people(session, batch, new, actor)
+        _notify_assigned_people(session, batch, new, actor)
         if known != (*batch.annotators, *batch.reviewers):
             queue_batch_messages(session, batch_id, HANDED_ON, actor=actor, at=now())
         session.respond(batch)
@@ -357,15 +357,15 @@ def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Ba
     row = find_batch(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
-    return _batches_from_rows(session, [row], with_here)[0]
+    return _build_batches(session, [row], with_here)[0]
 
 
 def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
     """The batches of datasets within a session."""
-    return _batches_from_rows(session, find_dataset_batches(session, dataset_ids))
+    return _build_batches(session, find_dataset_batches(session, dataset_ids))
 
 
-def _batches_from_rows(
+def _build_batches(
     session: Session, rows: Sequence[BatchRow], with_here: bool = True
 ) -> list[Batch]:
     ids = [row.id for row in rows]
@@ -421,10 +421,10 @@ def _check_request(new: NewBatch) -> None:
         raise InputError(
             f"a batch needs 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
         )
-    _check_gold(new.gold_every)
+    _check_gold_interval(new.gold_every)
 
 
-def _check_tracks(new: NewBatch) -> None:
+def _check_track_batch(new: NewBatch) -> None:
     """Tracks are judged, each by one reviewer."""
     if new.annotators:
         raise InputError(
@@ -439,12 +439,12 @@ def _check_tracks(new: NewBatch) -> None:
         )
 
 
-def _check_gold(every: int | None) -> None:
+def _check_gold_interval(every: int | None) -> None:
     if every is not None and not 1 <= every <= RAREST_GOLD:
         raise InputError(f"gold_every must be from 1 to {RAREST_GOLD}", pointer="/gold_every")
 
 
-def _require_gold(session: Session, dataset: int) -> None:
+def _require_gold_groups(session: Session, dataset: int) -> None:
     """Raise ConflictError where a dataset has no gold group to mix in."""
     if not list_gold_heads(session, dataset):
         raise ConflictError(
@@ -474,9 +474,11 @@ def _no_tracks_error(found: Sequence[int]) -> InputError:
     )
 
 
-def _notify_people(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
+def _notify_assigned_people(
+    session: Session, batch: Batch, people: Iterable[str], actor: str
+) -> None:
     """Tell people that work was given to them."""
-    by = person_of(actor)
+    by = person_of_actor(actor)
     due = "" if batch.due is None else f", due {batch.due}"
     # Who is told how many groups it has counts how many gold ones are mixed in.
     groups = "groups" if batch.gold_every is not None else plural(batch.groups, batch.kind[:-1])

@@ -169,7 +169,7 @@ def read_threads(
         where.append(ThreadModel.id == thread_id)
     columns = [item for item in ThreadModel.__table__.columns if item.name != "dataset_id"]
     rows = session.execute(select(*columns).where(*where).order_by(ThreadModel.id)).all()
-    comments = _comments_by_thread(session, [row.id for row in rows])
+    comments = _read_comments_by_thread(session, [row.id for row in rows])
     return [StoredThread(**row._mapping, comments=tuple(comments[row.id])) for row in rows]
 
 
@@ -189,7 +189,9 @@ def read_all_threads(session: Session) -> dict[int, ThreadRecord]:
     return found
 
 
-def _comments_by_thread(session: Session, threads: Sequence[int]) -> dict[int, list[StoredComment]]:
+def _read_comments_by_thread(
+    session: Session, threads: Sequence[int]
+) -> dict[int, list[StoredComment]]:
     named = (
         select(CommentMentionModel.comment_id, PersonModel.name)
         .join(PersonModel, PersonModel.id == CommentMentionModel.person_id)

@@ -14,11 +14,17 @@ from app.features.comments.queries import StoredComment, StoredThread
 from app.features.comments.service import LONGEST
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, Id
-from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    make_document_response,
+    make_empty_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
-from app.soccer.actors import is_actor_of, person_of
+from app.soccer.actors import is_actor_of, person_of_actor
 from app.soccer.frames import MAX_PIXEL
 
 Text = Annotated[str, Field(min_length=1, max_length=LONGEST, description="Plain text.")]
@@ -85,7 +91,7 @@ class CommentDocument(Document):
     @classmethod
     def of(cls, comment: StoredComment, actor: str) -> Self:
         """The document of a comment, for whom it is shown to."""
-        return cls(**vars(comment), mine=is_actor_of(comment.actor, person_of(actor)))
+        return cls(**vars(comment), mine=is_actor_of(comment.actor, person_of_actor(actor)))
 
 
 class ThreadDocument(Document):
@@ -134,7 +140,7 @@ def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
 
 
 def _thread_response(thread: comments.StoredThread, actor: str, status: int = 200) -> Response:
-    return document(ThreadDocument.of(thread, actor), status)
+    return make_document_response(ThreadDocument.of(thread, actor), status)
 
 
 @router.post(

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from app.db.check import CheckResult, compare_records
-from app.db.dialects.dialect import dialect_in
+from app.db.check import CheckResult, summarize_faulty_records
+from app.db.dialects.dialect import get_session_dialect
 from app.db.json_columns import report_damaged_values
 from app.db.log import LogEntry, NewLogEntry, append_entries, iterate_entries_of_kinds
 from app.db.session import Session, now
@@ -36,7 +36,7 @@ from app.features.notifications.service import notify_person
 from app.features.people.logins import read_roles
 from app.features.people.queries import MemberRow, find_person_by_name, read_members
 from app.features.people.roles import Role
-from app.soccer.actors import is_actor_of, person_of
+from app.soccer.actors import is_actor_of, person_of_actor
 
 COMMENT = "comment"
 """Kind of the log's entries about comments."""
@@ -99,7 +99,7 @@ def begin_thread(
         NotFoundError: There is no such group.
         InputError: It has no such view, there is no text, or it is too long.
     """
-    text = _checked_comment(text)
+    text = _validate_comment(text)
     if at is not None and view is None:
         raise InputError(
             "a comment on a point in a picture must name the view of that point", pointer="/view"
@@ -124,7 +124,7 @@ def add_reply(
         InputError: There is no text, or it is too long.
         ConflictError: The thread is full.
     """
-    text = _checked_comment(text)
+    text = _validate_comment(text)
     with store.write() as session:
         group, thread = (
             _require_group(session, group_id),
@@ -134,7 +134,7 @@ def add_reply(
             raise ConflictError(
                 f"a thread has at most {MOST} comments", hint="Start another thread on this group."
             )
-        before = {person_of(one.actor) for one in thread.comments if one.text is not None}
+        before = {person_of_actor(one.actor) for one in thread.comments if one.text is not None}
         _insert_comment(session, group, thread_id, text, actor, sorted(before))
         return _respond_with_thread(session, group_id, thread_id)
 
@@ -172,14 +172,14 @@ def edit_comment(
         ForbiddenError: It is somebody else's.
         InputError: There is no text, or it is too long.
     """
-    text = _checked_comment(text)
+    text = _validate_comment(text)
     with store.write() as session:
         group = _require_group(session, group_id)
         comment = _require_own_comment(session, group_id, thread_id, comment_id, actor)
         if text != comment.text:
             time = now()
             change_comment(session, comment_id, text, time)
-            people = _ids_of_readers(session, group, extract_mentions(text))
+            people = _find_reader_ids(session, group, extract_mentions(text))
             set_mentions(session, comment_id, people.values())
             entry = {"comment": comment_id, "text": text}
             _log_comment(session, group, actor, time, did="edited", thread=thread_id, **entry)
@@ -222,7 +222,7 @@ def _insert_comment(
 ) -> None:
     time = now()
     comment_id = insert_comment(session, thread_id, actor, text, time)
-    people = _ids_of_readers(session, group, extract_mentions(text))
+    people = _find_reader_ids(session, group, extract_mentions(text))
     set_mentions(session, comment_id, people.values())
     entry = {"comment": comment_id, "text": text, **where}
     _log_comment(session, group, actor, time, did="said", thread=thread_id, **entry)
@@ -254,7 +254,7 @@ def _notify_people(
         )
 
 
-def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
+def _find_reader_ids(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
     """Ids of those among some names who see a group's dataset; the others are not told apart."""
     found: dict[str, int] = {}
     for name in names:
@@ -280,7 +280,7 @@ def _log_comment(
     )
 
 
-def _checked_comment(text: str) -> str:
+def _validate_comment(text: str) -> str:
     text = text.strip()
     if not text:
         raise InputError("a comment cannot be empty", pointer="/text")
@@ -316,7 +316,7 @@ def _require_own_comment(
     thread = _require_thread(session, group_id, thread_id)
     for comment in thread.comments:
         if comment.id == comment_id and comment.text is not None:
-            if not is_actor_of(comment.actor, person_of(actor)):
+            if not is_actor_of(comment.actor, person_of_actor(actor)):
                 raise ForbiddenError("only its author can change a comment", hint="Reply to it.")
             return comment
     raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")
@@ -328,13 +328,13 @@ def examine_threads(store: Store) -> CheckResult:
     When a thread began and whom it mentions stands in the tables alone.
     """
     with store.read() as session:
-        return _compare_with_log(session, dialect_in(session).restoring)
+        return _compare_threads_with_log(session, get_session_dialect(session).restoring)
 
 
-def _compare_with_log(session: Session, restore: str) -> CheckResult:
+def _compare_threads_with_log(session: Session, restore: str) -> CheckResult:
     try:
         with report_damaged_values():
-            logged = threads_from_log(
+            logged = rebuild_threads_from_log(
                 iterate_entries_of_kinds(session, (COMMENT, "dataset_deleted"))
             )
     except StorageError as error:
@@ -342,10 +342,12 @@ def _compare_with_log(session: Session, restore: str) -> CheckResult:
     present = read_all_threads(session)
     keys = sorted(logged.keys() | present.keys())
     apart = [str(key) for key in keys if logged.get(key) != present.get(key)]
-    return compare_records("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
+    return summarize_faulty_records(
+        "threads", f"{len(present):,}, as the log says", apart, WRONG, restore
+    )
 
 
-def threads_from_log(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
+def rebuild_threads_from_log(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
     """The threads that follow from the log, by id.
 
     Args:
@@ -354,17 +356,17 @@ def threads_from_log(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
     threads: dict[int, ThreadRecord] = {}
     for entry in entries:
         if entry.kind == COMMENT:
-            _apply_entry(threads, entry)
+            _apply_log_entry(threads, entry)
         else:
             gone = entry.dataset_id
             threads = {key: one for key, one in threads.items() if one.dataset_id != gone}
     return threads
 
 
-def _apply_entry(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
+def _apply_log_entry(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
     body, number = entry.body, entry.body["thread"]
     if number not in threads:
-        threads[number] = _new_thread(entry)
+        threads[number] = _make_thread_from_entry(entry)
     thread, comment = threads[number], body.get("comment", 0)
     match body["did"]:
         case "said":
@@ -379,6 +381,6 @@ def _apply_entry(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
         del threads[number]
 
 
-def _new_thread(entry: LogEntry) -> ThreadRecord:
+def _make_thread_from_entry(entry: LogEntry) -> ThreadRecord:
     x, y = entry.body.get("at", (None, None))
     return ThreadRecord(entry.dataset_id, entry.group_id, entry.body.get("view"), x, y)

@@ -62,12 +62,12 @@ def delete(
 
     with open_store() as store:
         contents = read_contents(store, name)
-        typed = contents.name if yes else _ask_for_name(contents.name, contents.counts)
+        typed = contents.name if yes else _prompt_for_dataset_name(contents.name, contents.counts)
         contents = delete_dataset(store, contents.id, confirm=typed, actor=get_current_actor())
     print_values({"deleted": contents.name, **contents.counts}, json_)
 
 
-def _ask_for_name(name: str, counts: dict[str, int]) -> str:
+def _prompt_for_dataset_name(name: str, counts: dict[str, int]) -> str:
     """The name, typed once more by somebody who has read what goes."""
     there = ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "nothing"
     say_what = f'"{name}" holds {there.replace("_", " ")}. Type its name to delete it for good'

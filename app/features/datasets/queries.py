@@ -32,8 +32,8 @@ from app.config import Settings
 from app.db.dialects.dialect import (
     DeferReferences,
     insert_or_replace,
+    select_from_text_list,
     select_json_array_items,
-    select_texts,
 )
 from app.db.home import DAY, find_last_write_time
 from app.db.json_columns import parse_json_column, report_damaged_values
@@ -102,7 +102,7 @@ _UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
 
 
 @lru_cache(maxsize=64)
-def policy_from_row(text: str) -> Policy:
+def parse_stored_policy(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
     with report_damaged_values():
         return policy_from_json(parse_json_column(text))
@@ -155,7 +155,7 @@ def update_policy(session: Session, dataset_id: int, policy: Policy) -> None:
     session.execute(update(DatasetModel).where(mine).values(_policy_columns(policy)))
 
 
-def group_ids(
+def list_group_ids(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[int]:
     """Ids of the groups of a dataset, of these matches where they are named, in order."""
@@ -235,13 +235,15 @@ def find_versions_by_text(session: Session, text: str) -> Sequence[VersionName]:
     return session.rows(VersionName, select(*columns).where(or_(*fits)))
 
 
-def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
+def count_dataset_contents(session: Session, dataset_id: int) -> dict[str, int]:
     """How many groups, views, verdicts, versions and so on a dataset has."""
     counts = {}
     for word, name in _COUNTED.items():
         table = _TABLES[name]
         statement = (
-            select(func.count()).select_from(table).where(_belongs_to_dataset(table, dataset_id))
+            select(func.count())
+            .select_from(table)
+            .where(_build_dataset_condition(table, dataset_id))
         )
         counts[word] = session.scalar(statement) or 0
     return counts
@@ -258,7 +260,7 @@ def delete_solutions(session: Session, ids: Sequence[int]) -> None:
     session.execute(delete(SolutionModel).where(SolutionModel.id.in_(ids)))
 
 
-def record_used_ids(session: Session) -> None:
+def reserve_used_ids(session: Session) -> None:
     """No id is ever given again: the log speaks of what had it."""
     used = dict(session.execute(select(UsedIdModel.table, UsedIdModel.id)).all())
     newest = {
@@ -275,7 +277,7 @@ def record_used_ids(session: Session) -> None:
             session.execute(statement, [{"table": name, "id": identity}])
 
 
-def move_access(session: Session, dataset_id: int) -> int:
+def move_access_to_next_dataset(session: Session, dataset_id: int) -> int:
     """Let roles, tokens and webhooks of a dataset be those of the next that is made; returns its id.
 
     It has to be made in the same transaction.
@@ -289,7 +291,7 @@ def move_access(session: Session, dataset_id: int) -> int:
     return heir_id
 
 
-def delete_rows(session: Session, dataset_id: int) -> None:
+def delete_dataset_rows(session: Session, dataset_id: int) -> None:
     """Delete everything that was said, from the leaves to the dataset itself.
 
     Tables that cascade (versions, predictions, evaluations) follow the rows that they hang on.
@@ -299,15 +301,15 @@ def delete_rows(session: Session, dataset_id: int) -> None:
     # The database lets verdicts and dismissals go while their group still tells whose they are.
     judged = [_TABLES[model.__tablename__] for model in (VerdictModel, DismissalModel)]
     for table in judged:
-        session.execute(delete(table).where(_belongs_to_dataset(table, dataset_id)))
-    for table in filter(_must_be_deleted_first, reversed(Base.metadata.sorted_tables)):
+        session.execute(delete(table).where(_build_dataset_condition(table, dataset_id)))
+    for table in filter(_needs_explicit_deletion, reversed(Base.metadata.sorted_tables)):
         if table not in (dataset, groups, *judged):
-            session.execute(delete(table).where(_belongs_to_dataset(table, dataset_id)))
-    session.execute(delete(groups).where(_belongs_to_dataset(groups, dataset_id)))
+            session.execute(delete(table).where(_build_dataset_condition(table, dataset_id)))
+    session.execute(delete(groups).where(_build_dataset_condition(groups, dataset_id)))
     session.execute(delete(dataset).where(dataset.c.id == dataset_id))
 
 
-def _belongs_to_dataset(table: Table, dataset_id: int) -> ColumnElement[bool]:
+def _build_dataset_condition(table: Table, dataset_id: int) -> ColumnElement[bool]:
     """Whether a row belongs to the dataset: by its own column, its group's or its station's."""
     if "dataset_id" in table.c:
         return table.c.dataset_id == dataset_id
@@ -320,7 +322,7 @@ def _group_ids_statement(dataset_id: int) -> Select[int]:
     return select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
 
 
-def _must_be_deleted_first(table: Table) -> bool:
+def _needs_explicit_deletion(table: Table) -> bool:
     """Whether rows refer to a dataset or a group and do not go with it by themselves."""
     return any(
         key.column.table.name in (DatasetModel.__tablename__, GroupModel.__tablename__)
@@ -334,23 +336,23 @@ def list_unused_calibrations(session: Session) -> list[str]:
 
     A solver may have read them already for the solution that it is about to save.
     """
-    return [] if _has_unsolved(session) else list(session.scalars(_UNUSED))
+    return [] if _has_unsolved_groups(session) else list(session.scalars(_UNUSED))
 
 
-def delete_unused_calibrations_among(session: Session, keys: Sequence[str]) -> int:
+def delete_unused_calibrations_of_keys(session: Session, keys: Sequence[str]) -> int:
     """Delete those of some calibrations that are spare still; returns how many.
 
     Those that a version needs go on in it (a trigger sees to that).
     """
-    if _has_unsolved(session):
+    if _has_unsolved_groups(session):
         return 0
-    named = _NAMED.where(_items.c.value.in_(select_texts(keys)))
-    unused = (_KEY.in_(select_texts(keys)), _KEY.not_in(named))
+    named = _NAMED.where(_items.c.value.in_(select_from_text_list(keys)))
+    unused = (_KEY.in_(select_from_text_list(keys)), _KEY.not_in(named))
     gone = delete(CalibrationModel).where(*unused).returning(_KEY)
     return len(session.scalars(gone).all())
 
 
-def _has_unsolved(session: Session) -> bool:
+def _has_unsolved_groups(session: Session) -> bool:
     """Whether a group of any dataset waits to be solved."""
     waiting = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
     return session.scalar(waiting) is not None

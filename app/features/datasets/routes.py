@@ -12,15 +12,15 @@ from app.features.datasets import service as deletion
 from app.features.datasets import service as review
 from app.features.datasets.service import Dataset, DatasetContents, read_contents
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.policies.schemas import PolicyDocument
 from app.features.queue.service import summarize_groups
-from app.features.solve.jobs import request_solve
+from app.features.solve.jobs import request_solve_job
 from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
-from app.http.documents import Document, ListDocument, document, respond_with
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
 
@@ -114,7 +114,7 @@ class DeletedDocument(BaseModel):
 
 
 @router.get("", operation_id="listDatasets", responses=responses())
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
@@ -144,7 +144,9 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
-@router.post("/{dataset}/solve", operation_id="solveDataset", **openapi_of_job_response(404))
+@router.post(
+    "/{dataset}/solve", operation_id="solveDataset", **describe_job_response_for_openapi(404)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -153,11 +155,11 @@ def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> 
     The server does so by itself after whatever makes groups stale; this waits for it, too.
     """
     found = review.dataset_id(services.store, dataset)
-    return request_solve(services.jobs, services.store, found, actor=actor)
+    return request_solve_job(services.jobs, services.store, found, actor=actor)
 
 
 def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
-    return document(DeletedDocument(dry_run=dry_run, **vars(gone)))
+    return make_document_response(DeletedDocument(dry_run=dry_run, **vars(gone)))
 
 
 @router.delete(
@@ -181,7 +183,7 @@ def delete_dataset(
     """
     contents = read_contents(services.store, dataset)
     if not dry_run:
-        exports = services.jobs.all_ids(dataset_id=contents.id, kind="export")
+        exports = services.jobs.list_job_ids(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
         contents = deletion.delete_dataset(

@@ -8,36 +8,36 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
 from app.features.datasets.queries import (
-    delete_unused_calibrations_among,
+    delete_unused_calibrations_of_keys,
     find_dataset,
-    group_ids,
     has_match,
     insert_dataset_row,
     list_dataset_rows,
+    list_group_ids,
     list_unused_calibrations,
-    policy_from_row,
+    parse_stored_policy,
     read_dataset_names,
     update_policy,
 )
 from app.features.independent_annotations.queries import (
-    CopiesOf,
+    CopyDatasetKey,
     insert_copy_dataset,
     list_copy_dataset_ids,
     list_copy_datasets,
 )
-from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
+from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, has_hidden_groups
 from app.features.queue.queries import count_states
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.issia import MATCH as ISSIA
 from app.formats.manifest import LICENCES, UNKNOWN_LICENCE
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.sample.fixture import LEAGUES
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
@@ -59,7 +59,9 @@ def filter_by_match(states: Iterable[State], match: str | None) -> list[State]:
     return [state for state in states if match in (None, state.match)]
 
 
-def need_match(states: Iterable[State], match: str | None, dataset: str) -> list[State]:
+def filter_by_existing_match(
+    states: Iterable[State], match: str | None, dataset: str
+) -> list[State]:
     """``filter_by_match``.
 
     Raises:
@@ -81,7 +83,7 @@ MAX_TITLE = 80
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,98}[A-Za-z0-9._-])?")
 
 
-def require_name(
+def require_valid_name(
     name: str, what: str, *, digits: bool = False, pointer: str | None = "/name"
 ) -> None:
     """Raise unless something that addresses and files name can be called so.
@@ -98,7 +100,7 @@ def require_name(
     if not _NAME.fullmatch(name) or (name.isdigit() and not digits):
         alone = "" if digits else ", not digits alone"
         raise InputError(
-            f"{quoted(name)} cannot be the name of {what}",
+            f"{quote_text(name)} cannot be the name of {what}",
             hint=f"Use letters, digits, spaces and . _ -, up to 100, with no space at either end{alone}.",
             pointer=pointer,
         )
@@ -158,7 +160,7 @@ def insert_dataset(
     name: str,
     policy: Policy,
     actor: str,
-    copies: CopiesOf | None = None,
+    copies: CopyDatasetKey | None = None,
     *,
     hidden: bool = False,
 ) -> int:
@@ -172,7 +174,7 @@ def insert_dataset(
         copies: Of what it holds copies.
         hidden: Only people with a role in it see it, as with copies; not who has one everywhere.
     """
-    require_name(name, "a dataset")
+    require_valid_name(name, "a dataset")
     at = now()
     hidden = hidden or copies is not None
     identity = insert_dataset_row(session, name, policy, at, copies=hidden)
@@ -195,7 +197,9 @@ def list_datasets(
     with store.read() as session:
         hidden = frozenset(own) - list_copy_dataset_ids(session) if own else frozenset[int]()
         rows = [row for row in list_dataset_rows(session) if row.id <= COPIES or row.id in hidden]
-        return _datasets_with_counts(session, [row for row in rows if visibility.sees(row.id)])
+        return _build_datasets_with_counts(
+            session, [row for row in rows if visibility.sees(row.id)]
+        )
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
@@ -205,7 +209,7 @@ def get_dataset(store: Store, dataset: str | int) -> Dataset:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        return _datasets_with_counts(session, [_require_dataset_row(session, dataset)])[0]
+        return _build_datasets_with_counts(session, [_require_dataset_row(session, dataset)])[0]
 
 
 def get_dataset_head(store: Store, dataset: str | int) -> DatasetHead:
@@ -217,7 +221,7 @@ def get_dataset_head(store: Store, dataset: str | int) -> DatasetHead:
 def dataset_id(store: Store, dataset: str | int) -> int:
     """The id of a dataset; raises NotFoundError when there is none."""
     with store.read() as session:
-        return need_dataset(session, dataset)
+        return require_dataset_id(session, dataset)
 
 
 def unknown_dataset_error(store: Store, dataset: str | int) -> NotFoundError:
@@ -226,7 +230,7 @@ def unknown_dataset_error(store: Store, dataset: str | int) -> NotFoundError:
         return NotFoundError.dataset(dataset, read_dataset_names(session))
 
 
-def need_dataset(session: Session, dataset: str | int) -> int:
+def require_dataset_id(session: Session, dataset: str | int) -> int:
     """``dataset_id`` within a session."""
     return int(_require_dataset_row(session, dataset).id)
 
@@ -234,10 +238,10 @@ def need_dataset(session: Session, dataset: str | int) -> int:
 def read_dataset_head(session: Session, dataset: str | int) -> DatasetHead:
     """A dataset within a session, uncounted; raises NotFoundError when there is none."""
     row = _require_dataset_row(session, dataset)
-    return DatasetHead(row.id, row.name, row.created, policy_from_row(row.policy))
+    return DatasetHead(row.id, row.name, row.created, parse_stored_policy(row.policy))
 
 
-def require_matches(
+def require_dataset_with_matches(
     session: Session, dataset: str | int, matches: Collection[str] | None = None
 ) -> DatasetHead:
     """The head of a dataset that has all of these matches.
@@ -257,7 +261,7 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
     update_policy(session, dataset_id, policy)
     body = {"policy": policy_to_json(policy)}
     append_entries(session, [NewLogEntry("policy", actor, now(), body, dataset_id=dataset_id)])
-    refresh_queue(session, group_ids(session, dataset_id))
+    refresh_queue(session, list_group_ids(session, dataset_id))
 
 
 def _require_dataset_row(session: Session, dataset: str | int) -> Any:
@@ -267,33 +271,33 @@ def _require_dataset_row(session: Session, dataset: str | int) -> Any:
     return row
 
 
-def _datasets_with_counts(session: Session, rows: Sequence[Any]) -> list[Dataset]:
+def _build_datasets_with_counts(session: Session, rows: Sequence[Any]) -> list[Dataset]:
     states: dict[int, Counter[str]] = {}
     for row in count_states(session, [row.id for row in rows]):
         counts = states.setdefault(row.dataset_id, Counter())
         counts.update({row.status: row.groups, "groups": row.groups, "solved": int(row.solved)})
-    return [_dataset_with_counts(row, states.get(row.id, Counter())) for row in rows]
+    return [_build_dataset_with_counts(row, states.get(row.id, Counter())) for row in rows]
 
 
-def _dataset_with_counts(row: Any, counts: Counter[str]) -> Dataset:
+def _build_dataset_with_counts(row: Any, counts: Counter[str]) -> Dataset:
     return Dataset(
         id=row.id,
         name=row.name,
         created=row.created,
-        policy=policy_from_row(row.policy),
+        policy=parse_stored_policy(row.policy),
         groups=counts["groups"],
         solved=counts["solved"],
         accepted=counts["accepted"],
         rejected=counts["rejected"],
         deferred=counts["deferred"],
         unreviewed=counts["unreviewed"],
-        hides_groups=is_blind(row.id),
+        hides_groups=has_hidden_groups(row.id),
     )
 
 
 def find_licence(match: str) -> str:
     """The terms of the source that a match is from."""
-    return LICENCES.get(_source_of_match(match), UNKNOWN_LICENCE)
+    return LICENCES.get(_find_source_of_match(match), UNKNOWN_LICENCE)
 
 
 def join_licences(matches: Iterable[str]) -> str:
@@ -301,7 +305,7 @@ def join_licences(matches: Iterable[str]) -> str:
     return " ".join(sorted({find_licence(match) for match in matches})) or UNKNOWN_LICENCE
 
 
-def _source_of_match(match: str) -> str:
+def _find_source_of_match(match: str) -> str:
     parts = match.split("/")
     if parts[0] in LEAGUES:
         return "sample"
@@ -327,7 +331,7 @@ def delete_unused_calibrations(store: Store, wanted: Callable[[], bool] = lambda
         if not wanted():
             break
         with store.write() as session:
-            gone += delete_unused_calibrations_among(
+            gone += delete_unused_calibrations_of_keys(
                 session, keys[start : start + CALIBRATIONS_AT_ONCE]
             )
     return gone
@@ -354,7 +358,7 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _read_contents_in(session, read_dataset_head(session, dataset).id)
+        return _read_contents_in_session(session, read_dataset_head(session, dataset).id)
 
 
 def delete_dataset(
@@ -387,17 +391,17 @@ def delete_dataset(
     identity = dataset_id(store, found.id)
     with store.read() as session:
         copies = list_copy_datasets(session, identity)
-    with without_response():
+    with without_pending_response():
         for row in copies:
             delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
     _delete_solutions(store, identity)
     with store.write() as session:
-        contents = _read_contents_in(session, identity)
-        removal.record_used_ids(session)
-        heir = None if afresh is None else removal.move_access(session, identity)
+        contents = _read_contents_in_session(session, identity)
+        removal.reserve_used_ids(session)
+        heir = None if afresh is None else removal.move_access_to_next_dataset(session, identity)
         body = {"name": contents.name, "counts": contents.counts, "heir": heir}
         append_entries(session, [NewLogEntry(KIND, actor, now(), body, identity)])
-        removal.delete_rows(session, identity)
+        removal.delete_dataset_rows(session, identity)
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir
         session.respond(contents)
@@ -405,9 +409,9 @@ def delete_dataset(
     return contents
 
 
-def _read_contents_in(session: Session, identity: int) -> DatasetContents:
+def _read_contents_in_session(session: Session, identity: int) -> DatasetContents:
     name = read_dataset_head(session, identity).name
-    return DatasetContents(identity, name, removal.count_contents(session, identity))
+    return DatasetContents(identity, name, removal.count_dataset_contents(session, identity))
 
 
 def _delete_solutions(store: Store, identity: int) -> None:

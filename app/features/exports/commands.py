@@ -145,9 +145,9 @@ def import_(
             **({} if propose else {"propose": False}),
         }
         with connect_to_server(server) as client, show_progress("Importing") as progress:
-            values, nothing = remote.import_values(
+            values, nothing = remote.import_on_server(
                 client, dataset, format_, path if is_address(path) else Path(path), options,
-                lines=lines, frames=frames, policy=policy or _usual_policy(format_),
+                lines=lines, frames=frames, policy=policy or _choose_default_policy(format_),
                 dry_run=dry_run, progress=progress,
             )  # fmt: skip
         print_import(values, json_)
@@ -202,7 +202,7 @@ def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
         say(describe_result("proposals", asdict(run)) or "")
 
 
-def _usual_policy(format_: str) -> str | None:
+def _choose_default_policy(format_: str) -> str | None:
     """The policy of a dataset that an import makes; None where the format brings none into being."""
     return None if format_ in ("cameras", "touchline") else "paper"
 
@@ -252,14 +252,14 @@ def export(
         request = {"dataset": dataset, "format": format_, "all": everything, **options}
         with connect_to_server(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)
-            values = remote.export_values(client, sent_to, request, progress)
+            values = remote.export_on_server(client, sent_to, request, progress)
         print_export(values, json_)
         return
     from app.features.exports.service import export_dataset as run_export
-    from app.features.exports.service import require_possible
+    from app.features.exports.service import require_exportable
 
     with open_store() as store, show_progress("Exporting") as progress:
-        require_possible(store, dataset, format_, everything=everything, **options)
+        require_exportable(store, dataset, format_, everything=everything, **options)
         target = resolve_target_path(store.settings, out) if is_address(out) else Path(out)
         report = run_export(
             store, dataset, format_, target, everything=everything, **options, progress=progress

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.db.database_worker import CallingServer
+from app.db.database_worker import ServerProxy
 from app.db.home import DAY, delete_path, find_last_write_time
 from app.db.json_columns import Json
 from app.db.session import now
@@ -22,7 +22,7 @@ from app.db.store import Store
 from app.durable import PARTIAL, replace_file
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import get_dataset_head
-from app.features.exports.service import ExportReport, export_dataset, require_possible
+from app.features.exports.service import ExportReport, export_dataset, require_exportable
 from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.jobs.service import Jobs
@@ -31,7 +31,7 @@ from app.formats.file_tree import Root
 from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
 from app.json_text import json_text
-from app.media.frames import Frames, SentPicture
+from app.media.frames import EncodedPicture, FrameProvider
 from app.object_store.path import StoredPath, resolve_target_path
 from app.object_store.store import SCHEME
 from app.soccer.group import Media
@@ -114,7 +114,7 @@ class ExportFolder:
             left_out=dict(report.left_out),
             missing_images=list(report.missing_images),
             bytes=self.content(name).stat().st_size if stored is None else stored.size,
-            stored=None if stored is None else stored.sealed(),
+            stored=None if stored is None else stored.make_sealed_address(),
         )
         self._write_record(entry)
         return entry
@@ -149,7 +149,7 @@ class ExportFolder:
             self._record_path(name).unlink(missing_ok=True)
             self.content(name).unlink(missing_ok=True)
 
-    def expire(self, days: int) -> int:
+    def delete_expired_zips(self, days: int) -> int:
         """Delete zips that were finished so many days ago (0: none), and say how many.
 
         Their records stay, and say that they expired. What was delivered to an object store stays.
@@ -173,7 +173,7 @@ class ExportFolder:
                 self.content(name).unlink(missing_ok=True)
         return gone
 
-    def forget_unfinished(self) -> int:
+    def delete_unfinished_zips(self) -> int:
         """Delete zips that never got their record, or lost it, and say how many: nothing lists them.
 
         One that was written within a day may get its record yet.
@@ -202,7 +202,7 @@ def request_export(
     jobs: Jobs,
     store: Store,
     folder: ExportFolder,
-    frames: Frames,
+    frames: FrameProvider,
     request: Mapping[str, Any],
     *,
     actor: str,
@@ -225,8 +225,8 @@ def request_export(
     found = get_dataset_head(store, request["dataset"])
     version = request.get("version")
     if request.get("to") is not None:
-        require_absent_in_store(_target_in_store(store, request["to"]))
-    require_possible(
+        require_absent_in_store(_parse_store_target(store, request["to"]))
+    require_exportable(
         store,
         found.id,
         request["format"],
@@ -240,20 +240,22 @@ def request_export(
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",
-        partial(export_work, store, folder, frames),
+        partial(run_export_job, store, folder, frames),
         dataset_id=found.id,
         actor=actor,
         request=named,
     )
 
 
-def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder, frames: Frames) -> None:
+def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder, frames: FrameProvider) -> None:
     """Let exports that an earlier server was at be written from their beginning."""
 
-    jobs.register_resume(KIND, partial(export_work, store, folder, frames))
+    jobs.register_resume(KIND, partial(run_export_job, store, folder, frames))
 
 
-def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: JobProgress) -> Json:
+def run_export_job(
+    store: Store, folder: ExportFolder, frames: FrameProvider, progress: JobProgress
+) -> Json:
     """The work itself; the zip appears whole or not at all, and its record after it."""
     request, name = progress.job.request, str(progress.job_id)
     to = request.get("to")
@@ -266,7 +268,7 @@ def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: Jo
             "the export",
             _export_in_worker,
             progress.dataset_id,
-            content if to is None else _target_in_store(store, to),
+            content if to is None else _parse_store_target(store, to),
             beside,
             request,
             dataset_id=progress.dataset_id,
@@ -294,15 +296,15 @@ def _export_in_worker(
     out: Root,
     beside: Path,
     request: Mapping[str, Any],
-    caller: CallingServer,
+    caller: ServerProxy,
 ) -> ExportReport:
     """``export_dataset`` in a worker process, as it was requested.
 
     Frames are untrusted files: the caller has them made where they are made for requests.
     """
 
-    def read(media: Media, width: int | None, flipped: bool) -> SentPicture:
-        picture: SentPicture = caller.ask((media, width, flipped))
+    def request_picture(media: Media, width: int | None, flipped: bool) -> EncodedPicture:
+        picture: EncodedPicture = caller.ask((media, width, flipped))
         return picture
 
     version = request.get("version")
@@ -318,12 +320,12 @@ def _export_in_worker(
         views=request.get("views", "valid"),
         version=None if version is None else str(version),
         progress=caller,
-        read=read,
+        read=request_picture,
         beside=beside,
     )
 
 
-def _target_in_store(store: Store, address: str) -> StoredPath:
+def _parse_store_target(store: Store, address: str) -> StoredPath:
     """Where in a store an export goes.
 
     Raises:

@@ -6,14 +6,14 @@ from sqlalchemy import false, func, not_, or_, select
 
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session
-from app.features.queue.queries import Listing, RowOrder
+from app.features.queue.queries import GroupListing, RowOrder
 from app.features.queue.tables import QueueModel
-from app.features.solutions.queries import is_solved
+from app.features.solutions.queries import is_group_solved
 
 _NO_WORD = ("freeze", "comment", *DEEDS)
 _ACCEPTED = QueueModel.status == "accepted"
 _CURRENT = not_(QueueModel.stale)
-_SOLVED = is_solved()
+_SOLVED = is_group_solved()
 _OVERRIDDEN = func.coalesce(QueueModel.override == QueueModel.gate, false())
 """An override speaks of the gate that failed then, of no other that fails now."""
 _QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)
@@ -30,7 +30,7 @@ def find_newest_entry_time(session: Session, dataset_id: int) -> str | None:
 def list_exported_groups(session: Session, dataset_id: int, everything: bool) -> list[int]:
     """Ids of the groups that an export takes: all, or the accepted ones that may go out."""
     where = () if everything else (_ACCEPTED, _CURRENT, _SOLVED, _QUALIFIES)
-    return Listing(session, dataset_id, where).ids(RowOrder("number"))
+    return GroupListing(session, dataset_id, where).ids(RowOrder("number"))
 
 
 def count_left_out_groups(session: Session, dataset_id: int) -> dict[str, int]:
@@ -41,7 +41,7 @@ def count_left_out_groups(session: Session, dataset_id: int) -> dict[str, int]:
         "failing": [_CURRENT, _SOLVED, not_(_QUALIFIES)],
     }
     counts = {
-        reason: Listing(session, dataset_id, [_ACCEPTED, *where]).count()
+        reason: GroupListing(session, dataset_id, [_ACCEPTED, *where]).count()
         for reason, where in reasons.items()
     }
     return {reason: count for reason, count in counts.items() if count}

@@ -34,9 +34,15 @@ from app.http.deps import (
     Services,
     is_not_modified,
 )
-from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    make_document_response,
+    make_empty_response,
+    respond_with,
+)
 from app.http.headers import make_content_disposition
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
@@ -237,7 +243,7 @@ def list_formats(
 
 def _export_job_response(job: Job) -> Response:
     started = ExportJobDocument.of_export(JobDocument.model_validate(job))
-    return document(started, 202, make_location_header(job))
+    return make_document_response(started, 202, make_location_header(job))
 
 
 @router.post(
@@ -262,7 +268,7 @@ def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> 
 
 
 @router.get("/exports", operation_id="listExports", responses=responses(404))
-@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
+@may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 def list_exports(
     services: AppServices,
     visibility: SeesWhole,

@@ -29,9 +29,9 @@ from app.features.groups.view_queries import list_frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
 from app.features.imports.ingest import read_unassigned_persons
-from app.features.tracks.export import TrackSource, frozen_records
-from app.features.tracks.service import track_source
-from app.features.versions.frozen_queries import read_frozen, read_json
+from app.features.tracks.export import TrackSource, list_frozen_track_records
+from app.features.tracks.service import make_track_source
+from app.features.versions.frozen_queries import decode_frozen_json, read_frozen
 from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
@@ -42,18 +42,18 @@ from app.formats.export_formats import (
     describe_box_settings,
     describe_missing_frames,
     describe_view_settings,
-    export_names,
     find_frame_path_rule,
+    make_export_names,
     write_format,
 )
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Root
-from app.formats.frame_names import ExportNames, Outline
+from app.formats.frame_names import ExportKeyAssigner, Outline
 from app.formats.issia import FramePersons
 from app.formats.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
 from app.formats.output import open_output
 from app.formats.tracks_writer import TrackRecord
-from app.formats.view_files import PutText, ViewFiles
+from app.formats.view_files import PutText, ViewFileBuffer
 from app.media.frames import make_picture
 from app.object_store.path import StoredPath, is_address
 from app.progress import ReportProgress
@@ -92,7 +92,7 @@ class _UnrepresentableError(InputError):
 
 
 @dataclass(frozen=True)
-class FormatAnswer:
+class FormatAvailability:
     """Whether a dataset can be written in a format; ``reason`` and ``hint`` where it cannot."""
 
     format: str
@@ -113,7 +113,7 @@ class _ExportOptions:
         """Whether training data hold every view."""
         return self.everything or self.views == "all"
 
-    def require_used(self) -> None:
+    def require_options_apply(self) -> None:
         """Raises InputError where an option is given that the format does not use."""
         usual = _ExportOptions(self.format, self.everything)
         for name, formats in USERS.items():
@@ -136,7 +136,7 @@ class _ExportOptions:
                     f'"{value}" is not possible for {name}; choose one of {", ".join(choices)}',
                     pointer=f"/{name}",
                 )
-        self.require_used()
+        self.require_options_apply()
         if self.images == "link" and isinstance(out, StoredPath):
             raise InputError(
                 "an object store cannot contain links to images; choose to copy the images"
@@ -177,7 +177,7 @@ def export_dataset(
         everything: Every group, whatever its verdict.
         boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
             YOLO and Parquet hold. Other formats have no place for a chosen box.
-        images: ``none``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
+        images: ``make_empty_track``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
         views: ``valid`` or ``all``: whether COCO and YOLO, from which detectors learn, hold the
             views that annotate a ball and are in no valid pair. ``everything`` says all.
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:
@@ -200,14 +200,17 @@ def export_dataset(
         source = _open_source(session, store, dataset, options, version)
         with open_output(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(
-                root, images, read or _local_reader(store), find_frame_path_rule(format)
+                root,
+                images,
+                read or _make_local_picture_reader(store),
+                find_frame_path_rule(format),
             )
-            names = export_names(format, source.outlines())
+            names = make_export_names(format, source.outlines())
             run = _ExportRun(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
             run.tracks = _open_track_source(session, store.settings, source, options)
             if format == "parquet" and source.tracks:
-                run.kept = frozen_records(_read_frozen_tracks(session, source))
+                run.kept = list_frozen_track_records(_read_frozen_tracks(session, source))
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = read_unassigned_persons(session, dataset)
             with _open_view_files(root, out) as put:
@@ -226,11 +229,11 @@ def _open_view_files(root: Path, out: Root) -> Iterator[PutText | None]:
     if out.suffix.lower() != ".zip":
         yield None
         return
-    with ViewFiles(root) as files:
+    with ViewFileBuffer(root) as files:
         yield files.put
 
 
-def require_possible(
+def require_exportable(
     store: Store,
     dataset: str | int,
     format: str,  # noqa: A002
@@ -252,7 +255,7 @@ def require_possible(
             not use an option, or the groups do not fit it; then the hint names those that they fit.
     """
     options = _ExportOptions(format, everything, boxes, images, views)
-    options.require_used()
+    options.require_options_apply()
     try:
         _require_format(store, dataset, options, version)
     except _UnrepresentableError as error:
@@ -264,7 +267,7 @@ def require_possible(
 
 def list_formats_with_problems(
     store: Store, dataset: str | int, version: str | None = None
-) -> list[FormatAnswer]:
+) -> list[FormatAvailability]:
     """Every format, and why a dataset, or a version of it, cannot be written in it.
 
     All groups are asked about, whatever their verdicts are: another verdict opens no format.
@@ -278,16 +281,16 @@ def list_formats_with_problems(
         try:
             _require_format(store, dataset, options, version)
         except InputError as error:
-            answers.append(FormatAnswer(format, error.message, error.hint))
+            answers.append(FormatAvailability(format, error.message, error.hint))
         else:
-            answers.append(FormatAnswer(format))
+            answers.append(FormatAvailability(format))
     return answers
 
 
 def _require_format(
     store: Store, dataset: str | int, options: _ExportOptions, version: str | None
 ) -> None:
-    """``require_possible`` of one format."""
+    """``require_exportable`` of one format."""
     format, everything = options.format, options.everything  # noqa: A001
     _require_no_version_conflict(format, everything, version)
     with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
@@ -302,11 +305,11 @@ def _require_format(
             return
         source = _SampleSource(whole)
         frames = ExportImages(
-            Path(folder), "none", _local_reader(store), find_frame_path_rule(format)
+            Path(folder), "none", _make_local_picture_reader(store), find_frame_path_rule(format)
         )
-        with ViewFiles(Path(folder)) as small:
+        with ViewFileBuffer(Path(folder)) as small:
             try:
-                names = export_names(format, source.outlines())
+                names = make_export_names(format, source.outlines())
                 run = _ExportRun(source, options, frames, names, None)
                 run.tracks = _open_track_source(
                     session, store.settings, source, options, try_only=True
@@ -315,9 +318,9 @@ def _require_format(
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
-            files = [] if source.is_all else list_frame_files(session, whole.dataset_id)
+            files = [] if source.is_whole_source else list_frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
-    if source.is_all and run.tracks is None:
+    if source.is_whole_source and run.tracks is None:
         _require_content(whole.dataset, format, counts)
 
 
@@ -360,7 +363,7 @@ class _SampleSource:
         self.dataset_id, self.tracks = source.dataset_id, source.tracks
 
     @property
-    def is_all(self) -> bool:
+    def is_whole_source(self) -> bool:
         """Whether there are no more."""
         return self.count == self._source.count
 
@@ -373,7 +376,7 @@ class _SampleSource:
         return islice(self._source.outlines(), self.count)
 
 
-def _local_reader(store: Store) -> ReadPicture:
+def _make_local_picture_reader(store: Store) -> ReadPicture:
     return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
 
 
@@ -385,7 +388,7 @@ def _open_source(
         frozen = find_version(store, found.id, version)
         return VersionSource(session, frozen)
     source = LiveSource(session, found, options.everything, options.format in TRACKS)
-    source.require_some()
+    source.require_any_group()
     return source
 
 
@@ -401,7 +404,7 @@ def _open_track_source(
     if options.format not in TRACKS:
         return None
     frozen = None if source.tracks is None else _read_frozen_tracks(session, source)
-    found = track_source(
+    found = make_track_source(
         session, settings, source.dataset_id, source.dataset, source.policy, frozen
     )
     everything = options.everything or frozen is not None
@@ -414,7 +417,7 @@ def _read_frozen_tracks(
     """The tracks of a version by stretch, as they were frozen."""
     names = source.tracks or {}
     bodies = read_frozen(session, source.dataset_id, names.values())
-    return {key: read_json(bodies[name]) for key, name in names.items()}
+    return {key: decode_frozen_json(bodies[name]) for key, name in names.items()}
 
 
 class _ExportRun:
@@ -425,7 +428,7 @@ class _ExportRun:
         source: ExportSource,
         options: _ExportOptions,
         images: ExportImages,
-        names: ExportNames,
+        names: ExportKeyAssigner,
         progress: ReportProgress | None,
     ):
         self._source, self._options = source, options
@@ -458,7 +461,7 @@ class _ExportRun:
             None if self.tracks is None else self.tracks.records,
             self.kept,
         )
-        return write_format(root, self._records(), wanted, put)
+        return write_format(root, self._iterate_records(), wanted, put)
 
     def manifest(self, counts: Mapping[str, int]) -> Manifest:
         """What the manifest says of this export."""
@@ -487,7 +490,7 @@ class _ExportRun:
             },
         )
 
-    def _records(self) -> Iterator[ExportRecord]:
+    def _iterate_records(self) -> Iterator[ExportRecord]:
         # A frame without its label would teach that it shows no ball: it stays out as well.
         chosen = self._options.format == "yolo" and not self._options.every_view
         for place, (found, facts) in enumerate(self._source.items(), 1):

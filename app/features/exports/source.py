@@ -30,14 +30,14 @@ from app.formats.export_record import ExportRecord
 from app.formats.frame_names import (
     FrameName,
     Outline,
-    fold_file_name,
-    frame_identity,
     frame_path_by_match,
+    identify_frame,
+    normalize_file_name,
     with_export_key,
 )
 from app.formats.safe_path import resolve_inside
 from app.media.files import read_media_facts, read_picture_header
-from app.media.frames import SentPicture
+from app.media.frames import EncodedPicture
 from app.object_store.path import is_address, unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -50,7 +50,7 @@ Item = tuple[ExportRecord, Facts | None]
 """A record, and the facts about its frames where they were frozen with it."""
 
 
-ReadPicture = Callable[[Media, int | None, bool], SentPicture]
+ReadPicture = Callable[[Media, int | None, bool], EncodedPicture]
 """From where a frame lies, its width (None: as it is) and whether it is mirrored."""
 _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
 
@@ -145,16 +145,16 @@ class LiveSource:
         for start in range(0, self.count, BATCH):
             ids = self._ids[start : start + BATCH]
             for state in read_states(self._session, ids, markings=False):
-                yield _live_record(state), None
+                yield _build_live_record(state), None
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
         for start in range(0, self.count, BATCH):
             views = list_view_file_fields(self._session, self._ids[start : start + BATCH])
             for _, run in groupby(views, key=lambda view: view.group_id):
-                yield _outline_of_views(list(run)), {}
+                yield _make_outline_group(list(run)), {}
 
-    def require_some(self) -> None:
+    def require_any_group(self) -> None:
         """Raise InputError where there is nothing to export."""
         if not self.count:
             raise _nothing_to_export_error(self._found, self.left_out, self._groups != "accepted")
@@ -185,9 +185,9 @@ class VersionSource:
         for row in read_rows(self._session, self._version.id, members=True):
             batch.append(row)
             if len(batch) == BATCH:
-                yield from self._thaw_rows(batch)
+                yield from self._build_frozen_items(batch)
                 batch = []
-        yield from self._thaw_rows(batch)
+        yield from self._build_frozen_items(batch)
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
@@ -197,7 +197,7 @@ class VersionSource:
             for row, group in zip(batch, groups, strict=True):
                 yield replace(group, split=row.split), row.splits or {}
 
-    def _thaw_rows(self, rows: list[VersionGroup]) -> Iterator[Item]:
+    def _build_frozen_items(self, rows: list[VersionGroup]) -> Iterator[Item]:
         for item in read_frozen_groups(self._session, self._version, rows):
             frames = item.row.frames or {}
             facts = {key: frame["facts"] for key, frame in frames.items() if "facts" in frame}
@@ -222,26 +222,26 @@ def export_record_of_frozen_group(item: FrozenGroup) -> ExportRecord:
     )
 
 
-def _outline_of_views(views: list[ViewFileFields]) -> Group:
+def _make_outline_group(views: list[ViewFileFields]) -> Group:
     """A group of views without lines and balls."""
     first = views[0]
     return Group(
-        first.group, tuple(_bare_view(item) for item in views), first.match, split=first.split
+        first.group, tuple(_make_bare_view(item) for item in views), first.match, split=first.split
     )
 
 
-def _bare_view(item: ViewFileFields) -> View:
+def _make_bare_view(item: ViewFileFields) -> View:
     size = ImageSize(item.width, item.height)
     station = Station(item.station, size, shared=item.shared, flipped=item.flipped)
     return View(item.key, station, media=item.media)
 
 
-def _live_record(state: GroupState) -> ExportRecord:
+def _build_live_record(state: GroupState) -> ExportRecord:
     verdict = state.verdict
     return ExportRecord(
         group=state.group,
         solution=state.solution,
-        verdict=_verdict_text(verdict),
+        verdict=_format_verdict(verdict),
         reason=describe_verdict_reason(
             verdict.state, verdict.reason, verdict.note, verdict.override
         ),
@@ -249,7 +249,7 @@ def _live_record(state: GroupState) -> ExportRecord:
     )
 
 
-def _verdict_text(verdict: VerdictState) -> str:
+def _format_verdict(verdict: VerdictState) -> str:
     """The verdict; an accepted group that changed since says so, as it is not accepted now."""
     stale = verdict.stale and verdict.state == "accepted"
     return f"{verdict.state} (stale)" if stale else verdict.state
@@ -282,7 +282,7 @@ def _nothing_to_export_error(
 
 
 @dataclass(frozen=True)
-class _WrittenPicture:
+class _PlacedPicture:
     """A picture that was placed: its path in the export, its frame, its group and view."""
 
     path: str
@@ -309,7 +309,7 @@ class ExportImages:
         self._layout = layout
         self._splits: Mapping[str, str] = {}
         self._names: Mapping[str, str] = {}
-        self._written: dict[str, _WrittenPicture] = {}
+        self._written: dict[str, _PlacedPicture] = {}
 
     def add(
         self,
@@ -325,7 +325,7 @@ class ExportImages:
             frozen: What was known of its frames when it was frozen, by view; another frame than
                 that is missing.
             splits: Split by view, where views of one group are split.
-            names: Keys by which views are called, where not by their own (``ExportNames``).
+            names: Keys by which views are called, where not by their own (``ExportKeyAssigner``).
         """
         self.placed, self._splits, self._names = {}, splits or {}, names or {}
         for view in group.views:
@@ -371,12 +371,14 @@ class ExportImages:
         if self._images == "link" and is_file and self._is_upright(view, media):
             if not Path(media.path).is_file():
                 raise NotFoundError(f"the image file {PurePosixPath(media.path).name} is missing")
-            target = self._picture_path(group, view, PurePosixPath(media.path).suffix.lower())
+            target = self._prepare_picture_path(
+                group, view, PurePosixPath(media.path).suffix.lower()
+            )
             if target is not None:
                 target.symlink_to(media.path)
             return
         picture = self._read(media, None, view.station.flipped)
-        target = self._picture_path(group, view, _SUFFIXES[picture.kind])
+        target = self._prepare_picture_path(group, view, _SUFFIXES[picture.kind])
         if target is not None:
             target.write_bytes(picture.data)
 
@@ -386,7 +388,7 @@ class ExportImages:
         header = read_picture_header(media)
         return not view.station.flipped and (header is None or header.orientation == 1)
 
-    def _picture_path(self, group: Group, view: View, suffix: str) -> Path | None:
+    def _prepare_picture_path(self, group: Group, view: View, suffix: str) -> Path | None:
         """Where a frame goes, in folders that are there; None where it lies there already.
 
         Raises:
@@ -395,8 +397,8 @@ class ExportImages:
         called = with_export_key(view, self._names.get(view.key))
         path = self._layout(group, called, self._splits.get(view.key, group.split), suffix)
         whose = f"{group.key}, {view.key}"
-        first = self._written.get(fold_file_name(path))
-        if first is not None and (first.frame, first.path) != (frame_identity(group, view), path):
+        first = self._written.get(normalize_file_name(path))
+        if first is not None and (first.frame, first.path) != (identify_frame(group, view), path):
             raise InputError(
                 f"the pictures of two frames ({first.whose} and {whose}) would both be called {path}",
                 hint="Export without pictures, or rename one of the views in the source.",
@@ -405,8 +407,8 @@ class ExportImages:
         if first is not None:
             return None
         target = resolve_inside(self._root, path)
-        self._written[fold_file_name(path)] = _WrittenPicture(
-            path, frame_identity(group, view), whose
+        self._written[normalize_file_name(path)] = _PlacedPicture(
+            path, identify_frame(group, view), whose
         )
         target.parent.mkdir(parents=True, exist_ok=True)
         return target

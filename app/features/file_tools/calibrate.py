@@ -17,13 +17,13 @@ from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
 from app.evaluation.cameras import measure_leave_one_out_errors, score_frame, score_frames
 from app.features.file_tools.matches import (
-    MatchShare,
+    SharedMatchPlaces,
     choose_picture,
+    collect_shared_match_places,
     map_points_to_original_pictures,
-    match_shares,
-    read_matches,
+    read_match_of_each_frame,
 )
-from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
+from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file
@@ -32,20 +32,25 @@ from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.progress import ReportProgress
-from app.soccer.annotation import lines_without
+from app.soccer.annotation import remove_markings
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import GoalEdge, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import analyse_lone_frame, calibrate, with_lone_covariance
+from app.solving.calibrate import add_lone_frame_covariance, analyse_lone_frame, calibrate
 from app.solving.calibration_findings import (
     find_calibration_findings,
     find_pitch_findings_of_lone_frame,
 )
 from app.solving.lone_frame import LoneFrame
-from app.solving.match_position import FramePlace, FramePlaces, find_camera_place, share_position
+from app.solving.match_position import (
+    FramePlace,
+    FramePlaces,
+    calibrate_with_match_position,
+    find_camera_place,
+)
 from app.solving.solve import warm_up_solver
 
 CHUNK = 16
@@ -96,7 +101,7 @@ def calibrate_files(
         labels: ``checked`` leaves out markings found mislabelled, ``given`` trusts all.
         goal: What people click of goals and lines.
         with_leave_one_out: Also drop each marking in turn.
-        matches: File that names the match of each frame (``read_matches``): frames of a match
+        matches: File that names the match of each frame (``read_match_of_each_frame``): frames of a match
             share what they say of the main camera's position.
         guess: Without such a file: guess the matches from names and positions.
         picture: File that says how all pictures were stretched or cropped (``read_picture``).
@@ -114,19 +119,21 @@ def calibrate_files(
     report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise report.refusal(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} holds no line files")
     geometry: PictureGeometry | None = None
     picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
         geometry, picture_summary = choose_picture(files, size, picture)
         files = map_points_to_original_pictures(files, geometry)
-    named = None if matches is None else read_matches(matches)
+    named = None if matches is None else read_match_of_each_frame(matches)
     sharing = guess or named is not None
     policy = replace(CLICKED, goal=goal, check_labels=labels == "checked", lone_frames="any")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
     rounds = 2 if sharing else 1
 
-    def gather(jobs: Sequence[Future[list[CalibratedFrame]]], done: int) -> list[CalibratedFrame]:
+    def collect_frames(
+        jobs: Sequence[Future[list[CalibratedFrame]]], done: int
+    ) -> list[CalibratedFrame]:
         frames: list[CalibratedFrame] = []
         for job in jobs:
             frames.extend(job.result())
@@ -135,10 +142,12 @@ def calibrate_files(
         return frames
 
     alone = with_leave_one_out and not sharing
-    frames = gather([executor.submit(calibrate_chunk, it, size, policy, alone) for it in chunks], 0)
+    frames = collect_frames(
+        [executor.submit(calibrate_chunk, it, size, policy, alone) for it in chunks], 0
+    )
     groups = 0
     if sharing:
-        shares = match_shares(files, [frame.place for frame in frames], named)
+        shares = collect_shared_match_places(files, [frame.place for frame in frames], named)
         groups = len({share.match for share in shares})
         jobs = []
         for start in range(0, len(files), CHUNK):
@@ -149,8 +158,8 @@ def calibrate_files(
                     with_leave_one_out,
                 )
             )  # fmt: skip
-        frames = gather(jobs, len(files))
-    frames = [_frame_in_picture(frame, geometry, size) for frame in frames]
+        frames = collect_frames(jobs, len(files))
+    frames = [_map_frame_to_given_picture(frame, geometry, size) for frame in frames]
     summary = _make_summary(frames, report, time.perf_counter() - began)
     if sharing:
         summary["matches"] = groups
@@ -171,7 +180,7 @@ def calibrate_chunk(
 def recalibrate_chunk_with_match(
     files: Sequence[LineFile],
     frames: Sequence[CalibratedFrame],
-    shares: Sequence[MatchShare],
+    shares: Sequence[SharedMatchPlaces],
     size: ImageSize,
     policy: CalibrationPolicy,
     with_leave_one_out: bool,
@@ -211,7 +220,9 @@ def _calibrate_with_shared_position(
 ) -> CalibratedFrame:
     pitch = Pitch()
     began = time.thread_time()
-    calibration = share_position(frame.alone, others, file.lines, pitch, size, policy)
+    calibration = calibrate_with_match_position(
+        frame.alone, others, file.lines, pitch, size, policy
+    )
     milliseconds = frame.milliseconds + 1000 * (time.thread_time() - began)
     left_out = (
         measure_leave_one_out_errors(file.lines, pitch, size, policy, others)
@@ -242,8 +253,8 @@ def _make_frame(
         stem=stem,
         camera=None
         if camera is None
-        else camera_file_text(
-            camera, with_lone_covariance(calibration, lone).known_covariance, size
+        else format_camera_file(
+            camera, add_lone_frame_covariance(calibration, lone).known_covariance, size
         ),
         reason=calibration.reason,
         findings=tuple(findings),
@@ -255,16 +266,17 @@ def _make_frame(
     )
 
 
-def _frame_in_picture(
+def _map_frame_to_given_picture(
     frame: CalibratedFrame, picture: PictureGeometry | None, size: ImageSize
 ) -> CalibratedFrame:
     """The frame with the camera of the picture as it is; it was found in the one that was taken."""
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    known = with_lone_covariance(frame.alone, frame.lone).known_covariance
+    known = add_lone_frame_covariance(frame.alone, frame.lone).known_covariance
     return replace(
-        frame, camera=camera_file_text(picture.camera_of_shown_picture(camera, size), known, size)
+        frame,
+        camera=format_camera_file(picture.camera_of_annotated_picture(camera, size), known, size),
     )
 
 
@@ -298,20 +310,20 @@ def _write_results(
     findings = [
         {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
     ]
-    texts["findings.json"] = _json_file_text(findings)
+    texts["findings.json"] = _format_json_file(findings)
     if with_leave_one_out:
         rows = [
             {"frame": frame.stem, "marking": marking, "error_px": error}
             for frame in frames
             for marking, error in frame.left_out
         ]
-        texts["leave_one_out.json"] = _json_file_text(rows)
+        texts["leave_one_out.json"] = _format_json_file(rows)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for stale in _files_of_earlier_run(out) - set(texts):
+        for stale in _find_files_of_earlier_run(out) - set(texts):
             (out / stale).unlink()
         # calibrate.json says what the folder holds, so it comes last.
-        for name, text in chain(texts.items(), [("calibrate.json", _json_file_text(summary))]):
+        for name, text in chain(texts.items(), [("calibrate.json", _format_json_file(summary))]):
             file = out / name
             file.parent.mkdir(parents=True, exist_ok=True)
             replace_file(file, text.encode(), durable=False, private=False)
@@ -319,7 +331,7 @@ def _write_results(
         raise InputError(f"the cameras cannot be written to {out} ({error.strerror})") from error
 
 
-def _files_of_earlier_run(out: Path) -> set[str]:
+def _find_files_of_earlier_run(out: Path) -> set[str]:
     """Files of an earlier run; none where no run ended, so nothing foreign is removed."""
     if not (out / "calibrate.json").is_file():
         return set()
@@ -327,11 +339,11 @@ def _files_of_earlier_run(out: Path) -> set[str]:
     return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
 
 
-def _json_file_text(value: Any) -> str:
+def _format_json_file(value: Any) -> str:
     return json_text(value, indent=1) + "\n"
 
 
-def score_files(
+def score_camera_files(
     lines: Path,
     cameras: Path,
     *,
@@ -354,13 +366,13 @@ def score_files(
     report, camera_report = ReaderReport(), ReaderReport()
     found = _cameras_by_frame(read_cameras(cameras, camera_report))
     if not found:
-        raise camera_report.refusal(f"{cameras} holds no camera files")
-    dropped = _wrong_labels(without) if without is not None else set()
+        raise camera_report.make_refusal_error(f"{cameras} holds no camera files")
+    dropped = _read_wrong_labels(without) if without is not None else set()
     pitch = Pitch()
     scores = []
     frames: set[str] = set()
     for file in read_line_files(lines, size, report, by_folder=True):
-        kept = lines_without(
+        kept = remove_markings(
             file.lines, {marking for stem, marking in dropped if stem == file.stem}
         )
         camera = found.get(file.stem)
@@ -369,7 +381,7 @@ def score_files(
         if progress is not None:
             progress(len(scores))
     if not scores:
-        raise report.refusal(f"{lines} holds no line files")
+        raise report.make_refusal_error(f"{lines} holds no line files")
     if all(score is None for score in scores):
         frame, other = sorted(frames)[0], sorted(found)[0]
         raise InputError(
@@ -403,7 +415,7 @@ def _cameras_by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
     return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
 
 
-def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
+def _read_wrong_labels(findings: Path) -> set[tuple[str, str]]:
     """Frame and marking of each finding ``wrong_label``."""
     value = read_json(read_regular_file(findings), str(findings))
     if not isinstance(value, list):

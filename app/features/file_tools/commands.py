@@ -31,14 +31,14 @@ class CameraFormat(StrEnum):
     OPENTRACKIO = "opentrackio"
 
 
-class Labels(StrEnum):
+class LabelChecking(StrEnum):
     """Whether calibration doubts the names of markings."""
 
     CHECKED = "checked"
     GIVEN = "given"
 
 
-class Goal(StrEnum):
+class GoalEdgeOption(StrEnum):
     """What people click of goals and lines (``soccer.pitch.GoalEdge``)."""
 
     INNER = "inner"
@@ -51,16 +51,16 @@ def calibrate(
     source: LineFiles,
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
     size: Size,
-    labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
-        Labels.CHECKED
+    labels: Annotated[LabelChecking, typer.Option(help="checked leaves out wrong labels.")] = (
+        LabelChecking.CHECKED
     ),
     goal: Annotated[
-        Goal,
+        GoalEdgeOption,
         typer.Option(
             help="What is clicked of goals: their inner edges, or their middle; laws is the middle, "
             "and lines whose outer edges make the pitch, as on grass."
         ),
-    ] = Goal.MIDDLE,
+    ] = GoalEdgeOption.MIDDLE,
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
     ] = False,
@@ -87,7 +87,10 @@ def calibrate(
     from app.features.file_tools.calibrate import calibrate_files
     from app.workers.executors import open_process_pool
 
-    named, shape = _file_of_option(matches, "--matches"), _file_of_option(picture, "--picture")
+    named, shape = (
+        _resolve_option_file(matches, "--matches"),
+        _resolve_option_file(picture, "--picture"),
+    )
     pool = open_process_pool(workers or read_settings().workers)
     with pool as executor, show_progress("Calibrating") as progress:
         result = calibrate_files(
@@ -122,7 +125,7 @@ def _print_problems(problems: list[str]) -> None:
         print_error(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
 
 
-def _file_of_option(text: str | None, option: str) -> Path | None:
+def _resolve_option_file(text: str | None, option: str) -> Path | None:
     """The file that an option names; None without the option and for ``auto``."""
     if text in (None, "auto"):
         return None
@@ -148,10 +151,10 @@ def score(
     json_: Json = False,
 ) -> None:
     """Measure camera files against line files: JaC, completeness, errors."""
-    from app.features.file_tools.calibrate import score_files
+    from app.features.file_tools.calibrate import score_camera_files
 
     with show_progress("Scoring") as progress:
-        result = score_files(lines, cameras, size=size, without=without, progress=progress)
+        result = score_camera_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
     _print_problems(result["problems"])
 
@@ -211,13 +214,13 @@ def link(
     ball that belong together meet: t_live = offset + speed * t_replay. A ball that does not tell
     the times is refused with a reason (outcome unobservable).
     """
-    from app.features.file_tools.shots import link_files, parse_hint
+    from app.features.file_tools.shots import link_live_and_replay, parse_hint
 
     try:
         hints = [parse_hint(text) for text in at or ()]
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--at") from error
-    result = link_files(live, replay, out, hints)
+    result = link_live_and_replay(live, replay, out, hints)
     if json_:
         print_json(result)
     else:

@@ -14,15 +14,15 @@ from typing import Any
 from app.durable import replace_file
 from app.errors import DatasetFormatError, GeometryError, InputError
 from app.features.file_tools.track import pitch_to_row
-from app.formats.cameras import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.csv_text import read_rows
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file, resolve_inside
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
-from app.geometry.arrays import row_by_row
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.paint.frame_pitch import find_shared_pitch
 from app.paint.snap import SnappedCamera
@@ -39,14 +39,14 @@ ONE = "one"
 
 
 @dataclass(frozen=True)
-class MatchShare:
+class SharedMatchPlaces:
     """What a frame gets from the others of its match: their places. ``match`` is its name."""
 
     match: str
     others: FramePlaces
 
 
-def read_matches(path: Path) -> dict[str, str]:
+def read_match_of_each_frame(path: Path) -> dict[str, str]:
     """The match of each frame: a JSON object, or a CSV file with columns ``frame`` and ``match``.
 
     A frame is the stem of its line file, ``00002`` or ``folder/00002``.
@@ -65,13 +65,13 @@ def read_matches(path: Path) -> dict[str, str]:
                 "is not a JSON object that maps each frame name to a match name",
             )
         return dict(value)
-    rows = read_rows(content, str(path), ("frame", "match"), Limits())
+    rows = read_rows(content, str(path), ("frame", "match"), ImportLimits())
     return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}
 
 
-def match_shares(
+def collect_shared_match_places(
     files: Sequence[LineFile], places: Sequence[FramePlace | None], named: Mapping[str, str] | None
-) -> list[MatchShare]:
+) -> list[SharedMatchPlaces]:
     """What each frame gets from the others of its match.
 
     Args:
@@ -88,7 +88,7 @@ def match_shares(
     members = defaultdict(list)
     for index, file in enumerate(files):
         members[match[file.stem]].append(index)
-    shares = [MatchShare(match[file.stem], NO_PLACES) for file in files]
+    shares = [SharedMatchPlaces(match[file.stem], NO_PLACES) for file in files]
     for name, indices in members.items():
         if not name:
             continue
@@ -97,7 +97,7 @@ def match_shares(
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
             others = all_.without(row[index]) if index in row else all_
-            shares[index] = MatchShare(name, others)
+            shares[index] = SharedMatchPlaces(name, others)
     return shares
 
 
@@ -111,7 +111,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
     report = ReaderReport()
     frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
     if not frames:
-        raise report.refusal(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} holds no line files")
     found = estimate_pitch(frames, CLICKED)
     return {
         "length_m": found.length,
@@ -124,7 +124,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
 
 
 def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
-    """How the pictures of line files were stretched or cropped, as ``read_picture`` reads it.
+    """How the pictures of line files were stretched or cropped, as ``read_picture_geometry`` reads it.
 
     Raises:
         InputError: There is no line file.
@@ -133,9 +133,9 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
     report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise report.refusal(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} holds no line files")
     found = _estimate_picture(files, size)
-    values = _picture_values(found)
+    values = _picture_estimate_to_json(found)
     return {**values, "problems": [problem.message for problem in report.problems]}
 
 
@@ -151,16 +151,16 @@ def choose_picture(
             where something certainly happened to the pictures.
     """
     if given is not None:
-        picture = read_picture(given)
+        picture = read_picture_geometry(given)
         return picture, {"aspect": picture.aspect, "shift": [*picture.shift]}
     try:
         found = _estimate_picture(files, size)
     except GeometryError as error:
         return None, {"problem": error.message}
-    return found.proposal, _picture_values(found)
+    return found.proposal, _picture_estimate_to_json(found)
 
 
-def read_picture(path: Path) -> PictureGeometry:
+def read_picture_geometry(path: Path) -> PictureGeometry:
     """A picture as ``touchline picture --json`` writes it; numbers that are absent are nothing.
 
     Raises:
@@ -187,7 +187,10 @@ def map_points_to_original_pictures(
     """Line files with their points where the pictures as they were taken show them."""
     if picture is None:
         return list(files)
-    return [replace(file, lines=picture.lines_as_taken(file.lines, file.size)) for file in files]
+    return [
+        replace(file, lines=picture.lines_in_original_picture(file.lines, file.size))
+        for file in files
+    ]
 
 
 def _estimate_picture(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
@@ -195,7 +198,7 @@ def _estimate_picture(files: Sequence[LineFile], size: ImageSize) -> PictureEsti
     return estimate_match_picture(frames, CLICKED)
 
 
-def _picture_values(found: PictureEstimate) -> dict[str, Any]:
+def _picture_estimate_to_json(found: PictureEstimate) -> dict[str, Any]:
     return {
         "aspect": found.picture.aspect,
         "shift": [*found.picture.shift],
@@ -206,7 +209,7 @@ def _picture_values(found: PictureEstimate) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class DrawnFrame:
+class SnappedFrame:
     """A camera on its paint, and its file.
 
     Attributes:
@@ -224,8 +227,8 @@ class DrawnFrame:
     pitch: Pitch
 
 
-def share_tripods(
-    drawn: Sequence[DrawnFrame], tripod: str | None, rows: Sequence[dict[str, Any]], out: Path
+def refine_shared_tripod_cameras(
+    drawn: Sequence[SnappedFrame], tripod: str | None, rows: Sequence[dict[str, Any]], out: Path
 ) -> None:
     """Write cameras of frames of one tripod again, with what they know together.
 
@@ -240,7 +243,7 @@ def share_tripods(
     """
     if tripod is None:
         return
-    by_camera: dict[str, list[DrawnFrame]] = {}
+    by_camera: dict[str, list[SnappedFrame]] = {}
     named = None if tripod == ONE else _read_camera_names(Path(tripod), rows)
     for each in drawn:
         name = ONE if named is None else named.get(each.frame, "")
@@ -258,7 +261,7 @@ def share_tripods(
         shown, covariances = shared
         for each, covariance in zip(frames, covariances, strict=True):
             by_frame[each.frame]["shown"] = pitch_to_row(shown, on_shown=False)
-            text = camera_file_text(each.camera, row_by_row(covariance), each.size)
+            text = format_camera_file(each.camera, flatten_covariance(covariance), each.size)
             _write_camera_file(resolve_inside(out, camera_file_name(each.frame)), text)
 
 
@@ -269,7 +272,7 @@ def _read_camera_names(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[st
             f'"{file}" is not {ONE}, and there is no such file',
             hint="Give a CSV file with the columns frame and match, or a JSON object of frame names and matches.",
         )
-    named = read_matches(file)
+    named = read_match_of_each_frame(file)
     if not any(row["frame"] in named for row in rows):
         raise InputError(f"{file} names none of the {len(rows)} frames, such as {rows[0]['frame']}")
     return named

@@ -16,18 +16,18 @@ import numpy.typing as npt
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
-from app.features.file_tools.matches import DrawnFrame, share_tripods
-from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
-from app.formats.file_tree import Limits
+from app.features.file_tools.matches import SnappedFrame, refine_shared_tripod_cameras
+from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
+from app.formats.file_tree import ImportLimits
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.report import ReaderReport
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration import LineFile, read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.sn_calibration_writer import write_line_files
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.formats.view_files import write_file_below
-from app.geometry.arrays import row_by_row
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.json_text import json_text
@@ -37,7 +37,7 @@ from app.paint.agreement import measure_agreement
 from app.paint.evidence import to_paint_evidence
 from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.propose import explain_too_small_picture
-from app.paint.ridges import find_line_like
+from app.paint.ridges import find_line_like_pixels
 from app.paint.snap import SnappedCamera, snap_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
@@ -49,7 +49,7 @@ from app.solving.calibrate import calibrate
 from app.worker_process import WorkerEnded, WorkerProcess
 
 
-class UniqueNames:
+class UniqueNameGenerator:
     """Names of frames, none given twice: ``a.jpg`` and ``a.png`` are ``a`` and ``a_2``."""
 
     def __init__(self) -> None:
@@ -92,7 +92,7 @@ def read_pictures(
     """
     with closing(WorkerProcess(LIMITS)) as worker:
         for source in sources:
-            with open_tree_while_read(source, report, Limits.of(settings)) as tree:
+            with open_tree_context(source, report, ImportLimits.of(settings)) as tree:
                 if tree is None:
                     continue
                 for name in tree.names():
@@ -113,7 +113,7 @@ def list_picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]
     """Stems of every picture of some folders, zips and files; nothing is decoded."""
     stems: list[str] = []
     for source in sources:
-        with open_tree_while_read(source, ReaderReport(), Limits.of(settings)) as tree:
+        with open_tree_context(source, ReaderReport(), ImportLimits.of(settings)) as tree:
             if tree is None:
                 continue
             places = [PurePosixPath(name) for name in tree.names()]
@@ -131,7 +131,7 @@ SENTENCES = {
 }
 
 
-def snap_files(
+def snap_cameras_to_paint(
     lines: Path,
     images: Sequence[Path],
     out: Path,
@@ -159,21 +159,21 @@ def snap_files(
     """
     report = ReaderReport()
     values = _read_line_values(lines, settings, report)
-    match = _FileByPicture(values, images, settings)
+    match = _PictureFileMatcher(values, images, settings)
     rows: list[dict[str, Any]] = []
-    drawn: list[DrawnFrame] = []
+    drawn: list[SnappedFrame] = []
     for picture, frame, key in match.pictures(report):
         row, text, snapped = _snap_picture(picture, frame, values[key], report)
         _write_snapped_camera(out, frame, text, snapped)
         rows.append(row)
         if snapped is not None:
             size = ImageSize(snapped.size[1], snapped.size[0])
-            drawn.append(DrawnFrame(frame, snapped, snapped.camera, size, Pitch()))
+            drawn.append(SnappedFrame(frame, snapped, snapped.camera, size, Pitch()))
         if progress is not None:
             progress(len(rows))
     if not rows:
-        raise report.refusal(f"no picture has a line file of its name in {lines}")
-    share_tripods(drawn, tripod, rows, out)
+        raise report.make_refusal_error(f"no picture has a line file of its name in {lines}")
+    refine_shared_tripod_cameras(drawn, tripod, rows, out)
     _write_rows(out / "snap.json", rows)
     return rows
 
@@ -198,18 +198,18 @@ def measure_paint_agreement_of_files(
     """
     report = ReaderReport()
     found = read_cameras(cameras, report)
-    match = _FileByPicture(found, images, settings)
+    match = _PictureFileMatcher(found, images, settings)
     rows: list[dict[str, Any]] = []
     for picture, frame, key in match.pictures(report):
-        rows.append(_agree_picture(picture, frame, found[key]))
+        rows.append(_measure_picture_agreement(picture, frame, found[key]))
         if progress is not None:
             progress(len(rows))
     if not rows:
-        raise report.refusal(f"no picture has a camera of its name in {cameras}")
+        raise report.make_refusal_error(f"no picture has a camera of its name in {cameras}")
     return rows
 
 
-class _FileByPicture:
+class _PictureFileMatcher:
     """Which line file or camera belongs to a picture.
 
     The one of its whole name; else the one of its bare stem, where that stem is unique among
@@ -226,7 +226,7 @@ class _FileByPicture:
 
     def pictures(self, report: ReaderReport) -> Iterator[tuple[PictureFile, str, str]]:
         """Each picture that has a file, with the name of its frame and the key of its file."""
-        names = UniqueNames()
+        names = UniqueNameGenerator()
         for picture in read_pictures(self._images, self._settings, report):
             key = self._find_key(picture.stem)
             if key is not None:
@@ -243,9 +243,9 @@ class _FileByPicture:
 def _read_line_values(lines: Path, settings: Settings, report: ReaderReport) -> dict[str, Any]:
     """The lines of each image, by stem with folders; an error where they cannot be read."""
     values: dict[str, Any] = {}
-    with open_tree_while_read(lines, report, Limits.of(settings)) as tree:
+    with open_tree_context(lines, report, ImportLimits.of(settings)) as tree:
         if tree is None:
-            raise report.refusal(f"{lines} holds no line files")
+            raise report.make_refusal_error(f"{lines} holds no line files")
         for name in tree.names():
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json":
@@ -269,36 +269,36 @@ def _snap_picture(
 ) -> tuple[dict[str, Any], str | None, SnappedCamera | None]:
     """The row of a picture, the text of its camera's file, and how it lies on the paint."""
     if picture.image is None:
-        return _result_row(frame, NOTHING, reason=picture.problem), None, None
+        return _build_result_row(frame, NOTHING, reason=picture.problem), None, None
     if isinstance(value, ReviewError):
-        return _result_row(frame, NOTHING, reason=value.message), None, None
+        return _build_result_row(frame, NOTHING, reason=value.message), None, None
     if (small := explain_too_small_picture(picture.image)) is not None:
-        return _result_row(frame, NOTHING, reason=small), None, None
+        return _build_result_row(frame, NOTHING, reason=small), None, None
     height, width = picture.image.shape[:2]
     size = ImageSize(width, height)
     try:
         lines, _ = lines_from_json(value, size, picture.stem, report)
     except ReviewError as error:
-        return _result_row(frame, NOTHING, reason=error.message), None, None
+        return _build_result_row(frame, NOTHING, reason=error.message), None, None
     began = time.thread_time()
     clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
-        return _result_row(frame, NOTHING, reason=clicked.reason), None, None
-    kept = camera_file_text(clicked.camera, clicked.known_covariance, size)
+        return _build_result_row(frame, NOTHING, reason=clicked.reason), None, None
+    kept = format_camera_file(clicked.camera, clicked.known_covariance, size)
     field = find_field_of_play(picture.image)
     reason = explain_missing_field(picture.image, field)
     if reason is not None:
-        return _result_row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
+        return _build_result_row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
     try:
         snapped = _snap_to_paint(picture, field, clicked)
     except (GeometryError, np.linalg.LinAlgError) as error:
         broken = (
             f"the paint cannot be solved ({error}): the camera from the annotated lines is kept"
         )
-        return _result_row(frame, UNSURE, reason=broken), kept, None
+        return _build_result_row(frame, UNSURE, reason=broken), kept, None
     spent = 1000 * (time.thread_time() - began)
-    seen = measure_agreement(snapped.camera, field, find_line_like(picture.image, field))
-    row = _result_row(
+    seen = measure_agreement(snapped.camera, field, find_line_like_pixels(picture.image, field))
+    row = _build_result_row(
         frame,
         UNSURE if snapped.reason else PROPOSED,
         supported=seen.supported,
@@ -312,7 +312,7 @@ def _snap_picture(
     known = snapped.covariance
     if snapped.reason is not None or known is None:
         return row, kept, None
-    return row, camera_file_text(snapped.camera, row_by_row(known), size), snapped
+    return row, format_camera_file(snapped.camera, flatten_covariance(known), size), snapped
 
 
 def _snap_to_paint(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
@@ -321,19 +321,19 @@ def _snap_to_paint(picture: PictureFile, field: Any, clicked: Calibration) -> Sn
     return snap_camera(picture.image, field, clicked.camera, start_covariance=known)
 
 
-def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str, Any]:
+def _measure_picture_agreement(picture: PictureFile, frame: str, camera: Camera) -> dict[str, Any]:
     if picture.image is None:
-        return _result_row(frame, NOTHING, reason=picture.problem)
+        return _build_result_row(frame, NOTHING, reason=picture.problem)
     if camera.lens != BROWN_CONRADY:
         other = "the paint is read with lenses of one radial term; this camera has another"
-        return _result_row(frame, NOTHING, reason=other)
+        return _build_result_row(frame, NOTHING, reason=other)
     began = time.thread_time()
     field = find_field_of_play(picture.image)
     reason = explain_missing_field(picture.image, field)
     if reason is not None:
-        return _result_row(frame, NOTHING, reason=reason)
-    seen = measure_agreement(camera, field, find_line_like(picture.image, field))
-    return _result_row(
+        return _build_result_row(frame, NOTHING, reason=reason)
+    seen = measure_agreement(camera, field, find_line_like_pixels(picture.image, field))
+    return _build_result_row(
         frame,
         "measured",
         supported=seen.supported,
@@ -343,7 +343,7 @@ def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str
     )
 
 
-def _result_row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
+def _build_result_row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
     names = ("supported", "explained", "points", "error_px", "runner_up", "ms", "moved_px")
     empty: Mapping[str, Any] = dict.fromkeys((*names, "reason"))
     return {"frame": frame, "outcome": outcome, **empty, "points": 0, **known}
@@ -367,7 +367,7 @@ def _write_snapped_camera(
         if snapped is not None:
             (out / "lines").mkdir(exist_ok=True)
             height, width = snapped.size
-            points = to_paint_evidence(snapped.evidence).some_points()
+            points = to_paint_evidence(snapped.evidence).thin_points()
             file = LineFile(stem, ImageSize(width, height), points)
             write_line_files(out / "lines", [file])
     except OSError as error:

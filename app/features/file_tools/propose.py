@@ -14,12 +14,12 @@ import numpy as np
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import GeometryError, InputError
-from app.features.file_tools.matches import DrawnFrame, share_tripods
-from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
-from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
+from app.features.file_tools.matches import SnappedFrame, refine_shared_tripod_cameras
+from app.features.file_tools.paint import PictureFile, UniqueNameGenerator, read_pictures
+from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.report import ReaderReport
 from app.formats.safe_path import resolve_inside
-from app.geometry.arrays import row_by_row
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.paint.frame_pitch import find_agreed_pitch, group_by_position, make_pitch_frame
@@ -35,7 +35,7 @@ LIKELY = 0.6
 """Share of the markings that have paint, of an unsure camera that is asked for the size of its pitch."""
 
 
-def propose_files(
+def propose_cameras_of_files(
     sources: Sequence[Path],
     out: Path,
     settings: Settings,
@@ -67,11 +67,11 @@ def propose_files(
     report = ReaderReport()
     cameras = _read_known_cameras(known)
     rows: list[dict[str, Any]] = []
-    names = UniqueNames()
+    names = UniqueNameGenerator()
     seen: list[_ProposedCamera | None] = []
     for picture in read_pictures(sources, settings, report):
         frame = names.name(picture.stem)
-        row, proposed = _propose_one(picture, frame, out, cameras, size, Pitch())
+        row, proposed = _propose_frame_camera(picture, frame, out, cameras, size, Pitch())
         rows.append(row)
         seen.append(proposed)
         if progress is not None:
@@ -79,14 +79,14 @@ def propose_files(
     if not rows:
         why = f": {report.problems[0].message}" if report.problems else ""
         raise InputError(f"no picture (jpg, png or webp) can be read{why}")
-    pitches = _pitches_shown_by_films(seen)
+    pitches = _estimate_pitch_of_each_frame(seen)
     if pitches:
         for at, picture in enumerate(read_pictures(sources, settings, ReaderReport())):
             if at in pitches:
-                again = _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
+                again = _propose_on_other_pitch(picture, rows, at, out, pitches[at], seen[at], size)
                 seen[at] = again or seen[at]
     drawn = [one.drawn for one in seen if one is not None and one.drawn is not None]
-    share_tripods(drawn, tripod, rows, out)
+    refine_shared_tripod_cameras(drawn, tripod, rows, out)
     _write_camera_file(out / RESULT, json_text(rows, indent=1) + "\n")
     return rows
 
@@ -98,10 +98,10 @@ class _ProposedCamera:
     camera: Camera
     agreement: float
     frame: PitchFrame
-    drawn: DrawnFrame | None = None
+    drawn: SnappedFrame | None = None
 
 
-def _pitches_shown_by_films(seen: Sequence[_ProposedCamera | None]) -> dict[int, Pitch]:
+def _estimate_pitch_of_each_frame(seen: Sequence[_ProposedCamera | None]) -> dict[int, Pitch]:
     """The pitch of each frame whose film certainly shows another size, by its index."""
     cameras = [None if one is None else one.camera for one in seen]
     sizes = [None if one is None else one.frame.size for one in seen]
@@ -114,7 +114,7 @@ def _pitches_shown_by_films(seen: Sequence[_ProposedCamera | None]) -> dict[int,
     return found
 
 
-def _propose_again(
+def _propose_on_other_pitch(
     picture: PictureFile,
     rows: list[dict[str, Any]],
     at: int,
@@ -127,7 +127,9 @@ def _propose_again(
     frame = rows[at]["frame"]
     if picture.image is None or before is None:
         return None
-    row, again = _propose_one(picture, frame, out, [before.camera], size, pitch, before.agreement)
+    row, again = _propose_frame_camera(
+        picture, frame, out, [before.camera], size, pitch, before.agreement
+    )
     if again is not None:
         rows[at] = row | {"ms": row["ms"] + rows[at]["ms"]}
     return again
@@ -139,7 +141,7 @@ def count_proposals(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
     return {name: counts[name] for name in PROPOSAL_OUTCOMES}
 
 
-def _propose_one(
+def _propose_frame_camera(
     picture: PictureFile,
     frame: str,
     out: Path,
@@ -160,7 +162,7 @@ def _propose_one(
     milliseconds = 1000 * (time.perf_counter() - began)
     file, row = (
         resolve_inside(out, camera_file_name(frame)),
-        _result_row(frame, found, milliseconds),
+        _build_result_row(frame, found, milliseconds),
     )
     if pitch != Pitch():
         row["pitch"] = {"length": pitch.length, "width": pitch.width}
@@ -173,12 +175,12 @@ def _propose_one(
         if size is not None:
             camera = camera.scaled(size.width / width, size.height / height)
         spread = None if found.snapped is None else found.snapped.covariance
-        covariance = None if spread is None else row_by_row(spread)
+        covariance = None if spread is None else flatten_covariance(spread)
         shape = size or ImageSize(width, height)
-        _write_camera_file(file, camera_file_text(camera, covariance, shape))
+        _write_camera_file(file, format_camera_file(camera, covariance, shape))
         known_to = make_pitch_frame(picture.image, found.camera, pitch)
         drawn = (
-            DrawnFrame(frame, found.snapped, camera, shape, pitch)
+            SnappedFrame(frame, found.snapped, camera, shape, pitch)
             if found.snapped is not None and found.snapped.reason is None
             else None
         )
@@ -196,7 +198,7 @@ def _may_fit_another_pitch(found: FrameProposal) -> bool:
     return found.agreement is not None and found.agreement.supported >= LIKELY
 
 
-def _result_row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
+def _build_result_row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
     agreement, snapped = found.agreement, found.snapped
     return {
         "frame": frame,

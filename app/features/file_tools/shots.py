@@ -23,7 +23,7 @@ from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import ReaderReport
 from app.json_text import json_text
 from app.progress import ReportProgress
-from app.tracking.ball_rays import BallRays, ball_rays
+from app.tracking.ball_rays import BallRays, build_ball_rays
 from app.tracking.link import find_time_map
 from app.tracking.time_map import TimeMap
 from app.video.shots import RecordingShots, Shot, index_and_find_shots
@@ -63,19 +63,19 @@ def find_shots_in_file(
         InputError: ``out`` cannot hold the result.
     """
 
-    def hear(message: tuple[int, int | None, str]) -> None:
+    def forward_progress(message: tuple[int, int | None, str]) -> None:
         if progress is not None:
             progress(*message)
 
     with closing(WorkerProcess(LIMITS)) as worker:
         try:
             found: RecordingShots = worker.run(
-                index_and_find_shots, recording, settings, on_message=hear
+                index_and_find_shots, recording, settings, on_message=forward_progress
             )
         except WorkerEnded as error:
             kind = ImageError if error.reason == "crash" else TooLargeError
             raise kind(f"{recording.name} {error}") from error
-    document = _shots_document(found)
+    document = _shots_to_json(found)
     try:
         out.mkdir(parents=True, exist_ok=True)
         content = (json_text(document, indent=1) + "\n").encode()
@@ -85,16 +85,16 @@ def find_shots_in_file(
     return document
 
 
-def _shots_document(found: RecordingShots) -> dict[str, Any]:
+def _shots_to_json(found: RecordingShots) -> dict[str, Any]:
     return {
         "frames": found.frames,
         "fps": found.fps,
         "variable": found.variable,
-        "shots": [_shot_row(shot) for shot in found.shots],
+        "shots": [_shot_to_json(shot) for shot in found.shots],
     }
 
 
-def _shot_row(shot: Shot) -> dict[str, Any]:
+def _shot_to_json(shot: Shot) -> dict[str, Any]:
     return {
         "first": shot.first,
         "last": shot.last,
@@ -109,7 +109,7 @@ def _shot_row(shot: Shot) -> dict[str, Any]:
     }
 
 
-def link_files(
+def link_live_and_replay(
     live: Path, replay: Path, out: Path, hints: Sequence[tuple[float, float]] = ()
 ) -> dict[str, Any]:
     """Find which live time each time of a replay shows, and write ``link.json``.
@@ -129,13 +129,13 @@ def link_files(
         DatasetFormatError: ``ball.csv`` is another file.
     """
     report = ReaderReport()
-    made = find_time_map(_read_view(live, report), _read_view(replay, report), hints)
+    made = find_time_map(_read_ball_rays(live, report), _read_ball_rays(replay, report), hints)
     result = {
-        **_link_values(made),
+        **_time_map_to_json(made),
         "reason": made.reason,
         "found_by": None if made.reason else "instants" if made.by_hand else "ball",
         "pieces": [
-            {"first_s": piece.first, "last_s": piece.last, **_link_values(piece)}
+            {"first_s": piece.first, "last_s": piece.last, **_time_map_to_json(piece)}
             for piece in made.pieces
         ],
         "problems": [problem.message for problem in report.problems],
@@ -157,7 +157,7 @@ def parse_hint(text: str) -> tuple[float, float]:
     return float(found.group(1)), float(found.group(2))
 
 
-def _link_values(made: TimeMap) -> dict[str, Any]:
+def _time_map_to_json(made: TimeMap) -> dict[str, Any]:
     linked = made.reason is None
     sigma: Sequence[float | None] = (None, None)
     if linked and made.covariance is not None:
@@ -174,14 +174,14 @@ def _link_values(made: TimeMap) -> dict[str, Any]:
     }
 
 
-def _read_view(folder: Path, report: ReaderReport) -> BallRays:
+def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
     cameras = key_by_frame_number(read_cameras(folder, report))
     if not cameras:
-        raise report.refusal(f"{folder} holds no camera_<frame>.json")
-    rows = read_ball(folder / BALL_FILE, str(folder / BALL_FILE), report)
+        raise report.make_refusal_error(f"{folder} holds no camera_<frame>.json")
+    rows = read_ball_rows(folder / BALL_FILE, str(folder / BALL_FILE), report)
     seen = [(time, pixel, cameras[frame]) for frame, time, pixel in rows if frame in cameras]
     if not seen:
         raise InputError(
@@ -203,10 +203,12 @@ def _read_view(folder: Path, report: ReaderReport) -> BallRays:
             f" {_MOST_RAYS:,} at most",
             hint="Give only the rows of one shot.",
         )
-    return ball_rays([one[0] for one in kept], [one[1] for one in kept], [one[2] for one in kept])
+    return build_ball_rays(
+        [one[0] for one in kept], [one[1] for one in kept], [one[2] for one in kept]
+    )
 
 
-def read_ball(
+def read_ball_rows(
     path: Path, name: str, report: ReaderReport
 ) -> list[tuple[int, float, tuple[float, float]]]:
     """Frame, time in seconds and pixel of each row with a ball of a ``ball.csv``.

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
-from app.formats.cameras import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
@@ -25,8 +25,8 @@ from app.soccer.frames import ImageSize
 from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import OUTCOMES
-from app.tracking.sides import turned_frame
-from app.tracking.track import FrameCamera, Track, track_clip
+from app.tracking.sides import turn_frame_camera
+from app.tracking.track import CameraTrack, FrameCamera, track_clip
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
 RESULT = "track.json"
@@ -35,7 +35,7 @@ LARGEST_LINES = 16 * 2**20
 """Bytes of a file of lines of one frame."""
 
 
-def track_files(
+def track_cameras_of_clip(
     clip: Path,
     out: Path,
     lines: Sequence[str] = (),
@@ -70,23 +70,25 @@ def track_files(
             "the cameras cannot be turned: the given lines already say which half of the pitch is left",
             hint="Name the lines for the other half, or leave out one of the two options.",
         )
-    named = _parse_names(lines)
+    named = _parse_line_file_options(lines)
     contents = {number: _read_file(path) for number, path in named.items()}
     shown = {number: str(path) for number, path in named.items()}
 
-    def tell(done: Any) -> None:
+    def forward_progress(done: Any) -> None:
         if progress is not None:
             progress(done)
 
     with closing(WorkerProcess(LIMITS)) as worker:
         try:
-            found: Track = worker.run(track_video, clip, contents, shown, on_message=tell)
+            found: CameraTrack = worker.run(
+                track_video, clip, contents, shown, on_message=forward_progress
+            )
         except WorkerEnded as error:
             raise InputError(f"{clip.name} {error}") from error
     frames = found.shown_frames if on_shown else found.frames
     pitch = pitch_to_row(found.shown, on_shown=on_shown)
     if turn:
-        frames = [turned_frame(frame) for frame in frames]
+        frames = [turn_frame_camera(frame) for frame in frames]
         if pitch is not None:
             x, y, z = pitch["tripod"]
             pitch["tripod"] = [-x, -y, z]
@@ -100,7 +102,7 @@ def track_video(
     contents: Mapping[int, bytes],
     shown: Mapping[int, str],
     send: Callable[[int], Any],
-) -> Track:
+) -> CameraTrack:
     """The work of the process: decode, calibrate and follow.
 
     Args:
@@ -126,11 +128,11 @@ def _parse_lines(content: bytes, shown: str, size: ImageSize, report: ReaderRepo
         )
     lines, _ = lines_from_json(documents[0].lines, size, shown, report)
     if not lines:
-        raise report.refusal(f"{shown} has no line of a known marking")
+        raise report.make_refusal_error(f"{shown} has no line of a known marking")
     return lines
 
 
-def _parse_names(lines: Sequence[str]) -> dict[int, Path]:
+def _parse_line_file_options(lines: Sequence[str]) -> dict[int, Path]:
     named: dict[int, Path] = {}
     for text in lines:
         path, separator, number = text.rpartition("@")
@@ -205,9 +207,9 @@ def pitch_to_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any]
     if shown is None:
         return None
     (crown, crown_sigma), (inward, inward_sigma) = shown.crown, shown.inward
-    (knows_length, knows_width), (length, width) = shown.knows_sizes, shown.sizes_sigma.tolist()
+    (knows_length, knows_width), (length, width) = shown.are_sizes_known, shown.sizes_sigma.tolist()
     spread = np.linalg.eigvalsh(shown.position_covariance)[-1]
-    other = shown.other_pitch()
+    other = shown.clearly_different_pitch()
     return {
         "cameras": "shown" if on_shown else "plan",
         "length": shown.pitch.length if knows_length else None,
@@ -249,7 +251,7 @@ def write_cameras(out: Path, found: Sequence[FrameCamera], result: Mapping[str, 
             if frame.camera is None:
                 file.unlink(missing_ok=True)
                 continue
-            text = camera_file_text(frame.camera, frame.covariance, frame.size)
+            text = format_camera_file(frame.camera, frame.covariance, frame.size)
             replace_file(file, text.encode(), durable=False, private=False)
         text = json_text(result, indent=1) + "\n"
         replace_file(out / RESULT, text.encode(), durable=False, private=False)

@@ -37,8 +37,8 @@ from app.soccer.finding import (
     TRACK_DISAGREES,
     Dismissal,
     Finding,
-    Fix,
     PlacedFinding,
+    SuggestedFix,
 )
 
 SEEN = (PITCH_SIZE, PICTURE_GEOMETRY, TRACK_DISAGREES)
@@ -88,7 +88,7 @@ def _finding_from_row(row: Any) -> Finding:
         return Finding(row.kind, row.sentence, view=row.view)
     with report_damaged_values():
         place = None if row.place is None else tuple(parse_json_column(row.place))
-    fix = Fix("move_ball" if place else "exclude_view", row.view)
+    fix = SuggestedFix("move_ball" if place else "exclude_view", row.view)
     return PlacedFinding(
         row.kind, row.sentence, view=row.view, number=row.number, fix=fix, place=place
     )
@@ -185,7 +185,7 @@ def replace_shape_findings(
 
 
 @dataclass(frozen=True)
-class BallNotice:
+class UnexplainedBall:
     """A ball that a track does not explain, as it is stored.
 
     Attributes:
@@ -210,7 +210,7 @@ def replace_track_findings(
     dataset_id: int,
     matches: Collection[str],
     groups: Container[int] | None,
-    found: Iterable[BallNotice],
+    found: Iterable[UnexplainedBall],
 ) -> list[int]:
     """Put balls that tracks do not explain in the place of those that groups have.
 
@@ -269,7 +269,7 @@ SHOWN = (
     *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),
     shown_actor_column(_TABLE.c.actor, _TABLE.c.at).label("actor"),
 )
-"""What ``current_dismissals`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
+"""What ``group_current_dismissals`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,7 @@ NOTHING_DISMISSED = GroupDismissals()
 """Of a group in which nobody ever dismissed anything."""
 
 
-def current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
+def group_current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
     ``rows`` are those of the table, the oldest first (``read_import_findings`` reads them).
@@ -423,9 +423,9 @@ def read_import_findings(
     for row in rows:
         if row.source != _DISMISSED:
             found[row.group].append(row)
-    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
+    return found, group_current_dismissals(row for row in rows if row.source == _DISMISSED)
 
 
-def read_noticed_by_imports(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+def read_import_notices(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
     """The first part of ``read_import_findings``."""
     return read_import_findings(session, ids)[0]

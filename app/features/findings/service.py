@@ -11,19 +11,24 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import dataset_id
 from app.features.findings.queries import insert_dismissal, read_import_findings
-from app.features.groups.state import GroupState, read_states, require_content, require_unchanged
-from app.features.groups.submit import read_solved, require_group_open
+from app.features.groups.state import (
+    GroupState,
+    read_states,
+    require_unchanged,
+    require_unchanged_content,
+)
+from app.features.groups.submit import read_solved_group, require_group_open
 from app.features.queue.queries import (
     Condition,
-    Listing,
+    GroupListing,
     RowOrder,
     any_condition,
     compare_condition,
-    contains_text,
+    contains_text_condition,
     has_list_item,
 )
 from app.features.queue.refresh_queries import refresh_queue
-from app.features.solutions.queries import is_solved
+from app.features.solutions.queries import is_group_solved
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group, strip_and_check_note
 
@@ -62,7 +67,7 @@ def count_groups(
 ) -> int:
     """How many groups of a dataset have findings, of a kind, open or dismissed, where these are named."""
     with store.read() as session:
-        return Listing(session, dataset_id, _finding_conditions(kind, dismissed)).count()
+        return GroupListing(session, dataset_id, _finding_conditions(kind, dismissed)).count()
 
 
 def read_findings(
@@ -80,9 +85,9 @@ def read_findings(
     """
     with store.read() as session:
         where = [*_finding_conditions(kind, dismissed), compare_condition("number", ">", after)]
-        ids = Listing(session, dataset_id, where).ids(RowOrder("number"), limit)
+        ids = GroupListing(session, dataset_id, where).ids(RowOrder("number"), limit)
         states = read_states(session, ids)
-    return [_group_findings(state, kind, dismissed) for state in states]
+    return [_collect_group_findings(state, kind, dismissed) for state in states]
 
 
 def iterate_findings_as_json(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
@@ -98,13 +103,15 @@ def _finding_conditions(kind: str | None, dismissed: bool | None) -> list[Condit
     """What holds of groups with findings that can be read: those of an earlier solver cannot."""
     columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
     has = any_condition(
-        contains_text(column, ",") if kind is None else has_list_item(column, kind)
+        contains_text_condition(column, ",") if kind is None else has_list_item(column, kind)
         for column in columns[dismissed]
     )
-    return [has, is_solved()]
+    return [has, is_group_solved()]
 
 
-def _group_findings(state: GroupState, kind: str | None, dismissed: bool | None) -> GroupFindings:
+def _collect_group_findings(
+    state: GroupState, kind: str | None, dismissed: bool | None
+) -> GroupFindings:
     found = state.solution.findings if state.solution is not None else ()
     chosen = [
         (item, dismissal)
@@ -120,7 +127,7 @@ def _group_findings(state: GroupState, kind: str | None, dismissed: bool | None)
 
 
 @dataclass(frozen=True)
-class FindingName:
+class FindingReference:
     """What tells a finding of a group from the others; ``number`` where several have the rest."""
 
     kind: str
@@ -133,7 +140,7 @@ class FindingName:
 def set_dismissal(
     store: Store,
     group_id: int,
-    named: FindingName,
+    named: FindingReference,
     *,
     dismissed: bool,
     note: str | None = None,
@@ -159,15 +166,15 @@ def set_dismissal(
     """
     note = strip_and_check_note(note)
     while True:
-        record, solution = read_solved(store, group_id)
+        record, solution = read_solved_group(store, group_id)
         stored, what = record.stored, f"group {record.stored.group.key}"
         before = record.state(solution)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_content(session, group_id, record.content, if_match, what)
+            require_unchanged_content(session, group_id, record.content, if_match, what)
             require_group_open(session, stored.dataset_id, group_id)
             # After the ETag: a person who saw another state is told so first.
-            finding = _meant_finding(
+            finding = _find_named_finding(
                 () if before.solution is None else before.solution.findings, named
             )
             # Under another policy other things may be found.
@@ -183,7 +190,7 @@ def set_dismissal(
                 return after
 
 
-def _meant_finding(findings: Sequence[Finding], named: FindingName) -> Finding:
+def _find_named_finding(findings: Sequence[Finding], named: FindingReference) -> Finding:
     """The finding that is meant; of several, the one with the nearest number."""
     names = (named.kind, named.view, named.marking, named.suggested)
     fitting = [one for one in findings if (one.kind, one.view, one.marking, one.suggested) == names]

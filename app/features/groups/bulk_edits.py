@@ -36,8 +36,8 @@ from app.features.groups.submit import (
     require_group_open,
     submit_edits,
 )
-from app.features.groups.view_paint import PaintFollower
-from app.features.solutions.service import Solve, solve_encoded
+from app.features.groups.view_paint import PaintUpdater
+from app.features.solutions.service import Solve, solve_and_encode
 
 MAX_ITEMS = 200
 """Views of one request: solving 200 groups keeps other large edits waiting for some seconds. With 2,000
@@ -94,7 +94,7 @@ class BulkEditReport:
 
 
 @dataclass
-class _GroupPlan:
+class _GroupEditPlan:
     """The items of one group and the edits that they make together."""
 
     id: int
@@ -126,8 +126,8 @@ def edit_views(
     items: Sequence[ViewEdits],
     *,
     actor: str,
-    paint: PaintFollower | None = None,
-    solve: Solve = solve_encoded,
+    paint: PaintUpdater | None = None,
+    solve: Solve = solve_and_encode,
 ) -> BulkEditReport:
     """Edit the groups of many views, one after the other; one that was killed goes on.
 
@@ -149,7 +149,7 @@ def edit_views(
         outcomes, groups = _plan_items(session, dataset_id, left, actor)
     run = _BulkEditRun({**outcomes, **saved}, saved)
     for group in groups:
-        then = run.transaction_ending(group, is_last=group is groups[-1])
+        then = run.make_transaction_finalizer(group, is_last=group is groups[-1])
         try:
             state = _submit_group(store, group, actor, then=then, paint=paint, solve=solve)
         except (ConflictError, InputError, NotFoundError, OverloadedError) as error:
@@ -172,31 +172,31 @@ class _BulkEditRun:
         self._new: dict[int, ItemOutcome] = {}
         self._last: BulkEditReport | None = None
 
-    def transaction_ending(self, group: _GroupPlan, *, is_last: bool) -> Then:
+    def make_transaction_finalizer(self, group: _GroupEditPlan, *, is_last: bool) -> Then:
         """What ends the transaction of a group: the response with the last, else how far it is."""
         self._new = {}
 
-        def then(session: Session, state: GroupState) -> None:
-            self._new = _outcomes_with_etag(group, self._outcomes, state.etag)
+        def finalize_transaction(session: Session, state: GroupState) -> None:
+            self._new = _make_outcomes_with_etag(group, self._outcomes, state.etag)
             if is_last:
                 self._last = _make_report({**self._outcomes, **self._new})
                 session.respond(self._last)
             else:
                 _save_progress(session, [*self._saved.values(), *self._new.values()])
 
-        return then
+        return finalize_transaction
 
-    def mark_saved(self, group: _GroupPlan, state: GroupState) -> None:
+    def mark_saved(self, group: _GroupEditPlan, state: GroupState) -> None:
         """The group is as it was asked for."""
         self._saved |= self._new
         # Where nothing is new somebody has made the same change since it was planned.
-        self._outcomes |= self._new or _outcomes_with_etag(
+        self._outcomes |= self._new or _make_outcomes_with_etag(
             group, self._outcomes, state.etag, "unchanged"
         )
 
-    def mark_refused(self, group: _GroupPlan, error: ReviewError) -> None:
+    def mark_refused(self, group: _GroupEditPlan, error: ReviewError) -> None:
         """The group was refused when its turn came."""
-        self._outcomes |= _refused_outcomes(group, error)
+        self._outcomes |= _make_refused_outcomes(group, error)
         self._last = None
 
     def finish_report(self, store: Store) -> BulkEditReport:
@@ -210,7 +210,7 @@ class _BulkEditRun:
         return report
 
 
-def _submit_group(store: Store, group: _GroupPlan, actor: str, **how: Any) -> GroupState:
+def _submit_group(store: Store, group: _GroupEditPlan, actor: str, **how: Any) -> GroupState:
     """Save the edit of a group; one that builds on any state is tried again."""
     for _ in range(TRIES - 1):
         if group.etag is not None:
@@ -226,7 +226,7 @@ def _submit_group(store: Store, group: _GroupPlan, actor: str, **how: Any) -> Gr
 
 def _plan_items(
     session: Session, dataset_id: int, items: Mapping[int, ViewEdits], actor: str
-) -> tuple[dict[int, ItemOutcome], list[_GroupPlan]]:
+) -> tuple[dict[int, ItemOutcome], list[_GroupEditPlan]]:
     """What becomes of each item, and the groups that change, in the order of the request."""
     outcomes, groups = _locate_items(session, dataset_id, items)
     numbers, changing = [*groups], []
@@ -245,7 +245,7 @@ def _plan_items(
 
 def _locate_items(
     session: Session, dataset_id: int, items: Mapping[int, ViewEdits]
-) -> tuple[dict[int, ItemOutcome], dict[int, _GroupPlan]]:
+) -> tuple[dict[int, ItemOutcome], dict[int, _GroupEditPlan]]:
     """Items by their groups; those whose view the reader does not see are refused as unknown ones."""
     ids = {item.view for item in items.values() if isinstance(item.view, int)}
     keys = {item.group for item in items.values() if item.group is not None}
@@ -254,7 +254,7 @@ def _locate_items(
     by_key = {(row.group_key, row.key): row for row in rows}
     known = {row.group_key for row in rows}
     outcomes: dict[int, ItemOutcome] = {}
-    groups: dict[int, _GroupPlan] = {}
+    groups: dict[int, _GroupEditPlan] = {}
     for index, item in items.items():
         if isinstance(item.view, int):
             row, missing = by_id.get(item.view), f"there is no view {item.view} in this dataset"
@@ -267,7 +267,7 @@ def _locate_items(
             error = NotFoundError(missing, pointer=f"/items/{index}/view")
             outcomes[index] = ItemOutcome(index, "refused", error=error)
             continue
-        group = groups.setdefault(row.group_id, _GroupPlan(row.group_id, row.group_key))
+        group = groups.setdefault(row.group_id, _GroupEditPlan(row.group_id, row.group_key))
         group.views[index] = row.id
     return outcomes, groups
 
@@ -275,7 +275,7 @@ def _locate_items(
 def _plan_group(
     session: Session,
     stored: StoredGroup,
-    plan: _GroupPlan,
+    plan: _GroupEditPlan,
     etag: str,
     items: Mapping[int, ViewEdits],
     actor: str,
@@ -319,31 +319,36 @@ def _plan_group(
         )
         for index, one in outcomes.items():
             if one.error is None:
-                why = _error_with_pointer(spoilt, f"/items/{index}")
+                why = _copy_error_with_pointer(spoilt, f"/items/{index}")
                 outcomes[index] = ItemOutcome(index, "refused", stored.id, one.view, etag, why)
     return outcomes
 
 
-def _refused_outcomes(group: _GroupPlan, error: ReviewError) -> dict[int, ItemOutcome]:
+def _make_refused_outcomes(group: _GroupEditPlan, error: ReviewError) -> dict[int, ItemOutcome]:
     """The items of a group that was refused when its turn came."""
     etag = error.current_etag if isinstance(error, StaleRevisionError) else None
     return {
         index: ItemOutcome(
-            index, "refused", group.id, view, etag, _error_with_pointer(error, f"/items/{index}")
+            index,
+            "refused",
+            group.id,
+            view,
+            etag,
+            _copy_error_with_pointer(error, f"/items/{index}"),
         )
         for index, view in group.views.items()
     }
 
 
-def _error_with_pointer(error: ReviewError, pointer: str) -> ReviewError:
+def _copy_error_with_pointer(error: ReviewError, pointer: str) -> ReviewError:
     """The same error at another place of the request."""
     found = copy(error)
     found.pointer = pointer
     return found
 
 
-def _outcomes_with_etag(
-    group: _GroupPlan,
+def _make_outcomes_with_etag(
+    group: _GroupEditPlan,
     outcomes: Mapping[int, ItemOutcome],
     etag: str,
     outcome: Outcome | None = None,

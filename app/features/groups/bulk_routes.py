@@ -22,9 +22,14 @@ from app.features.groups.bulk_edits import (
 )
 from app.features.groups.edit import Edit, SetLines, set_ball
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
-from app.features.solutions.service import solve_encoded
+from app.features.solutions.service import solve_and_encode
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
-from app.http.documents import Document, document, respond_with, respond_with_document
+from app.http.documents import (
+    Document,
+    make_document_responder,
+    make_document_response,
+    respond_with,
+)
 from app.http.errors import find_http_status
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -68,7 +73,7 @@ class ViewEditItem(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _names_one_view_and_a_change(self) -> ViewEditItem:
+    def _check_one_view_and_change(self) -> ViewEditItem:
         if isinstance(self.view, str) and self.group is None:
             raise ValueError("a view that is named by its key needs `group`, the key of its group")
         if isinstance(self.view, int) and self.group is not None:
@@ -79,9 +84,9 @@ class ViewEditItem(BaseModel):
 
     def edits(self) -> ViewEdits:
         """The item as a value."""
-        return ViewEdits(self.view, self.group, self.etag, self._edits_for_view)
+        return ViewEdits(self.view, self.group, self.etag, self._build_view_edits)
 
-    def _edits_for_view(self, key: str) -> list[Edit]:
+    def _build_view_edits(self, key: str) -> list[Edit]:
         edits: list[Edit] = []
         if self.lines:
             edits.append(SetLines(key, points_by_marking(self.lines), tuple(self.proposed)))
@@ -200,7 +205,7 @@ class BulkEditDocument(Document):
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
-@respond_with(respond_with_document(BulkEditDocument.of))
+@respond_with(make_document_responder(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,
     edit: BulkEdit,
@@ -217,14 +222,14 @@ def edit_many(
     store, found = services.store, dataset_id(services.store, dataset)
     if dry_run:
         plan = plan_edits(store, found, edit.edits(), actor=actor)
-        return document(BulkEditDocument.of(plan))
+        return make_document_response(BulkEditDocument.of(plan))
     return edit_views(
         store,
         found,
         edit.edits(),
         actor=actor,
         paint=services.paint,
-        solve=partial(services.large.solve, solve_encoded),
+        solve=partial(services.large.solve, solve_and_encode),
     )
 
 

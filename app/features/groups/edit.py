@@ -14,7 +14,7 @@ from app.errors import InputError, NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import MAX_PIXEL, ImagePoint
-from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View, make_left_out
+from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View, make_view_exclusion
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
@@ -69,7 +69,7 @@ class SetStationLines:
         for name, points in self.lines.items():
             marking = canonical_marking(name)
             if points:
-                lines[marking] = _validated_points(marking, points)
+                lines[marking] = _validate_points(marking, points)
             else:
                 lines.pop(marking, None)
             own.discard(marking)
@@ -87,7 +87,7 @@ class SetStationLines:
 
     def inverse(self, station: Station) -> SetStationLines:
         """Each changed marking as it was before."""
-        before = _lines_before(station.lines, self.lines)
+        before = _select_original_lines(station.lines, self.lines)
         proposed, unseen = (
             tuple(name for name in names if name in before)
             for names in (station.proposed, station.not_visible)
@@ -158,12 +158,12 @@ class SetLines:
 
     def apply(self, group: Group) -> Group:
         """The group with these markings in the view (and in others that share its station)."""
-        view = need_view(group, self.view)
-        return with_station(group, view, self._as_station_edit.apply(view.station))
+        view = require_view(group, self.view)
+        return replace_station_in_group(group, view, self._as_station_edit.apply(view.station))
 
     def inverse(self, group: Group) -> SetLines:
         """Each changed marking as it was before."""
-        before = self._as_station_edit.inverse(need_view(group, self.view).station)
+        before = self._as_station_edit.inverse(require_view(group, self.view).station)
         return SetLines(self.view, before.lines, before.proposed, before.not_visible)
 
     @property
@@ -180,13 +180,13 @@ class SetCalibrationSource:
 
     def apply(self, group: Group) -> Group:
         """The group with that choice."""
-        view = need_view(group, self.view)
+        view = require_view(group, self.view)
         station = SetStationCalibration(self.calibration).apply(view.station)
-        return with_station(group, view, station)
+        return replace_station_in_group(group, view, station)
 
     def inverse(self, group: Group) -> SetCalibrationSource:
         """The choice as it was."""
-        return SetCalibrationSource(self.view, need_view(group, self.view).station.calibration)
+        return SetCalibrationSource(self.view, require_view(group, self.view).station.calibration)
 
 
 @dataclass(frozen=True)
@@ -201,12 +201,12 @@ class SetPicture:
 
     def apply(self, group: Group) -> Group:
         """The group with this picture in the view."""
-        view = need_view(group, self.view)
-        return with_station(group, view, replace(view.station, picture=self.picture))
+        view = require_view(group, self.view)
+        return replace_station_in_group(group, view, replace(view.station, picture=self.picture))
 
     def inverse(self, group: Group) -> SetPicture:
         """The picture as it was."""
-        return SetPicture(self.view, need_view(group, self.view).station.picture)
+        return SetPicture(self.view, require_view(group, self.view).station.picture)
 
 
 @dataclass(frozen=True)
@@ -222,12 +222,12 @@ class SetBalls:
         """The group with these balls in the view."""
         for ball in self.balls:
             _check_ball(ball)
-        view = need_view(group, self.view)
+        view = require_view(group, self.view)
         return group.with_view(replace(view, balls=self.balls, noise=self.noise))
 
     def inverse(self, group: Group) -> SetBalls:
         """The balls as they were."""
-        view = need_view(group, self.view)
+        view = require_view(group, self.view)
         return SetBalls(self.view, view.balls, view.noise)
 
 
@@ -248,15 +248,15 @@ class IncludeView:
 
     def apply(self, group: Group) -> Group:
         """The group with or without the view."""
-        why = make_left_out(self.reason, self.note)
+        why = make_view_exclusion(self.reason, self.note)
         if self.included and why is not None:
             raise InputError("only a left-out view can have a reason", pointer="/reason")
-        view = need_view(group, self.view)
+        view = require_view(group, self.view)
         return group.with_view(replace(view, included=self.included, left_out=why))
 
     def inverse(self, group: Group) -> IncludeView:
         """The view as it was."""
-        view = need_view(group, self.view)
+        view = require_view(group, self.view)
         if view.included or view.left_out is None:
             return IncludeView(self.view, view.included)
         return IncludeView(self.view, False, view.left_out.reason, view.left_out.note)
@@ -351,7 +351,7 @@ STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)
 """Edits of a view that belong to its station when that is shared."""
 
 
-def need_view(group: Group, key: str) -> View:
+def require_view(group: Group, key: str) -> View:
     """The view of that key.
 
     Raises:
@@ -363,7 +363,7 @@ def need_view(group: Group, key: str) -> View:
     return view
 
 
-def with_station(group: Group, view: View, station: Station) -> Group:
+def replace_station_in_group(group: Group, view: View, station: Station) -> Group:
     """The group with a view's station replaced, in each view that shares it."""
     for other in group.views:
         same = other.key == view.key
@@ -372,12 +372,12 @@ def with_station(group: Group, view: View, station: Station) -> Group:
     return group
 
 
-def _lines_before(lines: Lines, changes: LineChanges) -> LineChanges:
+def _select_original_lines(lines: Lines, changes: LineChanges) -> LineChanges:
     names = map(canonical_marking, changes)
     return {name: tuple(lines[name]) if name in lines else None for name in names}
 
 
-def _validated_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[ImagePoint, ...]:
+def _validate_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[ImagePoint, ...]:
     if len(points) > MAX_POINTS:
         raise InputError(f"{marking} has more than {MAX_POINTS} points")
     for index, point in enumerate(points):

@@ -99,7 +99,7 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
     match value["edit"]:
         case "set_lines":
             return SetLines(
-                value["view"], _lines_from_json(value["lines"]), *_line_sources_from_json(value)
+                value["view"], _lines_from_json(value["lines"]), *_parse_line_sources(value)
             )
         case "set_balls":
             balls = tuple(map(ball_from_json, value["balls"]))
@@ -126,9 +126,7 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
     """Back from ``edit_to_json``, for edits of a station."""
     match value["edit"]:
         case "set_station_lines":
-            return SetStationLines(
-                _lines_from_json(value["lines"]), *_line_sources_from_json(value)
-            )
+            return SetStationLines(_lines_from_json(value["lines"]), *_parse_line_sources(value))
         case "set_station_calibration":
             return SetStationCalibration(value["calibration"])
         case "set_station_camera":
@@ -146,7 +144,7 @@ def _noise_to_json(noise: float) -> Json:
     return {} if noise == 1 else {"noise": float(noise)}
 
 
-def _line_sources_from_json(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _parse_line_sources(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The markings that were proposed, and those that are not visible."""
     sources = value.get("source", {})
     proposed, not_visible = (

@@ -6,10 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.log import NewLogEntry, append_entries, iterate_single_edits, read_entries_of
+from app.db.log import (
+    NewLogEntry,
+    append_entries,
+    iterate_group_entries_of_kinds,
+    iterate_single_edits,
+)
 from app.db.session import Session, now
-from app.features.datasets.queries import group_ids
-from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, need_view
+from app.features.datasets.queries import list_group_ids
+from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, require_view
 from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import make_next_revision, save_revision
@@ -17,10 +22,10 @@ from app.features.groups.undo_stacks import GROUP_KINDS
 from app.features.match_estimates.queries import (
     NOISE,
     Factors,
-    factors_to_json,
     find_noise_factor,
-    read_factors,
-    write_factors,
+    noise_factors_to_json,
+    read_noise_factors,
+    write_noise_factors,
 )
 from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.group import Group, View
@@ -81,7 +86,7 @@ def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, 
     A ball that somebody accepted from predictions is not placed by them.
     """
     placed: dict[int, dict[str, str]] = {}
-    for entry in read_entries_of(session, groups, GROUP_KINDS):
+    for entry in iterate_group_entries_of_kinds(session, groups, GROUP_KINDS):
         for edit in iterate_single_edits(entry.body.get("edit") or {}):
             if edit.get("edit") == "set_balls" and entry.group_id is not None:
                 of_group = placed.setdefault(entry.group_id, {})
@@ -96,20 +101,20 @@ def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, act
 
     They are stale until they are solved again. No factors: all balls are as noisy as the dataset's.
     """
-    before = read_factors(session, dataset_id)
-    write_factors(session, dataset_id, factors)
-    body = {"factors": factors_to_json(factors), "before": factors_to_json(before)}
+    before = read_noise_factors(session, dataset_id)
+    write_noise_factors(session, dataset_id, factors)
+    body = {"factors": noise_factors_to_json(factors), "before": noise_factors_to_json(before)}
     append_entries(session, [NewLogEntry(NOISE, actor, now(), body, dataset_id)])
-    ids = group_ids(session, dataset_id)
+    ids = list_group_ids(session, dataset_id)
 
-    def noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
+    def make_noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
         placed = read_last_ball_actors(session, [*some])
         return {
-            number: SetNoise(_noise_by_view(stored.group, placed.get(number, {}), factors))
+            number: SetNoise(_compute_noise_by_view(stored.group, placed.get(number, {}), factors))
             for number, stored in some.items()
         }
 
-    return edit_groups(session, dataset_id, NOISE, ids, noise_edits, actor=actor)
+    return edit_groups(session, dataset_id, NOISE, ids, make_noise_edits, actor=actor)
 
 
 def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
@@ -121,7 +126,7 @@ def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -
         return edit
     if any(ball.predicted_by for ball in edit.balls):
         return edit
-    view = need_view(group, edit.view)
+    view = require_view(group, edit.view)
     return (
         replace(edit, noise=find_noise_factor(factors, _static_camera_key(view), actor))
         if factors
@@ -133,10 +138,12 @@ def keep_view_noise(group: Group, edit: Edit) -> Edit:
     """The edit with the noise that its view has: nobody is known to make it yet."""
     if not isinstance(edit, SetBalls):
         return edit
-    return replace(edit, noise=need_view(group, edit.view).noise)
+    return replace(edit, noise=require_view(group, edit.view).noise)
 
 
-def _noise_by_view(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:
+def _compute_noise_by_view(
+    group: Group, placed: Mapping[str, str], factors: Factors
+) -> dict[str, float]:
     return {
         view.key: find_noise_factor(factors, _static_camera_key(view), placed.get(view.key))
         for view in group.views

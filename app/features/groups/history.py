@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 from typing import Unpack
 
 from app.db.log import LogEntry as LogEntry
-from app.db.log import group_entries, list_station_entries
+from app.db.log import list_group_entries, list_station_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state import GroupState, GroupWithoutSolution, need_group
+from app.features.groups.state import GroupState, GroupWithoutSolution, require_group
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
-from app.features.groups.undo_stacks import undo_entry_body
+from app.features.groups.undo_stacks import make_undo_entry_body
 from app.features.people.visibility_queries import (
     hides_groups_from_reader,
     show_entries_under_aliases,
@@ -69,8 +69,8 @@ def read_history(store: Store, group_id: int) -> list[LogEntry]:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        stored = need_group(session, group_id)
-        entries = show_entries_under_aliases(session, _group_entries(session, stored))
+        stored = require_group(session, group_id)
+        entries = show_entries_under_aliases(session, _read_group_history(session, stored))
         if not hides_groups_from_reader():
             return entries
         return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]
@@ -83,26 +83,28 @@ def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChang
         NotFoundError: There is no such group, or no such entry of it.
     """
     with store.read() as session:
-        stored = need_group(session, group_id)
+        stored = require_group(session, group_id)
         if hides_groups_from_reader():
-            place, entries = entry_id - 1, _group_entries(session, stored)
+            place, entries = entry_id - 1, _read_group_history(session, stored)
             entry_id = entries[place].id if place < len(entries) else 0
-        snapshot = _snapshot_of_static_cameras(stored)
+        snapshot = _make_static_camera_snapshot(stored)
         before: Group | None = None
-        for entry in _merged_entries(session, stored):
+        for entry in _merge_group_and_station_entries(session, stored):
             known = group_id in snapshot.groups
             if entry.id == entry_id:
                 before = snapshot.group(group_id) if known else None
             apply_entry(snapshot, entry)
             if entry.id == entry_id and group_id in snapshot.groups:
                 (shown,) = show_entries_under_aliases(session, [entry])
-                return _changes_between(shown, before, snapshot.group(group_id), stored.view_ids)
+                return _compare_group_versions(
+                    shown, before, snapshot.group(group_id), stored.view_ids
+                )
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
 
 
-def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
+def _read_group_history(session: Session, stored: StoredGroup) -> list[LogEntry]:
     """The entries of a group's history."""
-    entries = list(_merged_entries(session, stored))
+    entries = list(_merge_group_and_station_entries(session, stored))
     first = next(entry.id for entry in entries if entry.group_id is not None)
     return [
         entry
@@ -111,16 +113,16 @@ def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
     ]
 
 
-def _merged_entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
+def _merge_group_and_station_entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
     shared = [
         list_station_entries(session, item.id)
         for item in stored.stations.values()
         if item.station.shared
     ]
-    return heapq.merge(group_entries(session, stored.id), *shared, key=lambda entry: entry.id)
+    return heapq.merge(list_group_entries(session, stored.id), *shared, key=lambda entry: entry.id)
 
 
-def _snapshot_of_static_cameras(stored: StoredGroup) -> StateSnapshot:
+def _make_static_camera_snapshot(stored: StoredGroup) -> StateSnapshot:
     """A state snapshot of the static cameras alone, as they are now; their own entries tell what they were."""
     snapshot = StateSnapshot()
     for item in stored.stations.values():
@@ -131,7 +133,7 @@ def _snapshot_of_static_cameras(stored: StoredGroup) -> StateSnapshot:
     return snapshot
 
 
-def _changes_between(
+def _compare_group_versions(
     entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping[str, int]
 ) -> EntryChanges:
     old = {} if before is None else {view.key: view for view in before.views}
@@ -148,17 +150,23 @@ def _changes_between(
 
 def undo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return submit_change(store, lambda _session: group_id, _plan_step("undo"), **how)
+    return submit_change(
+        store, lambda _session: group_id, _make_undo_or_redo_planner("undo"), **how
+    )
 
 
 def redo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return submit_change(store, lambda _session: group_id, _plan_step("redo"), **how)
+    return submit_change(
+        store, lambda _session: group_id, _make_undo_or_redo_planner("redo"), **how
+    )
 
 
-def _plan_step(kind: str) -> Plan:
-    def plan(session: Session, record: GroupWithoutSolution, _actor: str) -> GroupChange:
-        body = undo_entry_body(session, record.stacks, kind, "in this group")
+def _make_undo_or_redo_planner(kind: str) -> Plan:
+    def plan_undo_or_redo(
+        session: Session, record: GroupWithoutSolution, _actor: str
+    ) -> GroupChange:
+        body = make_undo_entry_body(session, record.stacks, kind, "in this group")
         try:
             group = edit_from_json(body["edit"]).apply(record.stored.group)
         except NotFoundError as error:
@@ -167,4 +175,4 @@ def _plan_step(kind: str) -> Plan:
             ) from error
         return GroupChange(kind, body, group)
 
-    return plan
+    return plan_undo_or_redo

@@ -15,7 +15,7 @@ from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.json_text import canonical_json_text
 from app.soccer import codec
-from app.soccer.codec import group_inputs_hash, station_digest, view_digest
+from app.soccer.codec import hash_group_inputs, station_digest, view_digest
 from app.soccer.group import Group, Station, View
 
 
@@ -42,7 +42,7 @@ def station_to_columns(station: Station) -> dict[str, Any]:
 def view_to_columns(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
     media, extras = view.media, view.extras.values()
-    why = codec.left_out_to_json(view.left_out)
+    why = codec.view_exclusion_to_json(view.left_out)
     return {
         "key": view.key,
         "position": position,
@@ -91,7 +91,7 @@ def group_to_columns(
         "pitch_width": group.pitch.width,
         "positions": positions_to_column(group),
         "paint": paint_to_column(read),
-        "inputs_hash": group_inputs_hash(group, read, views),
+        "inputs_hash": hash_group_inputs(group, read, views),
     }
 
 

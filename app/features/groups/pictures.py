@@ -19,7 +19,7 @@ from app.errors import (
 from app.features.paint.proposal_queries import Proposal
 from app.geometry.camera import Camera
 from app.media.files import read_pixels
-from app.media.frames import picture_error_of_ended_process
+from app.media.frames import make_picture_error
 from app.paint.evidence import Image
 from app.paint.view_paint import (
     choose_hiding_boxes,
@@ -28,7 +28,7 @@ from app.paint.view_paint import (
 )
 from app.paint.view_proposal import ViewProposal, keep_undrawn_markings, propose_lines_in_image
 from app.soccer.annotation import Lines
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, View
 from app.soccer.paint_evidence import (
@@ -90,7 +90,7 @@ class PaintTask:
         )
 
     @property
-    def reading_without_frame(self) -> PaintReading:
+    def make_reading_without_frame(self) -> PaintReading:
         """What is kept where no picture can be read."""
         return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
 
@@ -100,10 +100,10 @@ def digest_people_boxes(view: View) -> str:
     boxes = choose_hiding_boxes(view.extras.places, view.size)
     if not boxes:
         return ""
-    return digest(sorted([box.x, box.y, box.width, box.height] for box in boxes))
+    return digest_json(sorted([box.x, box.y, box.width, box.height] for box in boxes))
 
 
-def mark_outdated_beside_other_people(
+def mark_paint_outdated_by_other_people(
     group: Group, readings: Mapping[str, PaintReading]
 ) -> dict[str, PaintReading]:
     """Readings as they are given to a group: of those that were made beside other people than its
@@ -118,7 +118,7 @@ def mark_outdated_beside_other_people(
     return given
 
 
-def mark_outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
+def mark_paint_outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
     """The readings of a group after others hide paint in some of its views.
 
     Those say nothing of any clicks any more: solving goes without them and names the mending.
@@ -150,9 +150,9 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
         known = "" if reusable is None else reusable.frame
         frame, image = read_pixels(media, task.view.station.flipped, settings, known)
     except NotFoundError:
-        return reusable or task.reading_without_frame
+        return reusable or task.make_reading_without_frame
     except (ImageError, StorageError, TooLargeError):
-        return task.reading_without_frame
+        return task.make_reading_without_frame
     if image is None:
         return reusable
     return _read_paint_of_image(task, frame, image)
@@ -164,7 +164,7 @@ def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintRead
     if clicked.camera is None:
         return None
     if explain_unreadable_picture(image, size) is not None:
-        return replace(task.reading_without_frame, frame=frame)
+        return replace(task.make_reading_without_frame, frame=frame)
     seen = read_paint_of_image(
         image, size, clicked, task.group.pitch, policy, task.view.extras.places
     )
@@ -223,11 +223,11 @@ class ProposalTask:
         is_usable = old.outcome == "proposed" or old.sought_with == self.sought_with
         return old.frame if is_usable else ""
 
-    def proposal_without_picture(self, sentence: str) -> Proposal:
+    def make_proposal_without_picture(self, sentence: str) -> Proposal:
         """What is kept where no picture can be read."""
-        return self.proposal_to_keep(ViewProposal("nothing", sentence, {}), "")
+        return self.make_stored_proposal(ViewProposal("nothing", sentence, {}), "")
 
-    def proposal_to_keep(self, found: ViewProposal, frame: str) -> Proposal:
+    def make_stored_proposal(self, found: ViewProposal, frame: str) -> Proposal:
         """What is kept of an answer for the picture with this digest."""
         return Proposal(
             view_id=self.view_id,
@@ -245,13 +245,13 @@ def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
     try:
         digest, image = read_pixels(task.media, task.flipped, settings, known)
     except NotFoundError:
-        return task.proposal_without_picture(MISSING)
+        return task.make_proposal_without_picture(MISSING)
     except (ImageError, StorageError, TooLargeError):
-        return task.proposal_without_picture(UNREADABLE)
+        return task.make_proposal_without_picture(UNREADABLE)
     if image is None:
         return None
     found = propose_lines_in_image(image, task.size, task.known, task.pitch, task.policy)
-    return task.proposal_to_keep(
+    return task.make_stored_proposal(
         keep_undrawn_markings(found, task.drawn, task.pitch, task.size, task.policy), digest
     )
 
@@ -283,4 +283,4 @@ class PictureTask:
 
 
 def _picture_error(error: WorkerEnded) -> ReviewError:
-    return picture_error_of_ended_process("the picture", error)
+    return make_picture_error("the picture", error)

@@ -24,15 +24,15 @@ from app.errors import InputError, OverloadedError
 from app.features.groups.edit import Edit, IncludeView, SetLines, SetPicture, set_ball
 from app.features.groups.schemas import BallEdit, LineEdits, PictureEdit, points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
-from app.features.groups.submit import Solver, preview
-from app.features.groups.view_paint import PaintFollower, WithoutPictures
+from app.features.groups.submit import Solver, solve_edited_group
+from app.features.groups.view_paint import PaintUpdater, PaintUpdaterWithoutPictures
 from app.http.documents import Document
-from app.http.request_limits import is_large
+from app.http.request_limits import is_large_request
 from app.log import log_to_stderr
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.solve import solve, warm_up_solver
+from app.solving.solve import solve_group, warm_up_solver
 from app.worker_pool import ReadyWorker, choose_least_busy_worker
 from app.worker_process import WorkerEnded, WorkerLimits
 
@@ -93,7 +93,7 @@ class LargeGroupSolver:
     """
 
     def __init__(self, settings: Settings):
-        apart = settings.solves_in_own_processes
+        apart = settings.uses_solver_processes
         self.workers = (
             [ReadyWorker("large", LIMITS, _large_edit_error, prepare_solver_process)]
             if apart
@@ -143,7 +143,7 @@ def _large_edit_error(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"solving this group {error}", hint="Nothing was saved. Try it again.")
 
 
-def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
+def build_preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
     """The edits that a what-if asks for, in the order of its views.
 
     Raises:
@@ -157,11 +157,11 @@ def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
                 hint=f"Its views are {', '.join(view.key for view in group.views)}.",
                 pointer=f"/views/{key.replace('~', '~0').replace('/', '~1')}",
             )
-        edits.extend(_view_edits(key, change))
+        edits.extend(_build_view_edits(key, change))
     return edits
 
 
-def _view_edits(key: str, change: ViewPreview) -> list[Edit]:
+def _build_view_edits(key: str, change: ViewPreview) -> list[Edit]:
     edits: list[Edit] = []
     if change.lines:
         edits.append(SetLines(key, points_by_marking(change.lines)))
@@ -185,15 +185,15 @@ class PreviewSolver:
     """
 
     def __init__(
-        self, settings: Settings, store: Store, paint: PaintFollower, large: LargeGroupSolver
+        self, settings: Settings, store: Store, paint: PaintUpdater, large: LargeGroupSolver
     ):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         self.workers = [
             ReadyWorker("previews", LIMITS, _process_ended_error, prepare_preview_process, settings)
-            for _ in range(PROCESSES if settings.solves_in_own_processes else 0)
+            for _ in range(PROCESSES if settings.uses_solver_processes else 0)
         ]
 
-    async def preview_document(
+    async def solve_preview_document(
         self, request: Request, group_id: int, changes: PreviewRequest
     ) -> bytes:
         """The document of a what-if; empty where nobody waits for it any more.
@@ -204,7 +204,7 @@ class PreviewSolver:
             SharedStationError: See ``submit.preview``.
             OverloadedError: The process ended.
         """
-        large = is_large(request.scope)
+        large = is_large_request(request.scope)
         worker = choose_least_busy_worker(self._large.workers if large else self.workers)
         if worker is not None:
             task = worker.submit(solve_preview_in_process, self._settings, group_id, changes)
@@ -214,7 +214,7 @@ class PreviewSolver:
             if await request.is_disconnected():
                 return b""
         # It reads pictures, or there is no process: the solving alone may be done elsewhere.
-        solver: Solver = partial(self._large.solve, solve) if large else solve
+        solver: Solver = partial(self._large.solve, solve_group) if large else solve_group
         return await run_in_threadpool(
             _solve_preview, self._store, group_id, changes, self._paint, solver
         )
@@ -228,7 +228,7 @@ class PreviewSolver:
 def prepare_preview_process(settings: Settings) -> None:
     """In the process: open the database and load the solver's kernels."""
     log_to_stderr(settings.log_format)
-    _store_of_process(settings)
+    _open_process_store(settings)
     warm_up_solver()
     gc.collect()
     gc.freeze()
@@ -238,12 +238,12 @@ def solve_preview_in_process(
     settings: Settings, group_id: int, changes: PreviewRequest
 ) -> bytes | None:
     """In the process: ``_solve_preview``; None where pictures would have to be read."""
-    without = WithoutPictures()
-    found = _solve_preview(_store_of_process(settings), group_id, changes, without)
+    without = PaintUpdaterWithoutPictures()
+    found = _solve_preview(_open_process_store(settings), group_id, changes, without)
     return None if without.missed else found
 
 
-def _store_of_process(settings: Settings) -> Store:
+def _open_process_store(settings: Settings) -> Store:
     key = settings.model_dump_json()
     if key not in _stores:
         _stores[key] = Store.open(settings)
@@ -254,13 +254,13 @@ def _solve_preview(
     store: Store,
     group_id: int,
     changes: PreviewRequest,
-    paint: PaintFollower,
-    solve: Solver = solve,
+    paint: PaintUpdater,
+    solve: Solver = solve_group,
 ) -> bytes:
-    def edits(found: Group) -> Sequence[Edit]:
-        return preview_edits(found, changes)
+    def build_edits(found: Group) -> Sequence[Edit]:
+        return build_preview_edits(found, changes)
 
-    edited, solution = preview(store, group_id, edits, paint, solve)
+    edited, solution = solve_edited_group(store, group_id, build_edits, paint, solve)
     document = PreviewDocument(solution=SolutionDocument.of(solution, edited))
     return document.model_dump_json().encode()
 

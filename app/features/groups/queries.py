@@ -15,7 +15,7 @@ from app.db.dialects.dialect import insert
 from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.errors import NotFoundError
-from app.features.datasets.queries import policy_from_row
+from app.features.datasets.queries import parse_stored_policy
 from app.features.datasets.tables import (
     DatasetModel,
     GroupModel,
@@ -24,12 +24,12 @@ from app.features.datasets.tables import (
     ViewModel,
 )
 from app.features.groups.view_queries import StoredStation, station_from_row
-from app.features.match_estimates.queries import Factors, factors_from_text
-from app.features.paint.queries import read_paint_digests, read_readings
+from app.features.match_estimates.queries import Factors, noise_factors_from_text
+from app.features.paint.queries import read_paint_digests, read_paint_readings
 from app.features.people.visibility_queries import visible_groups_condition
 from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
+from app.soccer.group import Group, Media, SharedPosition, Station, View, ViewExclusion
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -76,20 +76,20 @@ class StoredGroup:
         return key in self.edited_views or (not own.station.shared and own.edited)
 
 
-def _row_type(table: FromClause) -> Any:
+def _make_row_type(table: FromClause) -> Any:
     """A row of one table, cut out of a row of several."""
     return namedtuple("Row", table.columns.keys())
 
 
 _GROUP, _VIEW, _STATION = GroupModel.__table__, ViewModel.__table__, StationModel.__table__
 _DATASET = DatasetModel.__table__
-_ViewRow, _StationRow = _row_type(_VIEW), _row_type(_STATION)
+_ViewRow, _StationRow = _make_row_type(_VIEW), _make_row_type(_STATION)
 _STATION_START = -len(_STATION.columns)
 _VIEW_START = _STATION_START - len(_VIEW.columns)
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 
 
-def _group_statement(*columns: Any) -> Any:
+def _select_groups_with_views(*columns: Any) -> Any:
     """Groups with these columns of their views: a row a view, or one without any."""
     head = (
         *_GROUP.columns,
@@ -108,8 +108,10 @@ def _group_statement(*columns: Any) -> Any:
 
 
 _OF_VIEW = select(_VIEW.c.group_id).where(_VIEW.c.id == bindparam("view"))
-_WHOLE = _group_statement(*_VIEW.columns)
-_WITHOUT_EXTRAS = _group_statement(*(null() if c.name == "extras" else c for c in _VIEW.columns))
+_WHOLE = _select_groups_with_views(*_VIEW.columns)
+_WITHOUT_EXTRAS = _select_groups_with_views(
+    *(null() if c.name == "extras" else c for c in _VIEW.columns)
+)
 
 
 def read_groups(
@@ -134,9 +136,9 @@ def read_groups(
         if view.station_id not in stations:
             stations[view.station_id] = station_from_row(_StationRow._make(row[_STATION_START:]))
     named = {d for row in heads.values() for d in read_paint_digests(row.paint).values()}
-    readings = read_readings(session, named) if named else {}
+    readings = read_paint_readings(session, named) if named else {}
     return {
-        number: _stored_group(heads[number], views.get(number, []), stations, readings)
+        number: _build_stored_group(heads[number], views.get(number, []), stations, readings)
         for number in ids
         if number in heads
     }
@@ -180,7 +182,7 @@ def find_views(
     return session.rows(ViewName, statement)
 
 
-def _stored_group(
+def _build_stored_group(
     head: Any,
     rows: Sequence[Any],
     stations: Mapping[int, StoredStation],
@@ -200,8 +202,8 @@ def _stored_group(
         id=head.id,
         dataset_id=head.dataset_id,
         dataset=head.dataset,
-        policy=policy_from_row(head.policy),
-        factors=factors_from_text(head.factors),
+        policy=parse_stored_policy(head.policy),
+        factors=noise_factors_from_text(head.factors),
         number=head.number,
         revision=head.revision,
         changed=head.changed,
@@ -244,9 +246,9 @@ def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
         return codec.positions_from_json(parse_json_column(text))
 
 
-def _left_out_from_text(text: str) -> LeftOut | None:
+def _left_out_from_text(text: str) -> ViewExclusion | None:
     with report_damaged_values():
-        return codec.left_out_from_json(parse_json_column(text))
+        return codec.view_exclusion_from_json(parse_json_column(text))
 
 
 # Most requests ask for what the one before asked for.

@@ -15,7 +15,7 @@ from app.features.groups.view_queries import StoredStation, list_groups_of_stati
 from app.features.imports.queries import list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.codec import (
-    camera_of_log_entry,
+    camera_from_log_entry,
     station_digest,
     station_from_json,
     station_to_json,
@@ -153,7 +153,7 @@ def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, Vi
 class SharedStations:
     """The shared stations of a dataset within one write transaction.
 
-    ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
+    ``apply_picture_change`` names those that were there and changed, ``kept`` those with edits that stayed.
     ``lines_left``: what comes without lines has none, and does not keep those of before.
     """
 
@@ -192,7 +192,7 @@ class SharedStations:
         if stored is None:
             self._insert_station(incoming)
             return
-        source = self._dataset_version_of(stored)
+        source = self._find_dataset_version(stored)
         followed = update_station_from_dataset(
             stored, incoming, source, lines_left=self._lines_left
         )
@@ -201,7 +201,7 @@ class SharedStations:
             self._save_station(stored, followed)
             self.changed.append(incoming.key)
 
-    def _dataset_version_of(self, stored: StoredStation) -> Station | None:
+    def _find_dataset_version(self, stored: StoredStation) -> Station | None:
         """A station as its dataset last brought it; under an edit only the log remembers."""
         if not stored.edited:
             return stored.station
@@ -210,7 +210,7 @@ class SharedStations:
             if entry.kind == "station":
                 station = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and station is not None:
-                station = station.with_given_camera(*camera_of_log_entry(entry.body))
+                station = station.with_given_camera(*camera_from_log_entry(entry.body))
             if station is not None and station_digest(station) == stored.source_digest:
                 found = station
         return found
@@ -223,12 +223,12 @@ class SharedStations:
 
     def _save_station(self, stored: StoredStation, followed: MergedStation) -> None:
         save_station(self._session, stored, followed.station, source=followed.base)
-        self._log_station(stored.id, followed, self._save_finding(stored.id, followed))
+        self._log_station(stored.id, followed, self._save_station_finding(stored.id, followed))
         groups = list_groups_of_station(self._session, stored.id)
         refresh_inputs_hashes(self._session, groups)
         refresh_queue(self._session, groups)
 
-    def _save_finding(self, station_id: int, followed: MergedStation) -> str | None:
+    def _save_station_finding(self, station_id: int, followed: MergedStation) -> str | None:
         """Save what imports noticed about the station: this one, or earlier ones while it holds."""
         if followed.kept is not None:
             sentence: str | None = followed.kept.sentence

@@ -21,14 +21,14 @@ from app.features.groups.state_snapshot_queries import (
     StationRecord,
     ViewRecord,
     replace_all_rows,
-    without_station,
+    strip_station_from_view,
 )
 from app.features.match_estimates.queries import NOISE, POSITION
 from app.features.paint.queries import PAINT
 from app.features.pitches.queries import PITCH
 from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.codec import (
-    camera_of_log_entry,
+    camera_from_log_entry,
     extras_from_json,
     policy_from_json,
     positions_from_json,
@@ -73,7 +73,7 @@ def rebuild_tables(store: Store) -> int:
     """
     with store.write() as session:
         snapshot = replay_log(session)
-        replace_all_rows(session, **_rows_by_table(snapshot))
+        replace_all_rows(session, **_build_rows_by_table(snapshot))
         refresh_queue(session, list(snapshot.groups))
     return len(snapshot.groups)
 
@@ -100,7 +100,7 @@ def _replay_station(snapshot: StateSnapshot, entry: LogEntry) -> None:
         station_from_json(station),
         station_from_json(station if base is None else base),
     )
-    _replay_noticed(snapshot, None, entry.station_id, [[None, entry.body["kept"]]])
+    _replay_import_findings(snapshot, None, entry.station_id, [[None, entry.body["kept"]]])
 
 
 def _save_station(
@@ -121,10 +121,10 @@ def _replay_new_group(snapshot: StateSnapshot, entry: LogEntry, number: int) -> 
     snapshot.groups[entry.group_id] = GroupRecord(
         entry.dataset_id, number, 0, "", "", Group("", ()), []
     )
-    _replay_import(snapshot, entry)
+    _replay_group_import(snapshot, entry)
 
 
-def _replay_import(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_group_import(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     record, body = snapshot.groups[entry.group_id], entry.body
     base = {view["key"]: view for view in (body["base"] or body["group"])["views"]}
@@ -139,12 +139,12 @@ def _replay_import(snapshot: StateSnapshot, entry: LogEntry) -> None:
         if not snapshot.stations[station_id].station.shared:
             del snapshot.stations[station_id]
     record.head, record.paint = (
-        _group_without_views(body["group"]),
+        _parse_group_without_views(body["group"]),
         dict(body["group"].get("paint", {})),
     )
     record.source_hash = body["source_hash"]
     record.revision, record.changed = record.revision + 1, entry.at
-    _replay_noticed(snapshot, entry.group_id, None, body.get("kept", []))
+    _replay_import_findings(snapshot, entry.group_id, None, body.get("kept", []))
 
 
 def _replay_imported_view(
@@ -160,10 +160,12 @@ def _replay_imported_view(
         _save_station(snapshot, record.dataset_id, station_id, own, source)
     station = snapshot.stations[station_id].station
     source_digest = view_digest(view_from_json(base, station))
-    return ViewRecord(0, station_id, without_station(view_from_json(value, station)), source_digest)
+    return ViewRecord(
+        0, station_id, strip_station_from_view(view_from_json(value, station)), source_digest
+    )
 
 
-def _group_without_views(value: Mapping[str, Any]) -> Group:
+def _parse_group_without_views(value: Mapping[str, Any]) -> Group:
     return Group(
         key=value["key"],
         views=(),
@@ -180,7 +182,7 @@ def _replay_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     record, group = snapshot.groups[entry.group_id], snapshot.group(entry.group_id)
     changed = edit_from_json(entry.body["edit"]).apply(group)
     for item, before, after in zip(record.views, group.views, changed.views, strict=True):
-        item.view = without_station(after)
+        item.view = strip_station_from_view(after)
         if after.station != before.station:
             _save_station(snapshot, record.dataset_id, item.station_id, after.station, None)
     record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
@@ -211,7 +213,7 @@ def _replay_camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = snapshot.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
-    station = record.station.with_given_camera(*camera_of_log_entry(entry.body))
+    station = record.station.with_given_camera(*camera_from_log_entry(entry.body))
     base = None if edited else station
     _save_station(snapshot, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:
@@ -257,7 +259,7 @@ def _replay_unassigned(snapshot: StateSnapshot, entry: LogEntry) -> None:
         snapshot.unassigned[entry.dataset_id, camera, frame] = extras_from_json(extras)
 
 
-def _replay_noticed(
+def _replay_import_findings(
     snapshot: StateSnapshot,
     group_id: int | None,
     station_id: int | None,
@@ -271,7 +273,7 @@ def _replay_noticed(
             snapshot.noticed.add((*place, view, sentence))
 
 
-def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
+def _build_rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
     """Rows of the tables, as ``replace_all_rows`` takes them."""
     stations = [
         {
@@ -307,7 +309,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
         }
         for key, extras in snapshot.unassigned.items()
     ]
-    groups = [_group_row(snapshot, key) for key in snapshot.groups]
+    groups = [_build_group_row(snapshot, key) for key in snapshot.groups]
     return {
         "stations": stations,
         "groups": groups,
@@ -317,7 +319,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
+def _build_group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
     record = snapshot.groups[group_id]
     return {
         **group_to_columns(snapshot.group(group_id), record.paint),
@@ -335,7 +337,7 @@ _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
     "dataset_deleted": _replay_dataset_deletion,
     "policy": _replay_policy,
     "station": _replay_station,
-    "import": _replay_import,
+    "import": _replay_group_import,
     "edit": _replay_edit,
     "undo": _replay_edit,
     "redo": _replay_edit,

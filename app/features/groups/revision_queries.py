@@ -31,10 +31,10 @@ from app.features.groups.insert_queries import (
 from app.features.groups.queries import StoredGroup, positions_from_text
 from app.features.groups.view_queries import save_station
 from app.features.paint.queries import read_paint_digests
-from app.features.solutions.queries import SolutionModel, is_current
+from app.features.solutions.queries import SolutionModel, is_current_solution
 from app.features.verdicts.tables import VerdictModel
 from app.soccer import codec
-from app.soccer.codec import inputs_hash, station_digest, view_digest
+from app.soccer.codec import hash_solver_inputs, station_digest, view_digest
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 
@@ -80,7 +80,7 @@ _HEADS = (
         _STATIONS,
     )
     .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
-    .outerjoin(SolutionModel.__table__, is_current())
+    .outerjoin(SolutionModel.__table__, is_current_solution())
     .where(_GROUP.c.id.in_(bindparam("ids", expanding=True)))
 )
 
@@ -100,14 +100,14 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
                 station=view.station,
                 digest=station_digest(view.station),
             )
-        if _view_row_differs(view, old):
+        if _is_view_row_changed(view, old):
             digests[view.key] = (view_digest(view), digests[view.key][1])
     pairs = [(digests[view.key][0], stations[view.key].digest) for view in group.views]
     return replace(
         stored,
         revision=stored.revision + 1,
         changed=at,
-        inputs_hash=inputs_hash(
+        inputs_hash=hash_solver_inputs(
             group.pitch, pairs, group.positions, codec.paint_to_json(group.paint), group.noise
         ),
         group=group,
@@ -119,7 +119,7 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
 def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
     """Write what ``make_next_revision`` changed; solutions and queue are the caller's to refresh."""
     for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
-        if _view_row_differs(view, old):
+        if _is_view_row_changed(view, old):
             _update_row(
                 session,
                 ViewModel.__table__,
@@ -139,7 +139,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     _update_row(session, GroupModel.__table__, after.id, values)
 
 
-def _view_row_differs(view: View, old: View) -> bool:
+def _is_view_row_changed(view: View, old: View) -> bool:
     """Whether the view's own row is another; its station has one of its own."""
     return replace(view, station=old.station) != old
 
@@ -260,7 +260,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         positions = positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = read_paint_digests(row.paint)
-        digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
+        digest = hash_solver_inputs(pitch, pairs[key], positions, paint, noise.get(key, {}))
         rows.append({"of": key, "inputs_hash": digest})
     if rows:
         session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)
@@ -289,12 +289,14 @@ def count_groups(session: Session, dataset_id: int) -> int:
 def count_changes(session: Session, dataset_id: int, after: int) -> int:
     """How many groups of a dataset have changed after a change."""
     statement = select(func.count()).select_from(GroupChangeModel)
-    return session.scalar(statement.where(*_changed_since(dataset_id, after))) or 0
+    return session.scalar(statement.where(*_changed_since_conditions(dataset_id, after))) or 0
 
 
 def list_changed_group_ids(session: Session, dataset_id: int, after: int) -> list[int]:
     """Ids of the groups of a dataset that have changed after a change."""
-    statement = select(GroupChangeModel.group_id).where(*_changed_since(dataset_id, after))
+    statement = select(GroupChangeModel.group_id).where(
+        *_changed_since_conditions(dataset_id, after)
+    )
     return list(session.scalars(statement))
 
 
@@ -320,7 +322,7 @@ def list_changed_groups(
         _changed_groups_statement()
         .add_columns(GroupChangeModel.id.label("change_id"))
         .join(GroupChangeModel, GroupChangeModel.group_id == GroupModel.id)
-        .where(*_changed_since(dataset_id, after))
+        .where(*_changed_since_conditions(dataset_id, after))
         .order_by(GroupChangeModel.id)
         .limit(limit)
     )
@@ -346,11 +348,11 @@ def _changed_groups_statement() -> Any:
             group.pitch_length, group.pitch_width,
         )
         .join(DatasetModel, DatasetModel.id == group.dataset_id)
-        .outerjoin(SolutionModel, is_current())
+        .outerjoin(SolutionModel, is_current_solution())
     )  # fmt: skip
 
 
-def _changed_since(dataset_id: int, after: int) -> tuple[Any, ...]:
+def _changed_since_conditions(dataset_id: int, after: int) -> tuple[Any, ...]:
     return GroupChangeModel.id > after, GroupChangeModel.dataset_id == dataset_id
 
 

@@ -18,8 +18,8 @@ from app.features.groups.schemas import (
     GroupDocument,
     LineDocuments,
     PitchSize,
-    group_response,
     lines_to_document,
+    make_group_response,
     url_of_image,
 )
 from app.features.groups.solution_schemas import SolutionDocument
@@ -124,14 +124,14 @@ class StepDocument(Document):
         )
 
 
-def load_document(store: Store, group_id: int) -> GroupDocument:
+def load_group_document(store: Store, group_id: int) -> GroupDocument:
     """The document of a group as it is now."""
-    return GroupDocument.of(submit.load_solved(store, group_id))
+    return GroupDocument.of(submit.load_solved_group(store, group_id))
 
 
-def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
+def load_group_document_of_view(store: Store, view_id: int) -> GroupDocument:
     """The document of the group of a view as it is now."""
-    return GroupDocument.of(submit.load_solved_of_view(store, view_id))
+    return GroupDocument.of(submit.load_solved_group_of_view(store, view_id))
 
 
 @router.get("", operation_id="listGroups", responses=responses(404))
@@ -205,14 +205,14 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
         etag = submit.read_group_etag(store, group)
         if is_not_modified(request, etag):
             return Response(status_code=304, headers={"ETag": etag})
-    return group_response(submit.load_solved(store, group))
+    return make_group_response(submit.load_solved_group(store, group))
 
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
-    state = submit.load_solved(store, group)
+    state = submit.load_solved_group(store, group)
     if state.solution is None:
         raise NotFoundError(f"group {group} has no solution")
     return SolutionDocument.of(state.solution, state.group, state.dismissed)
@@ -259,7 +259,7 @@ async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
     """What the solution would be; nothing is saved."""
-    found = await services.previews.preview_document(request, group, changes)
+    found = await services.previews.solve_preview_document(request, group, changes)
     return Response(found, media_type="application/json")
 
 
@@ -270,11 +270,11 @@ async def preview_group(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
     store = services.store
-    with add_current_state_to_conflicts(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
         return history.undo_group_edit(
             store, group, if_match=if_match, actor=actor, paint=services.paint
         )
@@ -287,11 +287,11 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
-    with add_current_state_to_conflicts(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
         return history.redo_group_edit(
             store, group, if_match=if_match, actor=actor, paint=services.paint
         )

@@ -22,16 +22,16 @@ from app.errors import UnknownMarkingError
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.policies.schemas import PolicyDocument
-from app.http.documents import Document, IdentityCache, ListDocument, document
-from app.soccer.annotation import BallAnnotation, Lines, followed_source
+from app.http.documents import Document, IdentityCache, ListDocument, make_document_response
+from app.soccer.annotation import BallAnnotation, Lines, make_followed_source
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
 from app.soccer.group import (
     MAX_NOTE,
     Group,
-    LeftOut,
     Reason,
     View,
+    ViewExclusion,
     is_numbered_in_time,
     make_view_letter,
 )
@@ -40,7 +40,7 @@ from app.soccer.pitch import MARKINGS, canonical_marking
 from app.wording import plural
 
 
-def _known_marking(name: str) -> str:
+def _validate_marking_name(name: str) -> str:
     try:
         return canonical_marking(name)
     except UnknownMarkingError as error:
@@ -56,7 +56,9 @@ def _require_distinct_markings(lines: Any) -> Any:
 
 
 Marking = Annotated[
-    str, AfterValidator(_known_marking), WithJsonSchema({"type": "string", "enum": list(MARKINGS)})
+    str,
+    AfterValidator(_validate_marking_name),
+    WithJsonSchema({"type": "string", "enum": list(MARKINGS)}),
 ]
 """One of the 26 names; spaces at the ends do not matter."""
 Pixel = Annotated[float, Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False, strict=True)]
@@ -143,7 +145,7 @@ def _describe_ball_alternatives(schema: dict[str, Any]) -> None:
     box, point = (fields[name].pop("anyOf")[0] for name in ("box", "point"))
     nowhere = {"type": "null"}
 
-    def alternative(title: str, place: str, **own: Any) -> dict[str, Any]:
+    def build_alternative(title: str, place: str, **own: Any) -> dict[str, Any]:
         own = {"box": nowhere, "point": nowhere, "out_of_view": {"const": False}, **own}
         properties = {name: fields[name] | own.get(name, {}) for name in fields}
         properties[place].pop("default", None)
@@ -161,9 +163,9 @@ def _describe_ball_alternatives(schema: dict[str, Any]) -> None:
         {"out_of_view": True},
     ]
     schema["oneOf"] = [
-        alternative("BallByBox", "box", box=box),
-        alternative("BallByPoint", "point", point=point),
-        alternative(
+        build_alternative("BallByBox", "box", box=box),
+        build_alternative("BallByPoint", "point", point=point),
+        build_alternative(
             "BallOutOfView", "out_of_view", out_of_view={"const": True}, followed_from=nowhere
         ),
     ]
@@ -212,7 +214,9 @@ class BallEdit(BaseModel):
             occluded=self.occluded,
             out_of_view=self.out_of_view,
             inferred=self.inferred and not self.out_of_view,
-            predicted_by="" if self.followed_from is None else followed_source(self.followed_from),
+            predicted_by=""
+            if self.followed_from is None
+            else make_followed_source(self.followed_from),
         )
 
 
@@ -252,14 +256,16 @@ class Ball(BaseModel):
 LineDocuments = dict[str, list[Point]]
 
 
-def _line_documents(lines: Lines) -> LineDocuments:
+def _build_line_documents(lines: Lines) -> LineDocuments:
     return {
         marking: [Point.model_construct(x=point.x, y=point.y) for point in points]
         for marking, points in lines.items()
     }
 
 
-_kept_documents: IdentityCache[Lines, LineDocuments] = IdentityCache(_line_documents, size=1024)
+_kept_documents: IdentityCache[Lines, LineDocuments] = IdentityCache(
+    _build_line_documents, size=1024
+)
 
 
 def lines_to_document(lines: Lines) -> LineDocuments:
@@ -318,7 +324,7 @@ class ViewDocument(Document):
     width: int
     height: int
     included: bool
-    left_out: LeftOut | None = Field(
+    left_out: ViewExclusion | None = Field(
         description="Reason why a person left the view out, if they gave one."
     )
     station: StationDocument
@@ -381,7 +387,7 @@ class GroupDocument(Document):
             verdicts=[VerdictDocument.model_validate(verdict) for verdict in state.verdicts],
             policy=PolicyDocument.model_validate(state.policy),
             views=[
-                _view_document(state, view, index, label)
+                _build_view_document(state, view, index, label)
                 for index, (view, label) in enumerate(
                     zip(group.views, make_view_labels(group), strict=True)
                 )
@@ -392,10 +398,10 @@ class GroupDocument(Document):
         )
 
 
-def group_response(state: GroupState) -> Response:
+def make_group_response(state: GroupState) -> Response:
     """The document of a group, its ETag in the header."""
     headers = {"ETag": state.etag, "Cache-Control": "private, no-cache"}
-    return document(GroupDocument.of(state), headers=headers)
+    return make_document_response(GroupDocument.of(state), headers=headers)
 
 
 def make_view_labels(group: Group) -> list[str]:
@@ -417,7 +423,7 @@ def url_of_image(view_id: int) -> str:
     return f"/api/v1/views/{view_id}/image"
 
 
-def _view_document(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
+def _build_view_document(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
     view_id, why = state.view_ids[view.key], view.left_out
     return ViewDocument.model_construct(
         id=view_id,
@@ -428,24 +434,24 @@ def _view_document(state: GroupState, view: View, index: int, label: str) -> Vie
         height=view.size.height,
         included=view.included,
         left_out=None if why is None else why,
-        station=_station_document(state, view),
+        station=_build_station_document(state, view),
         lines=lines_to_document(view.station.lines),
         proposed=[*view.station.proposed],
         not_visible=[*view.station.not_visible],
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else url_of_image(view_id),
-        neighbours=_neighbours_address(state.key, view, view_id),
+        neighbours=_build_neighbours_url(state.key, view, view_id),
     )
 
 
-def _neighbours_address(group: str, view: View, view_id: int) -> str | None:
+def _build_neighbours_url(group: str, view: View, view_id: int) -> str | None:
     media = view.media
     if media is None or not is_numbered_in_time(media, group, view.station.shared):
         return None
     return f"/api/v1/views/{view_id}/neighbours"
 
 
-def _station_document(state: GroupState, view: View) -> StationDocument:
+def _build_station_document(state: GroupState, view: View) -> StationDocument:
     station = view.station
     values: dict[str, Any] = {
         "id": state.station_ids[station.key],

@@ -18,11 +18,19 @@ from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Y, Z
 from app.http.documents import Document, IdentityCache
-from app.soccer.finding import Dismissal, Finding, Fix
+from app.soccer.finding import Dismissal, Finding, SuggestedFix
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Gate, Pair, Solution, Suspect
+from app.soccer.solution import (
+    GAMMAS_PERCENT,
+    BallFit,
+    Calibration,
+    Gate,
+    Solution,
+    SuspectLabel,
+    TriangulatedPair,
+)
 from app.solving.calibrate import DRAWN_DIGITS
 from app.solving.jaccard import project_markings
 
@@ -78,17 +86,17 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     )
 
 
-def _box_numbers(box: Any) -> Any:
+def _box_to_numbers(box: Any) -> Any:
     return (box.x, box.y, box.width, box.height) if isinstance(box, Box) else box
 
 
-def _values_by_gamma(values: Any) -> Any:
+def _map_values_by_gamma(values: Any) -> Any:
     if not isinstance(values, tuple):
         return values
     return {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, values, strict=True)}
 
 
-def _camera_json(camera: Any) -> Any:
+def _camera_to_json(camera: Any) -> Any:
     return camera_to_json(camera) if isinstance(camera, Camera) else camera
 
 
@@ -96,8 +104,8 @@ Measured = float | None
 """A number that may have no end (the sigma of parallel rays): it travels as null."""
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
-XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_box_numbers)]
-Jac = Annotated[dict[str, float], BeforeValidator(_values_by_gamma)]
+XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_box_to_numbers)]
+Jac = Annotated[dict[str, float], BeforeValidator(_map_values_by_gamma)]
 """By gamma in per cent of the diagonal."""
 _NOT_SEEN = np.empty((0, 2))
 
@@ -148,7 +156,7 @@ class MarkingDocument(Document):
     )
 
 
-class SuspectDocument(Document, shows=Suspect):
+class SuspectDocument(Document, shows=SuspectLabel):
     """A marking whose label looks wrong, and what would fit."""
 
     error_px: Measured
@@ -178,7 +186,7 @@ class CalibrationDocument(Document):
     """The camera of a view and how well it is known."""
 
     source: str = Field(description="`given`, `lines` or `paint`.")
-    camera: Annotated[CameraDocument, BeforeValidator(_camera_json)] | None
+    camera: Annotated[CameraDocument, BeforeValidator(_camera_to_json)] | None
     sigma: CameraSigma | None = Field(
         description="How well the camera is known; null for a given one of which nothing more is known."
     )
@@ -227,7 +235,7 @@ _kept_document: IdentityCache[Calibration, CalibrationDocument] = IdentityCache(
 )
 
 
-def _calibration_document(value: Any, info: ValidationInfo) -> Any:
+def _convert_calibration(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, Calibration):
         return value
     group: Any = info.context
@@ -262,7 +270,7 @@ class ViewSolutionDocument(Document):
     view: str
     included: bool
     failed: str | None = Field(description="First gate that dropped this view.")
-    calibration: Annotated[CalibrationDocument, BeforeValidator(_calibration_document)]
+    calibration: Annotated[CalibrationDocument, BeforeValidator(_convert_calibration)]
     ball: BallFitDocument | None
     expected: ExpectedBallDocument | None
 
@@ -277,7 +285,7 @@ class ViewSolutionDocument(Document):
         )
 
 
-class PairDocument(Document, shows=Pair):
+class PairDocument(Document, shows=TriangulatedPair):
     """The ball triangulated from two views; pitch frame, metres, z down."""
 
     errors_px: tuple[Measured, Measured]
@@ -329,11 +337,11 @@ class FailingGate(Document):
     sentence: str
 
 
-class FixDocument(Document, shows=Fix):
+class FixDocument(Document, shows=SuggestedFix):
     """An edit that a finding proposes."""
 
 
-def _edit_json(edit: Any) -> Any:
+def _edit_to_json(edit: Any) -> Any:
     return edit if isinstance(edit, dict) else edit_to_json(edit)
 
 
@@ -341,7 +349,7 @@ class OfferDocument(Document):
     """An edit that carries a fix out."""
 
     label: str = Field(description="What a button for it says.")
-    edit: Annotated[dict[str, Any], BeforeValidator(_edit_json)] = Field(
+    edit: Annotated[dict[str, Any], BeforeValidator(_edit_to_json)] = Field(
         description="As the history writes edits: `set_lines`, `set_balls`, "
         "`set_picture` or `include_view`."
     )

@@ -9,13 +9,13 @@ from typing import Any
 
 from app.db.session import Session
 from app.errors import NotFoundError, StaleRevisionError
-from app.features.datasets.queries import policy_from_row
+from app.features.datasets.queries import parse_stored_policy
 from app.features.findings.queries import (
     NOTHING_DISMISSED,
     GroupDismissals,
     findings_from_rows,
     read_import_findings,
-    read_noticed_by_imports,
+    read_import_notices,
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import find_etag_row, read_etag_rows
@@ -24,7 +24,7 @@ from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.verdicts.queries import StoredVerdict, is_fixed, read_last_verdicts
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -37,7 +37,7 @@ def content_tag(inputs_hash: str, revision: int, verdict_id: int, dismissal_id: 
     The ids are those of the newest verdict and of the newest dismissal; 0: there is none.
     """
     content = [inputs_hash, revision, verdict_id]
-    return digest([*content, dismissal_id] if dismissal_id else content)[:16]
+    return digest_json([*content, dismissal_id] if dismissal_id else content)[:16]
 
 
 def group_etag(
@@ -63,7 +63,7 @@ def group_etag(
     """
     kinds = sorted(set(findings or ()))
     parts = [policy_hash, policy_name, SOLVER_VERSION, findings is None, kinds, station_revisions]
-    computed = digest(parts)[:8]
+    computed = digest_json(parts)[:8]
     return f'"{content}-{computed}"'
 
 
@@ -110,11 +110,11 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
     head = read_group_head(session, group_id)
     if head is None:
         raise NotFoundError.group(group_id)
-    require_content(session, group_id, head.content, if_match, what)
+    require_unchanged_content(session, group_id, head.content, if_match, what)
     return head.policy_hash
 
 
-def require_content(
+def require_unchanged_content(
     session: Session, group_id: int, content: str, if_match: str, what: str
 ) -> None:
     """``require_unchanged`` where what was said about the group is known."""
@@ -136,7 +136,7 @@ def require_etag(current: str, if_match: str, what: str) -> None:
 
 def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
-    noticed = read_noticed_by_imports(session, group_ids)
+    noticed = read_import_notices(session, group_ids)
     etags = {}
     for row in read_etag_rows(session, group_ids):
         content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
@@ -144,7 +144,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
         if row.summary is not None:
             kinds = [item.kind for item in findings_from_rows(noticed[row.id], row.inputs_hash)]
             findings = [*json.loads(row.summary)["findings"], *kinds]
-        name = policy_from_row(row.policy).name
+        name = parse_stored_policy(row.policy).name
         revisions = int(row.station_revisions)
         etags[row.id] = group_etag(content, row.policy_hash, name, findings, revisions)
     return etags
@@ -262,8 +262,8 @@ class GroupWithoutSolution:
             solution = replace(solution, findings=solution.findings + noticed)
         edited = stored.edited
         verdicts = [
-            _verdict_state(item, stored, edited, passes)
-            for item in _newest_verdict_of_each_actor(self.verdicts)
+            _make_verdict_state(item, stored, edited, passes)
+            for item in _select_newest_verdict_per_actor(self.verdicts)
         ]
         kinds = None if solution is None else [item.kind for item in solution.findings]
         stations = stored.stations.values()
@@ -291,7 +291,7 @@ class GroupWithoutSolution:
         )
 
 
-def need_group(session: Session, group_id: int) -> StoredGroup:
+def require_group(session: Session, group_id: int) -> StoredGroup:
     """A group whole; raises NotFoundError where there is none."""
     stored = read_groups(session, [group_id]).get(group_id)
     if stored is None:
@@ -358,10 +358,10 @@ def read_states(
 
 def station_etag(stored: StoredStation) -> str:
     """The station's own ETag, quoted."""
-    return f'"{digest([stored.digest, stored.revision])[:16]}"'
+    return f'"{digest_json([stored.digest, stored.revision])[:16]}"'
 
 
-def _verdict_state(
+def _make_verdict_state(
     given: StoredVerdict, stored: StoredGroup, edited: bool, passes: bool | None
 ) -> VerdictState:
     reviewed = given.state != "unreviewed"
@@ -377,7 +377,7 @@ def _verdict_state(
     )
 
 
-def _newest_verdict_of_each_actor(verdicts: Iterable[StoredVerdict]) -> list[StoredVerdict]:
+def _select_newest_verdict_per_actor(verdicts: Iterable[StoredVerdict]) -> list[StoredVerdict]:
     last: dict[str, StoredVerdict] = {}
     for verdict in verdicts:
         last.setdefault(verdict.actor, verdict)

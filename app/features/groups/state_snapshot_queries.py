@@ -16,7 +16,7 @@ from sqlalchemy import delete, insert, select, text
 from app.db.dialects.dialect import DeferReferences
 from app.db.json_columns import decompress_json
 from app.db.session import Session
-from app.features.datasets.queries import list_dataset_rows, policy_from_row
+from app.features.datasets.queries import list_dataset_rows, parse_stored_policy
 from app.features.datasets.tables import (
     GroupModel,
     ImportFindingModel,
@@ -31,7 +31,7 @@ from app.features.queue.tables import QueueModel
 from app.features.tables import Base
 from app.features.verdicts.tables import VerdictModel
 from app.soccer.annotation import Extras
-from app.soccer.codec import extras_from_json, group_inputs_hash, paint_to_json
+from app.soccer.codec import extras_from_json, hash_group_inputs, paint_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
@@ -55,15 +55,15 @@ def iterate_groups(session: Session) -> Iterator[StoredGroup]:
 
 def iterate_verdicts(session: Session) -> Iterator[dict[str, Any]]:
     """Every verdict as values by column but its id, oldest first."""
-    return _all_rows(session, VerdictModel)
+    return _iterate_all_rows(session, VerdictModel)
 
 
 def iterate_dismissals(session: Session) -> Iterator[dict[str, Any]]:
     """Every dismissal of a finding in the same way."""
-    return _all_rows(session, DismissalModel)
+    return _iterate_all_rows(session, DismissalModel)
 
 
-def _all_rows(
+def _iterate_all_rows(
     session: Session, model: type[VerdictModel] | type[DismissalModel]
 ) -> Iterator[dict[str, Any]]:
     columns = [item for item in model.__table__.columns if item.name != "id"]
@@ -111,10 +111,10 @@ def replace_all_rows(
 @contextmanager
 def _preserve_view_rows(session: Session) -> Iterator[None]:
     """What goes with its view and is in no log comes back after this, where its view did."""
-    for table in _tables_of_views():
+    for table in _list_view_dependent_tables():
         session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))
     yield
-    for table in _tables_of_views():
+    for table in _list_view_dependent_tables():
         session.execute(
             text(
                 f"INSERT INTO {table} SELECT * FROM kept_{table}"
@@ -124,7 +124,7 @@ def _preserve_view_rows(session: Session) -> Iterator[None]:
         session.execute(text(f"DROP TABLE kept_{table}"))
 
 
-def _tables_of_views() -> list[str]:
+def _list_view_dependent_tables() -> list[str]:
     """Names of the tables whose rows are deleted with the view that they are about."""
     return [
         table.name
@@ -207,10 +207,10 @@ class StateSnapshot:
 
     def inputs_hash(self, group_id: int) -> str:
         """Digest of everything that solving the group reads."""
-        return group_inputs_hash(self.group(group_id), self.groups[group_id].paint)
+        return hash_group_inputs(self.group(group_id), self.groups[group_id].paint)
 
 
-def without_station(view: View) -> View:
+def strip_station_from_view(view: View) -> View:
     """A view as a record holds it."""
     return replace(view, station=_ELSEWHERE)
 
@@ -219,13 +219,13 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
     """The state snapshot as the tables have it."""
     snapshot = StateSnapshot()
     for row in list_dataset_rows(session):
-        snapshot.datasets[row.id] = (row.name, policy_from_row(row.policy))
+        snapshot.datasets[row.id] = (row.name, parse_stored_policy(row.policy))
     for station in iterate_stations(session):
         snapshot.stations[station.id] = StationRecord(
             station.dataset_id, station.station, station.revision, station.source_digest
         )
     for group in iterate_groups(session):
-        snapshot.groups[group.id] = _group_record(group)
+        snapshot.groups[group.id] = _make_group_record(group)
     for values in iterate_verdicts(session):
         snapshot.verdicts.setdefault(values.pop("group_id"), []).append(values)
     for values in iterate_dismissals(session):
@@ -238,12 +238,12 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
     return snapshot
 
 
-def _group_record(stored: StoredGroup) -> GroupRecord:
+def _make_group_record(stored: StoredGroup) -> GroupRecord:
     views = [
         ViewRecord(
             stored.view_ids[view.key],
             stored.stations[view.key].id,
-            without_station(view),
+            strip_station_from_view(view),
             stored.view_digests[view.key][1],
         )
         for view in stored.group.views

@@ -18,7 +18,7 @@ from app.features.groups.edit import (
     Edit,
     SetPaint,
     SetPicture,
-    need_view,
+    require_view,
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json, require_point_limits_of_edits
 from app.features.groups.group_edits import add_noise_of_actor, keep_view_noise
@@ -27,25 +27,25 @@ from app.features.groups.revision_queries import make_next_revision, save_revisi
 from app.features.groups.state import (
     GroupState,
     GroupWithoutSolution,
-    need_group,
     read_etags,
     read_record,
     read_state,
-    require_content,
+    require_group,
     require_unchanged,
+    require_unchanged_content,
 )
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations import submission_queries as submissions
-from app.features.independent_annotations.queries import find_independent_annotation_row
-from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
+from app.features.independent_annotations.queries import find_annotation_of_copy
+from app.features.paint.queries import FOLLOWS, PAINT, insert_paint_readings
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
 from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
-from app.features.solutions.service import Solve, read_known_calibrations, solve_encoded
+from app.features.solutions.service import Solve, read_known_calibrations, solve_and_encode
 from app.soccer.group import Group, Media
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def find_view(store: Store, view_id: int) -> FoundView:
 def require_group_open(session: Session, dataset_id: int, group_id: int) -> None:
     """Raise ConflictError where a group is an independent annotation that was submitted."""
     if dataset_id > COPIES:
-        submissions.require_annotation_open(find_independent_annotation_row(session, group_id))
+        submissions.require_annotation_open(find_annotation_of_copy(session, group_id))
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class EditOptions(TypedDict):
     if_match: str
     actor: str
     then: NotRequired[Then]
-    paint: NotRequired[PaintFollower | None]
+    paint: NotRequired[PaintUpdater | None]
     solve: NotRequired[Solve]
 
 
@@ -134,7 +134,7 @@ Find = Callable[[Session], int]
 Plan = Callable[[Session, GroupWithoutSolution, str], GroupChange]
 
 
-def load(store: Store, group_id: int) -> GroupState:
+def load_group_state(store: Store, group_id: int) -> GroupState:
     """A group as it is now.
 
     Raises:
@@ -157,7 +157,7 @@ def read_group_etag(store: Store, group_id: int) -> str:
     return found[group_id]
 
 
-def submit(
+def submit_edit(
     store: Store,
     group_id: int,
     edit: Edit,
@@ -178,7 +178,7 @@ def submit(
         StorageError: Nothing was saved.
     """
     return submit_change(
-        store, lambda _session: group_id, _plan_edits(lambda _stored: [edit]), **how
+        store, lambda _session: group_id, _make_edit_planner(lambda _stored: [edit]), **how
     )
 
 
@@ -188,9 +188,9 @@ def submit_edits(
     edits: Sequence[Edit],
     **how: Unpack[EditOptions],
 ) -> GroupState:
-    """``submit`` for several edits of a group, which are one edit: undo takes them back together."""
+    """``submit_edit`` for several edits of a group, which are one edit: undo takes them back together."""
     return submit_change(
-        store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how
+        store, lambda _session: group_id, _make_edit_planner(lambda _stored: edits), **how
     )
 
 
@@ -200,23 +200,23 @@ def submit_view_edit(
     edit_of: Callable[[str], Edit],
     **how: Unpack[EditOptions],
 ) -> GroupState:
-    """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
+    """``submit_edit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
-    def edits(stored: StoredGroup) -> list[Edit]:
+    def make_edits(stored: StoredGroup) -> list[Edit]:
         return [edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))]
 
-    def find(session: Session) -> int:
+    def find_group_id(session: Session) -> int:
         return find_group_of_view(session, view_id)
 
-    return submit_change(store, find, _plan_edits(edits), **how)
+    return submit_change(store, find_group_id, _make_edit_planner(make_edits), **how)
 
 
-def preview(
+def solve_edited_group(
     store: Store,
     group_id: int,
     edits_of: Callable[[Group], Sequence[Edit]],
-    paint: PaintFollower | None = None,
-    solve: Solver = solve,
+    paint: PaintUpdater | None = None,
+    solve: Solver = solve_group,
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
 
@@ -227,7 +227,7 @@ def preview(
         SharedStationError: The picture of a static camera is said to be cropped or stretched.
     """
     with store.read() as session:
-        stored = need_group(session, group_id)
+        stored = require_group(session, group_id)
         group = stored.group
         edits = edits_of(group)
         require_point_limits_of_edits(group, edits)
@@ -242,39 +242,39 @@ def preview(
     return group, solve(group, stored.policy, known)
 
 
-def load_solved(store: Store, group_id: int) -> GroupState:
+def load_solved_group(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed if that was still to do; saves nothing."""
-    state = load(store, group_id)
+    state = load_group_state(store, group_id)
     if state.solution is not None:
         return state
-    _, solution = preview(store, group_id, lambda _group: [])
+    _, solution = solve_edited_group(store, group_id, lambda _group: [])
     return replace(state, solution=solution)
 
 
-def load_solved_of_view(store: Store, view_id: int) -> GroupState:
-    """``load_solved`` for the group of a view."""
+def load_solved_group_of_view(store: Store, view_id: int) -> GroupState:
+    """``load_solved_group`` for the group of a view."""
     with store.read() as session:
         group_id = find_group_of_view(session, view_id)
-    return load_solved(store, group_id)
+    return load_solved_group(store, group_id)
 
 
-def solve_and_keep(store: Store, group_id: int) -> GroupState:
+def solve_and_store_group(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
-    record, solution = read_solved(store, group_id)
+    record, solution = read_solved_group(store, group_id)
     return record.state(solution)
 
 
-def solve_for_state(session: Session, group_id: int) -> GroupState:
+def read_and_solve_group(session: Session, group_id: int) -> GroupState:
     """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
     record = read_record(session, group_id)
     solution = read_solutions(session, [record.solution_key]).get(group_id)
     if solution is None:
         group, policy = record.stored.group, record.stored.policy
-        solution = solve(group, policy, read_known_calibrations(session, [group], policy))
+        solution = solve_group(group, policy, read_known_calibrations(session, [group], policy))
     return record.state(solution)
 
 
-def read_solved(
+def read_solved_group(
     store: Store, group_id: int, *, needed: bool = True
 ) -> tuple[GroupWithoutSolution, Solution | None]:
     """A group's record and its solution, which is computed and kept where it is needed."""
@@ -285,7 +285,7 @@ def read_solved(
         if solution is not None or not needed:
             return record, solution
         known = read_known_calibrations(session, [stored.group], stored.policy)
-    solution, encoded = solve_encoded(stored.group, stored.policy, known)
+    solution, encoded = solve_and_encode(stored.group, stored.policy, known)
     with store.write() as session:
         insert_solutions(session, [(record.solution_key, encoded)])
         refresh_queue(session, [group_id])
@@ -296,7 +296,7 @@ def refuse_edit_of_shared_station(stored: StoredGroup, edit: Edit) -> None:
     """Refuse an edit that belongs to the station when many views share that."""
     if not isinstance(edit, STATION_EDITS):
         return
-    station = need_view(stored.group, edit.view).station
+    station = require_view(stored.group, edit.view).station
     if station.shared:
         what = "picture" if isinstance(edit, SetPicture) else "lines"
         raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
@@ -310,8 +310,8 @@ def submit_change(
     if_match: str,
     actor: str,
     then: Then = Session.respond,
-    paint: PaintFollower | None = None,
-    solve: Solve = solve_encoded,
+    paint: PaintUpdater | None = None,
+    solve: Solve = solve_and_encode,
 ) -> GroupState:
     """Save a step of a group (an edit, an undo, a redo) and answer with the group as it is then.
 
@@ -323,14 +323,14 @@ def submit_change(
 
     Raises:
         StaleRevisionError: Somebody else was faster.
-        ReviewError: As ``find`` and ``plan`` raise it.
+        ReviewError: As ``find_group_id`` and ``plan_edit`` raise it.
         StorageError: Nothing was saved.
     """
     while True:
         with store.read() as session:
             before = read_record(session, find(session))
             what = f"group {before.stored.group.key}"
-            require_content(session, before.stored.id, before.content, if_match, what)
+            require_unchanged_content(session, before.stored.id, before.content, if_match, what)
             change = plan(session, before, actor)
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])
@@ -374,9 +374,9 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     where = stored.dataset_id, stored.id
     entries = [NewLogEntry(change.kind, actor, stored.changed, change.body, *where)]
     if outcome.painted is not change.group:
-        insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
+        insert_paint_readings(session, stored.dataset_id, outcome.painted.paint.values())
         entries.append(
-            NewLogEntry(PAINT, actor, stored.changed, _paint_entry_body(outcome), *where)
+            NewLogEntry(PAINT, actor, stored.changed, _make_paint_entry_body(outcome), *where)
         )
     append_entries(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
@@ -387,7 +387,7 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
 
 
-def _paint_entry_body(outcome: _AppliedChange) -> Json:
+def _make_paint_entry_body(outcome: _AppliedChange) -> Json:
     """Body of the entry that says what was read of the paint with a change."""
     before = outcome.change.group
     edit = SetPaint(outcome.painted.paint)
@@ -409,11 +409,11 @@ def combine_edits(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edi
     return made[0] if len(made) == 1 else CompositeEdit(tuple(made))
 
 
-def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
-    def plan(_session: Session, record: GroupWithoutSolution, actor: str) -> GroupChange:
+def _make_edit_planner(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
+    def plan_edit(_session: Session, record: GroupWithoutSolution, actor: str) -> GroupChange:
         group = record.stored.group
         edit = combine_edits(record.stored, edits_of(record.stored), actor)
         body = edit_and_inverse_to_json(edit, edit.inverse(group))
         return GroupChange("edit", body, edit.apply(group))
 
-    return plan
+    return plan_edit

@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 
 from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, SetPicture, set_ball
 from app.geometry.camera import Camera
-from app.soccer.annotation import BallAnnotation, lines_without
-from app.soccer.finding import Finding, Fix, PlacedFinding
+from app.soccer.annotation import BallAnnotation, remove_markings
+from app.soccer.finding import Finding, PlacedFinding, SuggestedFix
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View, make_view_letter
 from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.calibrate import calibrate_station, shortest_counted_marking_px
+from app.solving.calibrate import calibrate_station, min_counted_marking_px
 from app.solving.calibration_findings import READ_PAINT
 from app.solving.jaccard import (
     classify_markings,
@@ -59,7 +59,7 @@ class FixGuide:
 
 
 def list_edits_of_fix(
-    group: Group, fix: Fix | None, point: ImagePoint | None = None
+    group: Group, fix: SuggestedFix | None, point: ImagePoint | None = None
 ) -> tuple[EditOffer, ...]:
     """The edits that carry out a fix: none when only a person can, several to choose from.
 
@@ -72,15 +72,17 @@ def list_edits_of_fix(
     if fix is None or view is None:
         return ()
     action = _ACTIONS[fix.action]
-    found = ((one, action.edit(view, one, point)) for one in _fixes_to_choose(view, fix))
+    found = ((one, action.edit(view, one, point)) for one in _list_fix_choices(view, fix))
     return tuple(
-        EditOffer(_button_text(action.label, one), edit, _button_text(action.caption, one))
+        EditOffer(
+            _format_button_text(action.label, one), edit, _format_button_text(action.caption, one)
+        )
         for one, edit in found
         if edit
     )
 
 
-def find_guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGuide | None:
+def find_guide_of_fix(fix: SuggestedFix | None, point: ImagePoint | None = None) -> FixGuide | None:
     """Where a fix leads a person; None where an edit carries it out.
 
     Args:
@@ -97,34 +99,34 @@ def find_guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGu
 def list_edits_of_finding(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
-        return _fitted_box_offers(group, finding)
+        return _offer_fitted_box(group, finding)
     if isinstance(finding, PlacedFinding):
-        return _beside_track_offers(group, finding)
+        return _offer_edits_for_ball_off_track(group, finding)
     return list_edits_of_fix(group, finding.fix)
 
 
 def find_guide_of_finding(finding: Finding) -> FixGuide | None:
     """Where a finding leads a person; None where it offers edits, or nothing."""
     if finding.kind == "visible_not_annotated":
-        return find_guide_of_fix(Fix("draw_marking", finding.view, finding.marking))
+        return find_guide_of_fix(SuggestedFix("draw_marking", finding.view, finding.marking))
     return find_guide_of_fix(finding.fix)
 
 
-def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
+def edit_of_fix(group: Group, fix: SuggestedFix, point: ImagePoint | None = None) -> Edit | None:
     """The one edit that carries out a fix; None when only a person can, or has to choose."""
     found = list_edits_of_fix(group, fix, point)
     return found[0].edit if len(found) == 1 else None
 
 
-def rank_of_fix(fix: Fix) -> int:
+def rank_of_fix(fix: SuggestedFix) -> int:
     """Grows with what a fix takes away: mending what is wrong comes before leaving it out."""
     return _ACTIONS[fix.action].rank
 
 
-def describe_condition(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
+def describe_condition(group: Group, fix: SuggestedFix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
     letter = make_view_letter([view.key for view in group.views].index(fix.view or ""))
-    return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
+    return _format_button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 
 def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBalls:
@@ -136,18 +138,20 @@ def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBal
     return set_ball(view, replace(ball, box=moved))
 
 
-def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[EditOffer, ...]:
+def _offer_edits_for_ball_off_track(group: Group, finding: PlacedFinding) -> tuple[EditOffer, ...]:
     """The ball at the place of the track, another ball of the view, or the view left out."""
     key = finding.view
     view = None if key is None else group.view(key)
     place = None if finding.place is None else ImagePoint(*finding.place)
-    moved = list_edits_of_fix(group, Fix("move_ball", key), place) if place is not None else ()
-    others = () if view is None else _fixes_to_choose(view, Fix("pick_ball", key))
+    moved = (
+        list_edits_of_fix(group, SuggestedFix("move_ball", key), place) if place is not None else ()
+    )
+    others = () if view is None else _list_fix_choices(view, SuggestedFix("pick_ball", key))
     picked = [offer for fix in others if fix.index for offer in list_edits_of_fix(group, fix)]
-    return (*moved, *picked, *list_edits_of_fix(group, Fix("exclude_view", key)))
+    return (*moved, *picked, *list_edits_of_fix(group, SuggestedFix("exclude_view", key)))
 
 
-def _fitted_box_offers(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
+def _offer_fitted_box(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     """A box as large as the ball looks at its distance; the number is how many times as large it is now."""
     view = None if finding.view is None else group.view(finding.view)
     ball = None if view is None else view.ball
@@ -157,12 +161,12 @@ def _fitted_box_offers(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     return (EditOffer("Fit the box", set_ball(view.key, replace(ball, box=box))),)
 
 
-def _button_text(text: str, fix: Fix, **more: str | float) -> str:
+def _format_button_text(text: str, fix: SuggestedFix, **more: str | float) -> str:
     number = None if fix.index is None else fix.index + 1
     return text.format(marking=fix.marking, to=fix.to, number=number, **more)
 
 
-def _fixes_to_choose(view: View, fix: Fix) -> list[Fix]:
+def _list_fix_choices(view: View, fix: SuggestedFix) -> list[SuggestedFix]:
     """The fix, or one for each ball of which one has to be picked."""
     if fix.action != "pick_ball" or fix.index is not None:
         return [fix]
@@ -170,25 +174,25 @@ def _fixes_to_choose(view: View, fix: Fix) -> list[Fix]:
     return [replace(fix, index=index) for index in seen] if len(seen) > 1 else []
 
 
-def _no_edit(_view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _no_edit(_view: View, _fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     return None
 
 
-def _include_view_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _include_view_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     return IncludeView(view.key, fix.action == "include_view")
 
 
-def _pick_ball_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _pick_ball_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     there = fix.index is not None and fix.index < len(view.balls)
     return set_ball(view.key, view.balls[fix.index or 0]) if there else None
 
 
-def _move_ball_edit(view: View, _fix: Fix, point: ImagePoint | None) -> Edit | None:
+def _move_ball_edit(view: View, _fix: SuggestedFix, point: ImagePoint | None) -> Edit | None:
     ball = next((one for one in view.balls if not one.out_of_view), None)
     return None if point is None or ball is None else move_ball_edit(view.key, ball, point)
 
 
-def _swap_sides_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _swap_sides_edit(view: View, _fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     """Every marking under the name that it has when the pitch turns by 180 degrees."""
     lines = view.station.lines
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
@@ -201,12 +205,14 @@ def _swap_sides_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit |
     return SetLines(view.key, changes, not_visible=unseen) if changes else None
 
 
-def _estimate_picture_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _estimate_picture_edit(
+    view: View, _fix: SuggestedFix, _point: ImagePoint | None
+) -> Edit | None:
     """Its own lines say what was done to the picture; that of a static camera belongs to no view."""
     return None if view.station.shared else SetPicture(view.key, OPEN)
 
 
-def _relabel_marking_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _relabel_marking_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     lines = view.station.lines
     if fix.to is None or fix.marking is None or fix.marking not in lines:
         return None
@@ -214,27 +220,29 @@ def _relabel_marking_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Ed
     return SetLines(view.key, {fix.marking: None, fix.to: merged})
 
 
-def _delete_marking_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _delete_marking_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     if fix.marking is None or fix.marking not in view.station.lines:
         return None
     return SetLines(view.key, {fix.marking: None})
 
 
-def _mark_not_visible_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _mark_not_visible_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     if fix.marking is None or fix.marking in view.station.lines:
         return None
     return SetLines(view.key, {fix.marking: None}, not_visible=(fix.marking,))
 
 
-def _move_point_edit(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
+def _move_point_edit(view: View, fix: SuggestedFix, point: ImagePoint | None) -> Edit | None:
     return None if point is None else _replace_point_edit(view, fix, (point,))
 
 
-def _delete_point_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _delete_point_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     return _replace_point_edit(view, fix, ())
 
 
-def _replace_point_edit(view: View, fix: Fix, instead: tuple[ImagePoint, ...]) -> Edit | None:
+def _replace_point_edit(
+    view: View, fix: SuggestedFix, instead: tuple[ImagePoint, ...]
+) -> Edit | None:
     points = tuple(view.station.lines.get(fix.marking or "", ()))
     if fix.marking is None or fix.index is None or not fix.index < len(points):
         return None
@@ -257,7 +265,7 @@ class _FixAction:
     sentence: str = ""
     label: str = ""
     caption: str = ""
-    edit: Callable[[View, Fix, ImagePoint | None], Edit | None] = _no_edit
+    edit: Callable[[View, SuggestedFix, ImagePoint | None], Edit | None] = _no_edit
 
 
 _ACTIONS = {
@@ -377,18 +385,18 @@ def measure_marking_influences(
     trusting = replace(policy, check_labels=False)
     found = []
     for marking in station.lines:
-        used = lines_without(station.lines, {marking, *doubted})
+        used = remove_markings(station.lines, {marking, *doubted})
         rest = calibrate_station(replace(station, lines=used), pitch, trusting).camera
         jac, error = (
             (None, None)
             if rest is None
-            else _jac_and_distance_without(rest, marking, station, pitch, policy)
+            else _measure_fit_without_marking(rest, marking, station, pitch, policy)
         )
         found.append(MarkingInfluence(marking, whole.jac, jac, largest.get(marking), error))
     return found
 
 
-def _jac_and_distance_without(
+def _measure_fit_without_marking(
     camera: Camera, marking: str, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[tuple[float, ...], float | None]:
     """JaC of the other markings, and the largest distance of this one."""
@@ -396,7 +404,7 @@ def _jac_and_distance_without(
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     judged = project_markings_like_evaluator(camera, pitch, size, lines, measured)
     for short in find_unannotated_not_missing(
-        judged, lines, station.not_visible, shortest_counted_marking_px(policy, size)
+        judged, lines, station.not_visible, min_counted_marking_px(policy, size)
     ):
         del judged[short]
     values = []

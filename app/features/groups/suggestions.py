@@ -20,14 +20,14 @@ from app.features.groups.suggested_edits import (
     rank_of_fix,
 )
 from app.geometry.arrays import FloatArray
-from app.soccer.finding import Fix
+from app.soccer.finding import SuggestedFix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View, make_view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
 from app.solving.resect import REFERENCE_DIAGONAL
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.wording import format_pixels
 
 MOST_TRIALS = 24
@@ -80,7 +80,7 @@ class Suggestion:
     gate: str
     view: str | None
     sentence: str
-    fix: Fix
+    fix: SuggestedFix
     point: ImagePoint | None
     offers: tuple[EditOffer, ...]
     guide: FixGuide | None
@@ -89,11 +89,11 @@ class Suggestion:
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class _SuggestionCandidate:
     """A suggestion before it is tried."""
 
     sentence: str
-    fix: Fix
+    fix: SuggestedFix
     point: ImagePoint | None = None
     trial: Edit | None = None
     """What a person would draw; None: the fix itself is the edit."""
@@ -112,7 +112,7 @@ def find_suggestions(group: Group, policy: Policy, solution: Solution) -> list[S
         return []
     known = {view.calibration_key: view.calibration for view in solution.views}
     found = []
-    for candidate in _distinct_candidates(group, solution, failing)[:MOST_TRIALS]:
+    for candidate in _collect_distinct_candidates(group, solution, failing)[:MOST_TRIALS]:
         suggestion = _try_candidate(group, policy, solution, failing, candidate, known)
         if suggestion is not None:
             found.append((not suggestion.passes, rank_of_fix(candidate.fix), suggestion))
@@ -124,14 +124,14 @@ def _try_candidate(
     policy: Policy,
     solution: Solution,
     failing: Gate,
-    candidate: _Candidate,
+    candidate: _SuggestionCandidate,
     known: dict[str, Calibration],
 ) -> Suggestion | None:
     """The suggestion, or None where the edit changes nothing for the better."""
     edit = candidate.trial or edit_of_fix(group, candidate.fix, candidate.point)
     if edit is None:
         return None
-    then = solve(edit.apply(group), policy, known)
+    then = solve_group(edit.apply(group), policy, known)
     gate = next(gate for gate in then.gates if gate.name == failing.name)
     if not then.passes and not _is_improvement(failing, gate, solution, then, candidate.fix.view):
         return None
@@ -162,44 +162,48 @@ def _is_improvement(
     return new.calibration.jac[0] > old.calibration.jac[0]
 
 
-def _distinct_candidates(group: Group, solution: Solution, failing: Gate) -> list[_Candidate]:
+def _collect_distinct_candidates(
+    group: Group, solution: Solution, failing: Gate
+) -> list[_SuggestionCandidate]:
     """All ideas once, the gentlest first."""
-    ideas: dict[Fix, _Candidate] = {}
+    ideas: dict[SuggestedFix, _SuggestionCandidate] = {}
     for candidate in (
-        *_candidates_of_findings(group, solution),
-        *_candidates_of_gate(group, solution, failing),
+        *_iterate_finding_candidates(group, solution),
+        *_iterate_gate_candidates(group, solution, failing),
     ):
         ideas.setdefault(candidate.fix, candidate)
     return sorted(ideas.values(), key=lambda candidate: rank_of_fix(candidate.fix))
 
 
-def _candidates_of_findings(group: Group, solution: Solution) -> Iterator[_Candidate]:
+def _iterate_finding_candidates(group: Group, solution: Solution) -> Iterator[_SuggestionCandidate]:
     for finding in solution.findings:
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Candidate(describe_condition(group, fix), fix)
+            yield _SuggestionCandidate(describe_condition(group, fix), fix)
 
 
-def _candidates_of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Candidate]:
+def _iterate_gate_candidates(
+    group: Group, solution: Solution, failing: Gate
+) -> Iterator[_SuggestionCandidate]:
     for view in group.views:
         solved = solution.view(view.key)
         if solved is None:
             continue
         if not view.included:
-            fix = Fix("include_view", view.key)
-            yield _Candidate(describe_condition(group, fix), fix)
+            fix = SuggestedFix("include_view", view.key)
+            yield _SuggestionCandidate(describe_condition(group, fix), fix)
         elif solved.failed == "jac":
-            yield from _candidates_of_undrawn_markings(group, view, solved)
-            yield from _candidates_of_lines(group, view, solved)
+            yield from _iterate_undrawn_marking_candidates(group, view, solved)
+            yield from _iterate_line_candidates(group, view, solved)
     explained = any(finding.kind in BETTER_CAUSES for finding in solution.findings)
     if failing.name == "reprojection" and not explained:
-        yield from _candidates_of_balls(group, solution)
+        yield from _iterate_ball_candidates(group, solution)
 
 
-def _candidates_of_undrawn_markings(
+def _iterate_undrawn_marking_candidates(
     group: Group, view: View, solved: ViewSolution
-) -> Iterator[_Candidate]:
+) -> Iterator[_SuggestionCandidate]:
     """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
     nobody can see are said not to be visible, for two clicks anywhere would do as well."""
     # What stands there under a wrong name is relabelled, not drawn again.
@@ -217,8 +221,10 @@ def _candidates_of_undrawn_markings(
     shortest = STUB_PX * view.size.diagonal / REFERENCE_DIAGONAL
     for fit in undrawn:
         if fit.length_px < shortest:
-            hide = Fix("hide_marking", view.key, fit.marking)
-            yield _Candidate(describe_condition(group, hide, max(fit.length_px, 1.0)), hide)
+            hide = SuggestedFix("hide_marking", view.key, fit.marking)
+            yield _SuggestionCandidate(
+                describe_condition(group, hide, max(fit.length_px, 1.0)), hide
+            )
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = make_view_letter(group.views.index(view))
@@ -229,20 +235,22 @@ def _candidates_of_undrawn_markings(
     advice = f"{' and '.join(names)} {verb} drawn in {letter}"
     fitted = group.pitch.with_goal(solved.calibration.goal)
     seen = project_markings(camera, fitted, view.size)
-    drawn = {fit.marking: _clicks_along(seen[fit.marking]) for fit in undrawn}
-    fix = Fix("draw_marking", view.key, undrawn[0].marking)
-    yield _Candidate(advice, fix, trial=SetLines(view.key, drawn))
+    drawn = {fit.marking: _sample_clicks_along_polyline(seen[fit.marking]) for fit in undrawn}
+    fix = SuggestedFix("draw_marking", view.key, undrawn[0].marking)
+    yield _SuggestionCandidate(advice, fix, trial=SetLines(view.key, drawn))
 
 
 def _is_undrawn(fit: MarkingFit) -> bool:
     return fit.outcome == "fp" and not fit.distances_px
 
 
-def _clicks_along(polyline: FloatArray) -> tuple[ImagePoint, ...]:
+def _sample_clicks_along_polyline(polyline: FloatArray) -> tuple[ImagePoint, ...]:
     return tuple(map(ImagePoint._make, polyline[:: len(polyline) // _CLICKS + 1].tolist()))
 
 
-def _candidates_of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
+def _iterate_line_candidates(
+    group: Group, view: View, solved: ViewSolution
+) -> Iterator[_SuggestionCandidate]:
     """Move or drop the worst point, or drop the marking, for each marking that does not count."""
     off = [
         fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest_distance(fit)
@@ -252,17 +260,19 @@ def _candidates_of_lines(group: Group, view: View, solved: ViewSolution) -> Iter
         for action in ("move_point", "drop_point", "drop_marking"):
             if action == "drop_point" and len(fit.distances_px) <= MIN_POINTS_LEFT:
                 continue
-            fix = Fix(
+            fix = SuggestedFix(
                 action, view.key, fit.marking, index=None if action == "drop_marking" else index
             )
             slip = MAX_POINT_SLIP_PERCENT / 100 * view.size.diagonal
             if action == "move_point" and fit.distances_px[index] > slip:
                 continue
             point = fit.nearest[index] if action == "move_point" else None
-            yield _Candidate(describe_condition(group, fix, fit.distances_px[index]), fix, point)
+            yield _SuggestionCandidate(
+                describe_condition(group, fix, fit.distances_px[index]), fix, point
+            )
 
 
-def _candidates_of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
+def _iterate_ball_candidates(group: Group, solution: Solution) -> Iterator[_SuggestionCandidate]:
     """Look for the ball where the other view's ray passes, in either view of a pair.
 
     Nobody moves it there by a key: a ball that is put onto a ray meets it, right or wrong.
@@ -270,18 +280,20 @@ def _candidates_of_balls(group: Group, solution: Solution) -> Iterator[_Candidat
     for pair in solution.pairs:
         for moved, other in ((pair.a, pair.b), (pair.b, pair.a)):
             view = group.view(moved)
-            point = _ball_beside_ray(group, solution, moved, other)
+            point = _find_ball_nearest_to_ray(group, solution, moved, other)
             if view is None or point is None or view.ball is None or view.ball.center is None:
                 continue
             apart = math.dist(point, view.ball.center)
             if apart > MAX_BALL_SLIP_PERCENT / 100 * view.size.diagonal:
                 continue
-            fix = Fix("look_ball", moved, to=other)
+            fix = SuggestedFix("look_ball", moved, to=other)
             trial = move_ball_edit(moved, view.ball, point)
-            yield _Candidate(describe_condition(group, fix, apart), fix, point, trial)
+            yield _SuggestionCandidate(describe_condition(group, fix, apart), fix, point, trial)
 
 
-def _ball_beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
+def _find_ball_nearest_to_ray(
+    group: Group, solution: Solution, moved: str, other: str
+) -> ImagePoint | None:
     """The place nearest to a view's ball where a ball on the other view's ray would be seen."""
     views = [group.view(key) for key in (moved, other)]
     solved = [solution.view(key) for key in (moved, other)]

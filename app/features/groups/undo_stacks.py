@@ -10,8 +10,8 @@ from app.db.json_columns import Json
 from app.db.log import (
     LogEntry,
     filter_groups_with_history,
-    group_entries,
-    group_steps,
+    list_group_entries,
+    list_group_steps,
     list_newest_steps,
     list_station_entries,
     list_station_steps,
@@ -25,8 +25,8 @@ from app.features.groups.state_snapshot_queries import StateSnapshot, StationRec
 from app.features.groups.view_queries import StoredStation
 from app.features.imports.queries import list_shared_stations
 from app.soccer.codec import (
-    camera_of_log_entry,
-    digest,
+    camera_from_log_entry,
+    digest_json,
     group_without_views_to_json,
     station_digest,
     station_from_json,
@@ -71,7 +71,7 @@ class UndoStacks:
         return UndoStacks((*self.done, self.undone[-1]), self.undone[:-1])
 
 
-def undo_entry_body(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:
+def make_undo_entry_body(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:
     """Body of the entry that an undo or a redo writes: the edit that it makes, and back.
 
     Args:
@@ -94,26 +94,28 @@ def undo_entry_body(session: Session, stacks: UndoStacks, kind: str, where: str)
 def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, UndoStacks]:
     """The stacks of each group."""
     if len(group_ids) == 1:
-        return {group_ids[0]: _read_newest(session, group_ids[0])}
+        return {group_ids[0]: _read_stacks_from_newest_steps(session, group_ids[0])}
     steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
-    for row in group_steps(session, group_ids, GROUP_KINDS):
+    for row in list_group_steps(session, group_ids, GROUP_KINDS):
         steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
-    return {number: _stacks_after(taken) for number, taken in steps.items()}
+    return {number: _build_stacks(taken) for number, taken in steps.items()}
 
 
-def _read_newest(session: Session, group_id: int) -> UndoStacks:
+def _read_stacks_from_newest_steps(session: Session, group_id: int) -> UndoStacks:
     """The stacks of one group from as little of its history as tells them."""
     most = _FIRST_LOOK
     while True:
         rows = list_newest_steps(session, group_id, GROUP_KINDS, most)
         steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
-        stacks = _stacks_after(steps) if len(rows) < most else _stacks_of_newest(steps)
+        stacks = (
+            _build_stacks(steps) if len(rows) < most else _build_stacks_from_newest_steps(steps)
+        )
         if stacks is not None:
             return stacks
         most *= _FURTHER
 
 
-def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
+def _build_stacks_from_newest_steps(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
     """The stacks after the newest steps, or None where older ones must be known to tell them.
 
     An edit leaves nothing undone, whatever was before; so all that follows from it is known, as
@@ -121,7 +123,7 @@ def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
     """
     first = next((at for at, (kind, _) in enumerate(steps) if kind == "edit"), len(steps))
     try:
-        stacks = _stacks_after(steps[first:])
+        stacks = _build_stacks(steps[first:])
     except IndexError:
         return None
     return stacks if len(stacks.done) > 1 else None
@@ -130,10 +132,10 @@ def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
 def read_station_stacks(session: Session, station_id: int) -> UndoStacks:
     """The stacks of a shared station."""
     rows = list_station_steps(session, station_id, STATION_KINDS)
-    return _stacks_after((STATION_KINDS[row.kind], row.id) for row in rows)
+    return _build_stacks((STATION_KINDS[row.kind], row.id) for row in rows)
 
 
-def _stacks_after(steps: Iterable[tuple[str, int]]) -> UndoStacks:
+def _build_stacks(steps: Iterable[tuple[str, int]]) -> UndoStacks:
     """The stacks after all steps (kind, id of the entry): ``UndoStacks.then`` of each, in one go."""
     done: list[int] = []
     undone: list[int] = []
@@ -186,7 +188,7 @@ def digest_imported_group(group: Group) -> str:
         ]
         for view in group.views
     ]
-    return digest([group_without_views_to_json(group), views])
+    return digest_json([group_without_views_to_json(group), views])
 
 
 def format_pitch_size(pitch: Pitch) -> str:
@@ -195,7 +197,7 @@ def format_pitch_size(pitch: Pitch) -> str:
 
 
 @dataclass
-class _LogWalk:
+class _GroupLogReplay:
     """One group's log on the way from its first entry to its last."""
 
     snapshot: StateSnapshot
@@ -211,10 +213,10 @@ class _LogWalk:
             self._add_camera(entry)
         apply_entry(self.snapshot, entry)
         if entry.kind == "import":
-            self.base = group_of_log_entry(entry.body["base"] or entry.body["group"], by_key)
+            self.base = parse_logged_group(entry.body["base"] or entry.body["group"], by_key)
         if self.base is not None:
             self.bases[digest_imported_group(self.base)] = None
-        self._note_states(self.snapshot.group(entry.group_id))
+        self._record_states(self.snapshot.group(entry.group_id))
 
     def _add_camera(self, entry: LogEntry) -> None:
         """A camera that came on its own is what the dataset brought, unless lines were edited."""
@@ -226,10 +228,10 @@ class _LogWalk:
         for item in (item for item in items if item.station_id == entry.station_id):
             view = self.base.view(item.view.key)
             if view is not None:
-                station = view.station.with_given_camera(*camera_of_log_entry(entry.body))
+                station = view.station.with_given_camera(*camera_from_log_entry(entry.body))
                 self.base = self.base.with_view(replace(view, station=station))
 
-    def _note_states(self, group: Group) -> None:
+    def _record_states(self, group: Group) -> None:
         _append_if_new(self.pitches, format_pitch_size(group.pitch))
         for view in group.views:
             _append_if_new(self.views.setdefault(view.key, []), view_digest(view))
@@ -254,21 +256,21 @@ class RevisionChains:
         found = list(groups)
         touched = filter_groups_with_history(self._session, [item.id for item in found])
         return {
-            item.id: self._chain_from_log(item)
+            item.id: self._build_chain_from_log(item)
             if item.id in touched
-            else _chain_of_unedited_group(item)
+            else _build_chain_of_unedited_group(item)
             for item in found
         }
 
-    def _chain_from_log(self, stored: StoredGroup) -> RevisionChain:
+    def _build_chain_from_log(self, stored: StoredGroup) -> RevisionChain:
         snapshot = StateSnapshot()
         for number, item in self._shared.items():
             snapshot.stations[number] = StationRecord(
                 self._dataset_id, item.station, item.revision, item.source_digest
             )
         by_key = {item.station.key: item.station for item in self._shared.values()}
-        walk = _LogWalk(snapshot)
-        for entry in group_entries(self._session, stored.id, verdicts=False):
+        walk = _GroupLogReplay(snapshot)
+        for entry in list_group_entries(self._session, stored.id, verdicts=False):
             walk.add_entry(entry, by_key)
         assert walk.base is not None
         return RevisionChain(
@@ -280,7 +282,7 @@ class RevisionChains:
         )
 
 
-def _chain_of_unedited_group(stored: StoredGroup) -> RevisionChain:
+def _build_chain_of_unedited_group(stored: StoredGroup) -> RevisionChain:
     group = stored.group
     return RevisionChain(
         base=group,
@@ -311,11 +313,11 @@ def read_station_revision_chain(session: Session, stored: StoredStation) -> Stat
     return StationRevisionChain(base, tuple(states) or (stored.digest,))
 
 
-def group_of_log_entry(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Group:
+def parse_logged_group(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Group:
     """A group from JSON in which a shared station is its key."""
     return Group(
         key=value["key"],
-        views=tuple(_view_of_log_entry(view, shared) for view in value["views"]),
+        views=tuple(_parse_logged_view(view, shared) for view in value["views"]),
         match=value["match"],
         pitch=Pitch(*value["pitch"]),
         split=value["split"],
@@ -323,6 +325,6 @@ def group_of_log_entry(value: Mapping[str, Any], shared: Mapping[str, Station]) 
     )
 
 
-def _view_of_log_entry(value: Mapping[str, Any], shared: Mapping[str, Station]) -> View:
+def _parse_logged_view(value: Mapping[str, Any], shared: Mapping[str, Station]) -> View:
     station = value["station"]
     return view_from_json(value, shared[station] if isinstance(station, str) else None)

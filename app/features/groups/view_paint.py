@@ -20,7 +20,7 @@ from app.features.pitches.queries import list_groups_of_match
 from app.features.solutions.service import read_known_calibrations
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
-from app.media.frames import Frames
+from app.media.frames import FrameProvider
 from app.paint.view_paint import read_paint
 from app.paint.view_proposal import propose_undrawn_lines
 from app.soccer.annotation import Lines
@@ -64,7 +64,7 @@ class ViewPaintRequest:
     known: tuple[Camera, ...] = ()
     drawn: Lines = field(default_factory=dict)
 
-    def request_paint(self, frames: Frames) -> PoolTask:
+    def request_paint(self, frames: FrameProvider) -> PoolTask:
         """Have the paint read near the camera; the result is a ``ViewPaint``."""
         station = self.view.station
         return frames.request_work_on_frame(
@@ -72,7 +72,7 @@ class ViewPaintRequest:
             station.size, self.start, self.group.pitch, self.policy, self.view.extras.places,
         )  # fmt: skip
 
-    def request_proposal(self, frames: Frames) -> PoolTask:
+    def request_proposal(self, frames: FrameProvider) -> PoolTask:
         """Have lines proposed; the result is a ``ViewProposal``."""
         station = self.view.station
         return frames.request_work_on_frame(
@@ -177,10 +177,10 @@ SECONDS = 5.0
 """Longer nobody waits for a frame; it is then read when paint is read again."""
 
 
-class PaintFollower:
+class PaintUpdater:
     """Reads the paint of an edited group again, in the processes that make pictures."""
 
-    def __init__(self, frames: Frames):
+    def __init__(self, frames: FrameProvider):
         self._frames = frames
 
     def update_paint(
@@ -193,7 +193,7 @@ class PaintFollower:
             policy: Of its dataset, for calibrations.
             known: Calibrations by key.
         """
-        tasks = list(_outdated_tasks(group, policy, known))
+        tasks = list(_iterate_outdated_paint_tasks(group, policy, known))
         if not tasks:
             return group
         read = dict(self._read_pictures(tasks))
@@ -220,7 +220,7 @@ class PaintFollower:
                 yield task.view.key, reading
 
 
-class WithoutPictures(PaintFollower):
+class PaintUpdaterWithoutPictures(PaintUpdater):
     """Where no picture can be read: ``missed`` says that one would have been.
 
     A camera of clicks alone would be another answer than the one that is asked for.
@@ -234,7 +234,7 @@ class WithoutPictures(PaintFollower):
         return iter(())
 
 
-def _outdated_tasks(
+def _iterate_outdated_paint_tasks(
     group: Group, policy: CalibrationPolicy, known: Mapping[str, Calibration]
 ) -> Iterator[PaintTask]:
     """Views whose paint was read for other clicks than they have, or, with that of others, not yet."""

@@ -155,7 +155,7 @@ def find_view(session: Session, view_id: int) -> StoredView | None:
     return next(iter(_read_views(session, ViewModel.id == view_id)), None)
 
 
-def views_of_camera(
+def list_views_of_camera(
     session: Session, dataset_id: int, match: str, station_id: int
 ) -> list[StoredView]:
     """The views of a match that a camera shows, of groups that whoever asks may see."""

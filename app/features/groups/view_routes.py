@@ -20,7 +20,7 @@ from app.features.groups.edit import (
     SetPicture,
     set_ball,
 )
-from app.features.groups.routes import CHANGED, CONFLICTS, load_document_of_view
+from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
 from app.features.groups.schemas import (
     BallEdit,
     GroupDocument,
@@ -28,21 +28,21 @@ from app.features.groups.schemas import (
     NeighbourList,
     ViewEdit,
     describe_frame_offset,
-    group_response,
+    make_group_response,
 )
 from app.features.groups.state import GroupState
 from app.features.groups.submit import FoundView, find_view, submit_view_edit
 from app.features.groups.view_paint import NO_FRAME_HINT
-from app.features.solutions.service import Solve, solve_encoded
+from app.features.solutions.service import Solve, solve_and_encode
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, Services, is_not_modified
 from app.http.documents import respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import TRANSFER, is_large, limit
+from app.http.request_limits import TRANSFER, is_large_request, limit
 from app.http.route import Route
-from app.media.frames import Frames, SentPicture
+from app.media.frames import EncodedPicture, FrameProvider
 from app.soccer.group import FARTHEST, Media
 from app.worker_process import WorkerEnded
 
@@ -75,7 +75,7 @@ FRAME: Responses = {
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def patch_lines(
     view: Id,
     lines: LinesEdit,
@@ -87,12 +87,12 @@ def patch_lines(
     """Draw, move or delete markings; 409 names the station when the camera is static."""
     values = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
 
-    def edit(key: str) -> Edit:
+    def make_edit(key: str) -> Edit:
         return SetLines(key, *values)
 
-    apart = partial(services.large.solve, solve_encoded)
-    solve = apart if is_large(request.scope) else solve_encoded
-    return _submit_view_edit(services, view, edit, if_match, actor, solve)
+    apart = partial(services.large.solve, solve_and_encode)
+    solve = apart if is_large_request(request.scope) else solve_and_encode
+    return _submit_view_edit(services, view, make_edit, if_match, actor, solve)
 
 
 @router.patch(
@@ -102,7 +102,7 @@ def patch_lines(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def patch_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
@@ -122,13 +122,13 @@ def patch_ball(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
     """Leave the view out and say why, take it in again, choose its calibration, say its picture."""
 
-    def edit(key: str) -> Edit:
+    def make_edit(key: str) -> Edit:
         if "calibration" in change.model_fields_set:
             return SetCalibrationSource(key, change.calibration)
         if "picture" in change.model_fields_set:
@@ -136,7 +136,7 @@ def patch_view(
             return SetPicture(key, None if picture is None else picture.picture())
         return IncludeView(key, change.included, change.reason, change.note)
 
-    return _submit_view_edit(services, view, edit, if_match, actor)
+    return _submit_view_edit(services, view, make_edit, if_match, actor)
 
 
 def _submit_view_edit(
@@ -145,10 +145,10 @@ def _submit_view_edit(
     edit_of: Callable[[str], Edit],
     if_match: str,
     actor: str,
-    solve: Solve = solve_encoded,
+    solve: Solve = solve_and_encode,
 ) -> GroupState:
     store, paint = services.store, services.paint
-    with add_current_state_to_conflicts(lambda: load_document_of_view(store, view)):
+    with add_current_state_to_conflicts(lambda: load_group_document_of_view(store, view)):
         return submit_view_edit(
             store, view, edit_of, if_match=if_match, actor=actor, paint=paint, solve=solve
         )
@@ -185,7 +185,7 @@ async def get_image(
         around = await _read_neighbour_frames(request, services.frames, found)
         if around is None:
             return Response(status_code=CLIENT_GONE)
-        found = replace(found, media=_frame_at_offset(found, around, offset))
+        found = replace(found, media=_find_frame_at_offset(found, around, offset))
     picture = await _read_picture(request, services.frames, found, clamp_width(width))
     if picture is None:
         return Response(status_code=CLIENT_GONE)
@@ -221,7 +221,7 @@ async def get_neighbours(
 
 
 async def _read_neighbour_frames(
-    request: Request, frames: Frames, view: FoundView
+    request: Request, frames: FrameProvider, view: FoundView
 ) -> dict[int, Media] | None:
     """Where the frames before and after a view's lie, by how many frames later.
 
@@ -245,7 +245,7 @@ async def _read_neighbour_frames(
     return found
 
 
-def _frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> Media:
+def _find_frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> Media:
     """The frame so many frames later."""
     if not around:
         raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
@@ -255,15 +255,15 @@ def _frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> 
 
 
 async def _read_picture(
-    request: Request, frames: Frames, view: FoundView, width: int | None
-) -> SentPicture | None:
+    request: Request, frames: FrameProvider, view: FoundView, width: int | None
+) -> EncodedPicture | None:
     """The frame, or None where nobody waits for it any more.
 
     What is wrong with it is said with the view that it belongs to.
     """
     if view.media is None:
         raise NotFoundError("this view has no readable frame", hint=NO_FRAME_HINT)
-    with with_view_in_error(view.key):
+    with add_view_to_errors(view.key):
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
@@ -273,12 +273,12 @@ async def _read_picture(
         ):
             return None
         task = frames.ask(view.media, width, view.flipped)
-        made: SentPicture | None = await task.result_unless_client_gone(request.is_disconnected)
+        made: EncodedPicture | None = await task.result_unless_client_gone(request.is_disconnected)
         return made
 
 
 @contextmanager
-def with_view_in_error(key: str) -> Iterator[None]:
+def add_view_to_errors(key: str) -> Iterator[None]:
     """Say what is wrong with a frame with the view that it belongs to."""
     try:
         yield

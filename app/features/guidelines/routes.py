@@ -14,7 +14,7 @@ from app.features.independent_annotations.routes import (
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, is_not_modified
-from app.http.documents import document, respond_with, respond_with_document
+from app.http.documents import make_document_responder, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -51,7 +51,7 @@ def get_guidelines(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(document)
+@respond_with(make_document_response)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
 ) -> guidelines.Guidelines:
@@ -69,7 +69,7 @@ def write_guidelines(
     responses=responses(404, 409, 413, 415, 503),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
-@respond_with(respond_with_document(GuidelinePictureDocument.model_validate, 201))
+@respond_with(make_document_responder(GuidelinePictureDocument.model_validate, 201))
 def add_picture(
     dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
 ) -> guidelines.GuidelinePicture:

@@ -9,7 +9,7 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
-from app.features.datasets.service import need_dataset
+from app.features.datasets.service import require_dataset_id
 from app.features.guidelines.queries import (
     GUIDELINE,
     count_pictures,
@@ -22,7 +22,7 @@ from app.features.guidelines.queries import (
 )
 from app.features.imports.upload_queries import upload_path
 from app.json_text import Moment
-from app.media.frames import Frames
+from app.media.frames import FrameProvider
 from app.soccer.group import Media
 
 MAX_LETTERS = 100_000
@@ -80,7 +80,7 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
     """
     with store.read() as session:
         return _read_version(
-            session, find_guidelines_dataset(session, need_dataset(session, dataset)), number
+            session, find_guidelines_dataset(session, require_dataset_id(session, dataset)), number
         )
 
 
@@ -104,7 +104,7 @@ def write_guidelines(
     if len(text) > MAX_LETTERS:
         raise InputError(f"guidelines have at most {MAX_LETTERS:,} characters", pointer="/text")
     with store.write() as session:
-        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
+        dataset_id = find_guidelines_dataset(session, require_dataset_id(session, dataset))
         heads = list_guideline_heads(session, dataset_id)
         newest = heads[0].number if heads else 0
         if newest != based_on:
@@ -126,7 +126,9 @@ def write_guidelines(
         return written
 
 
-def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -> GuidelinePicture:
+def add_picture(
+    store: Store, dataset: str | int, upload: str, frames: FrameProvider
+) -> GuidelinePicture:
     """Keep an uploaded picture for a dataset's guidelines, under the digest of its bytes.
 
     ``frames`` decodes it where it can take nobody down.
@@ -144,7 +146,7 @@ def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -
     found = frames.ask(Media(str(path)), None, False).future.result()
     picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
     with store.write() as session:
-        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
+        dataset_id = find_guidelines_dataset(session, require_dataset_id(session, dataset))
         if count_pictures(session, dataset_id) >= MAX_PICTURES:
             raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
         insert_picture(session, dataset_id, picture.digest, picture.type, picture.body)
@@ -159,7 +161,7 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
         NotFoundError: There is no such dataset or picture.
     """
     with store.read() as session:
-        dataset_id = find_guidelines_dataset(session, need_dataset(session, dataset))
+        dataset_id = find_guidelines_dataset(session, require_dataset_id(session, dataset))
         row = find_picture(session, dataset_id, digest)
     if row is None:
         raise NotFoundError("these guidelines have no such picture")

@@ -33,7 +33,7 @@ def collect_view_and_station_ids(stored: StoredGroup) -> dict[str, tuple[int, in
     return {key: (stored.view_ids[key], stored.stations[key].id) for key in stored.view_ids}
 
 
-def import_body(
+def make_import_entry_body(
     group: Group,
     base: Group | None,
     source: str,
@@ -47,13 +47,13 @@ def import_body(
     return {
         "source": source,
         "source_hash": digest,
-        "group": _group_to_log(group),
-        "base": None if base is None or base == group else _group_to_log(base),
+        "group": _group_to_log_json(group),
+        "base": None if base is None or base == group else _group_to_log_json(base),
         "ids": {key: list(pair) for key, pair in places.items()},
     }
 
 
-def _group_to_log(group: Group) -> Json:
+def _group_to_log_json(group: Group) -> Json:
     """A group in which a shared station is its key: the log has it in an entry of its own."""
     views = [
         view_to_json(view, view.station.key if view.station.shared else None)
@@ -65,7 +65,7 @@ def _group_to_log(group: Group) -> Json:
 GONE = "this group is no longer in the imported files; it is kept until a person rejects it"
 
 
-def filter_missing_of_read_matches(
+def filter_missing_groups_of_read_matches(
     session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
 ) -> list[int]:
     """Those of the missing groups whose match came all the same: they are truly gone.
@@ -85,7 +85,7 @@ def filter_missing_of_read_matches(
     return [group.id for group in groups if group.id in missing and group.match in matches]
 
 
-def save_gone_findings(
+def save_missing_group_findings(
     session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
@@ -96,7 +96,9 @@ def save_gone_findings(
     for number, item in stored.items():
         base = chains[number].base
         save_group(session, item, item.group, at=at, source=base)
-        body = _gone_entry_body(item, base, source, list_group_findings(session, number))
+        body = _make_missing_group_entry_body(
+            item, base, source, list_group_findings(session, number)
+        )
         entries.append(NewLogEntry("import", actor, at, body, dataset_id, number))
     if entries:
         append_entries(session, entries)
@@ -105,13 +107,13 @@ def save_gone_findings(
     return len(entries)
 
 
-def _gone_entry_body(
+def _make_missing_group_entry_body(
     stored: StoredGroup,
     base: Group,
     source: str,
     noticed: Iterable[tuple[str | None, str]],
 ) -> dict[str, Json]:
-    body = import_body(
+    body = make_import_entry_body(
         stored.group, base, source, stored.source_hash, collect_view_and_station_ids(stored)
     )
     body["kept"] = [[view, sentence] for view, sentence in [*noticed, (None, GONE)]]
@@ -145,11 +147,13 @@ class GroupLimits:
             problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
             self._report.note(self._source, group.key, None, problem)
             return None
-        return replace(group, views=tuple(self._thin_view(group, view) for view in group.views))
+        return replace(
+            group, views=tuple(self._drop_densest_markings(group, view) for view in group.views)
+        )
 
-    def _thin_view(self, group: Group, view: View) -> View:
+    def _drop_densest_markings(self, group: Group, view: View) -> View:
         station = view.station
-        dense = list(_densest_markings(station.lines))
+        dense = list(_iterate_densest_markings(station.lines))
         if not dense:
             return view
         if station.key not in self._told:
@@ -177,7 +181,7 @@ def count_points(lines: Lines) -> int:
     return sum(map(len, lines.values()))
 
 
-def _densest_markings(lines: Lines) -> Iterator[str]:
+def _iterate_densest_markings(lines: Lines) -> Iterator[str]:
     """The densest markings, as many as have to go until the others may stay."""
     total = count_points(lines)
     for marking in sorted(lines, key=lambda name: len(lines[name]), reverse=True):

@@ -79,7 +79,7 @@ def import_given_cameras(
         dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
-        ``changed`` and ``unchanged`` count views and static cameras that a camera was attached to;
+        ``apply_picture_change`` and ``unchanged`` count views and static cameras that a camera was attached to;
         ``problems`` name cameras that fit nothing, several views, or pictures of another size.
 
     Raises:
@@ -87,14 +87,14 @@ def import_given_cameras(
     """
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
-        places = _stations_by_name(session, found.id)
+        places = _read_stations_by_name(session, found.id)
     known: list[tuple[NamedStation, GivenCamera]] = []
     for name in sorted(cameras):
-        fitting = _stations_of_name(places, name)
+        fitting = _find_stations_of_name(places, name)
         matches = {place.match for place in fitting}
         if not fitting:
             report.problems.append(
-                f'camera "{name}": no view has this name{_example_names(places)}'
+                f'camera "{name}": no view has this name{_format_example_names(places)}'
             )
             continue
         if len(matches) > 1:
@@ -112,11 +112,11 @@ def import_given_cameras(
                 f"{size.width}x{size.height}; that of the file counts"
             )
         made_for = stated or size
-        report.problems.extend(_size_warnings(name, cameras[name], fitting, made_for))
+        report.problems.extend(_iterate_size_warnings(name, cameras[name], fitting, made_for))
         record = {COVARIANCE: (covariances or {}).get(name)}
         for place in fitting:
             covariance = covariance_from_json(record, cameras[name], made_for or place.size)
-            camera = _scaled_camera(cameras[name], made_for, place.size)
+            camera = _scale_camera(cameras[name], made_for, place.size)
             known.append((place, GivenCamera(camera, covariance)))
     for start in range(0, len(known), BATCH):
         with open_import_session(store, keep=not dry_run) as session:
@@ -125,7 +125,7 @@ def import_given_cameras(
     return report
 
 
-def _stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
+def _read_stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
     places: dict[str, list[NamedStation]] = {}
     for row in list_dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
@@ -145,7 +145,9 @@ def _stations_by_name(session: Session, dataset_id: int) -> dict[str, list[Named
     return places
 
 
-def _stations_of_name(places: Mapping[str, list[NamedStation]], name: str) -> list[NamedStation]:
+def _find_stations_of_name(
+    places: Mapping[str, list[NamedStation]], name: str
+) -> list[NamedStation]:
     """What a name means; folders before it do not matter where no match could be one of them."""
     parts = name.split("/")
     for start in range(len(parts)):
@@ -155,19 +157,19 @@ def _stations_of_name(places: Mapping[str, list[NamedStation]], name: str) -> li
     return []
 
 
-def _example_names(places: Mapping[str, list[NamedStation]]) -> str:
+def _format_example_names(places: Mapping[str, list[NamedStation]]) -> str:
     names = [f'"{name}"' for name in sorted(places) if "/" not in name]
     more = " and more" if len(names) > EXAMPLES else ""
     return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
 
 
-def _scaled_camera(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
+def _scale_camera(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
     if made_for is None or made_for == size:
         return camera
     return camera.scaled(size.width / made_for.width, size.height / made_for.height)
 
 
-def _size_warnings(
+def _iterate_size_warnings(
     name: str, camera: Camera, fitting: Sequence[NamedStation], made_for: ImageSize | None
 ) -> Iterator[str]:
     """What to say of a camera whose principal point is the middle of another size than was said."""
@@ -194,7 +196,7 @@ def attach_cameras(
 
     Args:
         source: Where they come from, for the log.
-        report: Counts ``changed`` and ``unchanged``.
+        report: Counts ``apply_picture_change`` and ``unchanged``.
     """
     stations = read_stations(session, [place.station for place, _ in batch])
     touched: set[int] = set()

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.db.json_columns import Json, decompress_json
-from app.db.log import LogEntry, group_entries, list_station_entries
+from app.db.log import LogEntry, list_group_entries, list_station_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead, join_licences, read_dataset_head
@@ -73,9 +73,13 @@ def export_edits(
     with store.read() as session, output as root:
         found = read_dataset_head(session, dataset)
         counts = {
-            "stations": _write_lines(root / STATIONS, _exported_stations(session, found.id)),
-            "groups": _write_lines(root / GROUPS, _exported_groups(session, found, progress)),
-            "spare": _write_lines(root / SPARE, _unassigned_values(session, found.id)),
+            "stations": _write_lines(
+                root / STATIONS, _iterate_exported_stations(session, found.id)
+            ),
+            "groups": _write_lines(
+                root / GROUPS, _iterate_exported_groups(session, found, progress)
+            ),
+            "spare": _write_lines(root / SPARE, _iterate_unassigned_frames(session, found.id)),
         }
         head = {
             "format": FORMAT,
@@ -88,7 +92,7 @@ def export_edits(
     return counts
 
 
-def group_to_merge(group: Group) -> dict[str, Json]:
+def group_to_export_json(group: Group) -> dict[str, Json]:
     """A group without media; a shared station is its key."""
     views = []
     for view in group.views:
@@ -110,7 +114,7 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
     return count
 
 
-def _exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
+def _iterate_exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
     for stored in list_shared_stations(session, dataset_id):
         chain = read_station_revision_chain(session, stored)
         station, base = station_to_json(stored.station), station_to_json(chain.base)
@@ -123,7 +127,7 @@ def _exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
         }
 
 
-def _exported_groups(
+def _iterate_exported_groups(
     session: Session, dataset: DatasetHead, progress: ReportProgress | None
 ) -> Iterator[Json]:
     chains = RevisionChains(session, dataset.id)
@@ -133,17 +137,17 @@ def _exported_groups(
         known, verdicts = chains.of(stored.values()), list_verdicts_of_groups(session, stored)
         checked = read_dismissals_to_export(session, stored)
         for item in stored.values():
-            exported = _exported_group(session, item, known[item.id], verdicts.get(item.id, []))
+            exported = _export_group(session, item, known[item.id], verdicts.get(item.id, []))
             # Earlier releases know no such key: it is there where it says something.
             yield exported | ({"dismissals": checked[item.id]} if item.id in checked else {})
         if progress is not None:
             progress(start + len(stored), len(ids))
 
 
-def _exported_group(
+def _export_group(
     session: Session, stored: StoredGroup, chain: RevisionChain, verdicts: Json
 ) -> Json:
-    group, base = group_to_merge(stored.group), group_to_merge(chain.base)
+    group, base = group_to_export_json(stored.group), group_to_export_json(chain.base)
     walked = len(chain.bases) > 1 or base != group or _has_several_states(chain)
     return {
         "group": group,
@@ -152,7 +156,7 @@ def _exported_group(
         "views": {key: list(states) for key, states in chain.views.items()},
         "stations": {key: list(states) for key, states in chain.stations.items()},
         "pitches": list(chain.pitches),
-        "log": _edit_entries_to_json(group_entries(session, stored.id)) if walked else [],
+        "log": _edit_entries_to_json(list_group_entries(session, stored.id)) if walked else [],
         "verdicts": verdicts,
     }
 
@@ -174,7 +178,7 @@ def _edit_entries_to_json(logged: Iterable[LogEntry]) -> list[Json]:
     return entries
 
 
-def _unassigned_values(session: Session, dataset_id: int) -> Iterator[Json]:
+def _iterate_unassigned_frames(session: Session, dataset_id: int) -> Iterator[Json]:
     for row in iterate_sorted_unassigned_frames(session, dataset_id):
         yield {"camera": row.camera, "frame": row.frame, "extras": decompress_json(row.extras)}
 

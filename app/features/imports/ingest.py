@@ -23,7 +23,7 @@ from app.features.findings.queries import (
 )
 from app.features.groups.edit import SetPaint, SetPositions
 from app.features.groups.insert_queries import NewRows
-from app.features.groups.pictures import mark_outdated_where_people_moved
+from app.features.groups.pictures import mark_paint_outdated_where_people_moved
 from app.features.groups.queries import (
     StoredGroup,
     iterate_unassigned_frames,
@@ -38,13 +38,13 @@ from app.features.imports.body import (
     MAX_VIEWS,
     GroupLimits,
     collect_view_and_station_ids,
-    filter_missing_of_read_matches,
-    import_body,
-    save_gone_findings,
+    filter_missing_groups_of_read_matches,
+    make_import_entry_body,
+    save_missing_group_findings,
 )
 from app.features.imports.queries import find_newest_imports, list_known_groups
 from app.features.independent_annotations.queries import is_copy_dataset
-from app.features.paint.queries import insert_readings
+from app.features.paint.queries import insert_paint_readings
 from app.features.pitches.queries import is_pitch_edited, read_edited_pitches
 from app.features.pitches.service import set_pitch_of_groups
 from app.features.policies.service import choose_first_policy
@@ -128,7 +128,7 @@ def import_groups(
     """
     report, seen, done = IngestReport(), set[str](), 0
     limits = GroupLimits(source, ReaderReport() if limit_report is None else limit_report)
-    sound, stations = _storable_groups(groups, seen, report, limits), set[str]()
+    sound, stations = _filter_storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(
@@ -142,11 +142,11 @@ def import_groups(
     if done:
         with store.read() as session:
             missing = _find_missing_groups(session, origin, seen, report)
-            gone = filter_missing_of_read_matches(session, origin.dataset_id, seen, missing)
+            gone = filter_missing_groups_of_read_matches(session, origin.dataset_id, seen, missing)
         for start in range(0, 0 if dry_run else len(gone), BATCH):
             with store.write() as session:
                 ids = gone[start : start + BATCH]
-                report.findings += save_gone_findings(
+                report.findings += save_missing_group_findings(
                     session, origin.dataset_id, ids, source=origin.source, actor=actor
                 )
     return report
@@ -200,7 +200,7 @@ def _find_missing_groups(
     return missing
 
 
-def _storable_groups(
+def _filter_storable_groups(
     groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
 ) -> Iterator[Group]:
     """Groups that can be stored, their media by absolute path."""
@@ -216,10 +216,10 @@ def _storable_groups(
             held = limits.limit_group(group)
             if held is not None:
                 report.without_picture += all(view.media is None for view in held.views)
-                yield replace(held, views=tuple(map(_with_absolute_media_path, held.views)))
+                yield replace(held, views=tuple(map(_make_media_path_absolute, held.views)))
 
 
-def _with_absolute_media_path(view: View) -> View:
+def _make_media_path_absolute(view: View) -> View:
     if view.media is None or is_address(view.media.path):
         return view
     path = Path(view.media.path).absolute()
@@ -290,7 +290,7 @@ def insert_new_groups(
         first = len(rows.views)
         identity = rows.add_group(group, digest, at, shared)
         places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
-        body = import_body(group, None, origin.source, digest, places)
+        body = make_import_entry_body(group, None, origin.source, digest, places)
         entries.append(NewLogEntry("import", origin.actor, at, body, origin.dataset_id, identity))
         ids.append(identity)
     rows.insert()
@@ -320,22 +320,22 @@ def _update_group(
             f"may have {MAX_VIEWS}; it stays as it is"
         )
         return
-    if (pitch := _edited_pitch(session, stored, incoming)) is not None:
+    if (pitch := _find_edited_pitch(session, stored, incoming)) is not None:
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
     if incoming.match == stored.group.match:
         # What the match shares comes from its other pictures.
         shared_here = SetPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
     # What was read of a picture says of which, and is read again where that is another.
-    paint = mark_outdated_where_people_moved(stored.group, followed.group)
+    paint = mark_paint_outdated_where_people_moved(stored.group, followed.group)
     followed = replace(followed, group=SetPaint(paint).apply(followed.group))
-    insert_readings(session, origin.dataset_id, followed.group.paint.values())
+    insert_paint_readings(session, origin.dataset_id, followed.group.paint.values())
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )
     after = read_groups(session, [group_id])[group_id]
     kept = save_findings(session, after, followed.kept)
-    body = import_body(
+    body = make_import_entry_body(
         followed.group, followed.base, origin.source, digest, collect_view_and_station_ids(after)
     )
     body["kept"] = [[item.view, item.sentence] for item in kept]
@@ -347,7 +347,7 @@ def _update_group(
     report.findings += len(followed.kept)
 
 
-def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:
+def _find_edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:
     """The size that a person gave to a group's match, or to the group itself that has none."""
     if incoming.match:
         pitches = read_edited_pitches(session, stored.dataset_id, {incoming.match})

@@ -13,9 +13,9 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import ConflictError, InputError, TooLargeError
 from app.features.datasets.queries import find_dataset, has_more_groups
-from app.features.datasets.service import get_dataset_head, require_name
+from app.features.datasets.service import get_dataset_head, require_valid_name
 from app.features.imports.sources import FORMATS, ImportSource, import_source
-from app.features.imports.upload_queries import get_upload, save_upload, upload_path
+from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import FailedWithReportError, JobProgress, leave_work_to_next_server
@@ -23,7 +23,7 @@ from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.paint.service import has_pictures
-from app.features.solve.jobs import request_solve
+from app.features.solve.jobs import request_solve_job
 from app.formats.file_tree import Root
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
@@ -113,12 +113,12 @@ def request_import(
     with store.read() as session:
         row = find_dataset(session, request.dataset)
     if row is None:
-        require_name(request.dataset, "a dataset", pointer="/dataset")
+        require_valid_name(request.dataset, "a dataset", pointer="/dataset")
     would = "Dry run of" if request.dry_run else "Import"
     return jobs.submit(
         KIND,
         f"{would} {source.name} ({request.format}) for {request.dataset}",
-        partial(import_work, jobs, store, settings),
+        partial(run_import_job, jobs, store, settings),
         dataset_id=None if row is None else int(row.id),
         actor=actor,
         request=request.values(),
@@ -128,10 +128,10 @@ def request_import(
 def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
     """Let imports that an earlier server was at go on; what is there already stays as it is."""
 
-    jobs.register_resume(KIND, partial(import_work, jobs, store, settings))
+    jobs.register_resume(KIND, partial(run_import_job, jobs, store, settings))
 
 
-def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgress) -> Json:
+def run_import_job(jobs: Jobs, store: Store, settings: Settings, progress: JobProgress) -> Json:
     """The work itself; its result is the report, also where it fails because it read nothing."""
     request, actor = ImportRequest(**progress.job.request), progress.job.actor
     source = resolve_source(settings, request)
@@ -139,7 +139,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
     progress(0, None, sentence)
     if not request.dry_run and "upload" in request.source:
         # Frames are read where they are, so the file must stay from the first group on.
-        save_upload(settings, request.source["upload"])
+        mark_upload_permanent(settings, request.source["upload"])
     with leave_work_to_next_server(progress):
         outcome = import_in_worker(
             store,
@@ -147,7 +147,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
             source,
             actor=actor,
             dry_run=request.dry_run,
-            progress=_group_progress(progress, sentence),
+            progress=_make_group_progress(progress, sentence),
             stop=progress.check,
             policy=None if request.policy is None else POLICIES[request.policy],
         )
@@ -156,10 +156,12 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
     if found is not None:
         jobs.set_dataset(progress.job_id, int(found.id))
     if outcome.nothing is not None:
-        raise FailedWithReportError(*outcome.nothing, _import_result(outcome, request))
+        raise FailedWithReportError(*outcome.nothing, _make_import_result(outcome, request))
     if request.dry_run or not outcome.fresh:
-        return _import_result(outcome, request)
-    return _import_result(outcome, request, **_request_following_jobs(jobs, store, request, actor))
+        return _make_import_result(outcome, request)
+    return _make_import_result(
+        outcome, request, **_request_following_jobs(jobs, store, request, actor)
+    )
 
 
 def import_in_worker(
@@ -220,7 +222,7 @@ def _request_following_jobs(
     solves once more what it changes. For frames that nobody has annotated cameras are sought last.
     """
     found = get_dataset_head(store, request.dataset)
-    solve, paint = request_solve(jobs, store, found.id, actor=actor), None
+    solve, paint = request_solve_job(jobs, store, found.id, actor=actor), None
     if request.format == "frames":
         if not request.options.get("propose", True):
             return {"solve_job": solve.id}
@@ -247,15 +249,15 @@ def _request_rig_adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: st
         return None
 
 
-def _group_progress(progress: JobProgress, sentence: str) -> ReportProgress:
-    def step(done: int, _total: int | None = None, phase: str = "") -> None:
+def _make_group_progress(progress: JobProgress, sentence: str) -> ReportProgress:
+    def report_step(done: int, _total: int | None = None, phase: str = "") -> None:
         more = f" {phase}" if phase else ""
         progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
 
-    return step
+    return report_step
 
 
-def _import_result(
+def _make_import_result(
     outcome: ImportOutcome,
     request: ImportRequest,
     *,
@@ -292,7 +294,7 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
         raise InputError(
             f'"{request.format}" cannot be imported; {", ".join(FORMATS)} can', pointer="/format"
         )
-    path, name = _place_of_source(settings, request.source)
+    path, name = _resolve_source_path(settings, request.source)
     options = dict(request.options)
     size = options.pop("size", None)
     offset = options.pop("frame_offset", 8)
@@ -302,8 +304,10 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
         request.format,
         path,
         size=None if size is None else ImageSize(*size),
-        lines=None if request.lines is None else _place_of_source(settings, request.lines)[0],
-        frames=None if request.frames is None else _place_of_source(settings, request.frames)[0],
+        lines=None if request.lines is None else _resolve_source_path(settings, request.lines)[0],
+        frames=None
+        if request.frames is None
+        else _resolve_source_path(settings, request.frames)[0],
         calibration=options.get("calibration"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
@@ -316,7 +320,7 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
     return source
 
 
-def _place_of_source(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
+def _resolve_source_path(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
         return upload_path(settings, upload.id), upload.name

@@ -56,9 +56,9 @@ from app.features.imports.merge_parse import (
 )
 from app.features.imports.queries import list_known_groups, list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
-from app.formats.file_tree import FileTree, Limits, Root
+from app.formats.file_tree import FileTree, ImportLimits, Root
 from app.formats.report import ReaderReport
-from app.formats.trees import open_tree_while_read
+from app.formats.trees import open_tree_context
 from app.progress import ReportProgress
 from app.soccer.codec import station_digest, station_to_json
 from app.soccer.group import Group, Station
@@ -70,7 +70,7 @@ def merge_stations(
     """Bring static cameras up to what another installation made of them."""
     for item in exported:
         stored = _find_stored_station(session, origin.dataset_id, item.station.key)
-        if stored is None or _is_only_in_other(session, stored, item):
+        if stored is None or _is_station_only_in_other(session, stored, item):
             shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
             shared.insert_or_update([item.base])
             report.changed += len(shared.changed)
@@ -80,7 +80,7 @@ def merge_stations(
         report.changed += _merge_station(session, origin, stored, item, report)
 
 
-def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStation) -> bool:
+def _is_station_only_in_other(session: Session, stored: StoredStation, item: MergeStation) -> bool:
     """Whether the other's dataset brought what this one's never did."""
     base = station_digest(item.base)
     if base == stored.source_digest:
@@ -100,17 +100,17 @@ def _merge_station(
     there = UnitHistory(station_digest(item.station), station_digest(item.base), item.states)
     decision = choose_merge_action(here, there)
     if decision in (FOLLOW, UPSTREAM):
-        _take_other_station(
-            session, origin, stored, item, chain, _finding_sentence(decision, stored)
+        _adopt_other_station(
+            session, origin, stored, item, chain, _format_finding_sentence(decision, stored)
         )
     elif decision == CONFLICT:
         return _save_conflict(
-            session, origin, stored, chain, _finding_sentence(decision, stored), report
+            session, origin, stored, chain, _format_finding_sentence(decision, stored), report
         )
     return decision in (FOLLOW, UPSTREAM)
 
 
-def _finding_sentence(decision: str, stored: StoredStation) -> str | None:
+def _format_finding_sentence(decision: str, stored: StoredStation) -> str | None:
     key = stored.station.key
     if decision == CONFLICT:
         return (
@@ -125,7 +125,7 @@ def _finding_sentence(decision: str, stored: StoredStation) -> str | None:
     return None
 
 
-def _take_other_station(
+def _adopt_other_station(
     session: Session,
     origin: ImportOrigin,
     stored: StoredStation,
@@ -222,7 +222,7 @@ def merge_edits(
     dataset: str,
     path: Root,
     report: ReaderReport,
-    limits: Limits,
+    limits: ImportLimits,
     *,
     source: str,
     actor: str,
@@ -245,7 +245,7 @@ def merge_edits(
         dry_run: Dry run: report what would happen, change nothing.
     """
     result = IngestReport()
-    with open_tree_while_read(path, report, limits) as tree:
+    with open_tree_context(path, report, limits) as tree:
         if tree is None:
             return result
         try:
@@ -265,7 +265,7 @@ def _merge_tree(
     }
     with open_import_session(run.store, keep=run.keep) as session:
         origin = run.origin(session)
-        _note_policy(session, run)
+        _report_policy_difference(session, run)
         merge_stations(session, origin, stations.values(), run.report)
     known = {key: item.station for key, item in stations.items()}
     groups = _parse_records(tree, GROUPS, report, lambda value: parse_group(value, known))
@@ -296,7 +296,7 @@ def _parse_records(
         yield item
 
 
-def _note_policy(session: Session, run: _MergeRun) -> None:
+def _report_policy_difference(session: Session, run: _MergeRun) -> None:
     row = find_dataset(session, run.dataset)
     if row is not None and row.policy_hash != run.head.policy.hash:
         run.report.problems.append(
@@ -316,7 +316,7 @@ def _merge_batch(
         merge_stations(session, origin, stations.values(), IngestReport())
     items = {item.group.key: item for item in batch}
     known = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
-    upstream = _groups_only_in_other(session, origin, items, known)
+    upstream = _list_groups_only_in_other(session, origin, items, known)
     import_group_batch(session, origin, upstream, run.report, run.counted)
     counted = {group.key for group in upstream}
     ids = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
@@ -336,7 +336,7 @@ def _merge_batch(
     refresh_queue(session, touched)
 
 
-def _groups_only_in_other(
+def _list_groups_only_in_other(
     session: Session,
     origin: ImportOrigin,
     items: Mapping[str, MergeGroup],
@@ -348,15 +348,15 @@ def _groups_only_in_other(
     shared = _read_static_cameras(session, origin.dataset_id)
     upstream = []
     for key, item in items.items():
-        base = _with_own_stations(item.base, shared)
+        base = _replace_with_own_stations(item.base, shared)
         if key not in known:
             upstream.append(base)
         elif digest_imported_group(base) not in chains[known[key]].bases:
-            upstream.append(_with_media(base, stored[known[key]].group))
+            upstream.append(_copy_known_media(base, stored[known[key]].group))
     return upstream
 
 
-def _with_own_stations(group: Group, shared: Mapping[str, Station]) -> Group:
+def _replace_with_own_stations(group: Group, shared: Mapping[str, Station]) -> Group:
     """The group with its static cameras as the dataset brought them here.
 
     They are merged on their own; in an import of groups they must look untouched.
@@ -368,7 +368,7 @@ def _with_own_stations(group: Group, shared: Mapping[str, Station]) -> Group:
     return replace(group, views=tuple(views))
 
 
-def _with_media(group: Group, stored: Group) -> Group:
+def _copy_known_media(group: Group, stored: Group) -> Group:
     """The group with the frames that are known here; whether they are mirrored, too."""
     views = []
     for view in group.views:

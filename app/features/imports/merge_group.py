@@ -17,7 +17,7 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChain, format_pitch_size
-from app.features.imports.body import collect_view_and_station_ids, import_body
+from app.features.imports.body import collect_view_and_station_ids, make_import_entry_body
 from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, list_verdicts_of_groups
@@ -83,9 +83,9 @@ def merge_group(
 ) -> bool:
     """Bring a group up to what another installation made of it; whether anything changed."""
     merged, kept = _merge_views(stored, chain, exported)
-    pitch = choose_merge_action(*_pitch_histories(stored, chain, exported))
-    kept += _kept_edits(None, pitch, f"pitch of {merged.key}")
-    fresh = _new_findings(session, stored.id, kept)
+    pitch = choose_merge_action(*_make_pitch_histories(stored, chain, exported))
+    kept += _make_kept_edits(None, pitch, f"pitch of {merged.key}")
+    fresh = _filter_new_findings(session, stored.id, kept)
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
     at = now()
@@ -93,7 +93,7 @@ def merge_group(
     after = read_groups(session, [stored.id])[stored.id]
     noticed = save_findings(session, after, kept)
     base = chain.base
-    body = import_body(
+    body = make_import_entry_body(
         merged, base, origin.source, stored.source_hash, collect_view_and_station_ids(after)
     )
     body["kept"] = [[item.view, item.sentence] for item in noticed]
@@ -119,27 +119,28 @@ def _merge_views(
         if other is None or base is None or other.station.shared != view.station.shared:
             continue
         ball = choose_merge_action(
-            _view_history_here(stored, chain, view), _view_history_there(exported, other, base)
+            _make_local_view_history(stored, chain, view),
+            _make_exported_view_history(exported, other, base),
         )
         if ball in (FOLLOW, UPSTREAM):
             view = replace(
                 view, balls=other.balls, included=other.included, left_out=other.left_out
             )
-        kept += _kept_edits(view.key, ball, f"ball of {view.key}")
+        kept += _make_kept_edits(view.key, ball, f"ball of {view.key}")
         if not view.station.shared:
             here, there = (
-                _station_history_here(stored, chain, view),
-                _station_history_there(exported, other, base),
+                _make_local_station_history(stored, chain, view),
+                _make_exported_station_history(exported, other, base),
             )
             lines = choose_merge_action(here, there)
             if lines in (FOLLOW, UPSTREAM):
                 view = replace(view, station=view.station.with_annotations_of(other.station))
-            kept += _kept_edits(view.key, lines, f"lines or the camera of {view.key}")
+            kept += _make_kept_edits(view.key, lines, f"lines or the camera of {view.key}")
         group = group.with_view(view)
     return group, kept
 
 
-def _kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
+def _make_kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     if decision == CONFLICT:
         sentence = (
             f"another installation edited the {what} too; the edit of this installation is kept"
@@ -154,7 +155,7 @@ def _kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     return [KeptEdit(view, sentence)]
 
 
-def _pitch_histories(
+def _make_pitch_histories(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
 ) -> tuple[UnitHistory, UnitHistory]:
     here = UnitHistory(
@@ -164,27 +165,29 @@ def _pitch_histories(
     return here, UnitHistory(size, base, exported.pitches)
 
 
-def _view_history_here(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
+def _make_local_view_history(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
     present, base = stored.view_digests[view.key]
     return UnitHistory(present, base, chain.views.get(view.key, (present,)))
 
 
-def _view_history_there(exported: MergeGroup, view: View, base: View) -> UnitHistory:
+def _make_exported_view_history(exported: MergeGroup, view: View, base: View) -> UnitHistory:
     past = exported.views.get(view.key, ())
     return UnitHistory(view_digest(view), view_digest(base), past)
 
 
-def _station_history_here(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
+def _make_local_station_history(
+    stored: StoredGroup, chain: RevisionChain, view: View
+) -> UnitHistory:
     own = stored.stations[view.key]
     return UnitHistory(own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,)))
 
 
-def _station_history_there(exported: MergeGroup, view: View, base: View) -> UnitHistory:
+def _make_exported_station_history(exported: MergeGroup, view: View, base: View) -> UnitHistory:
     past = exported.stations.get(view.key, ())
     return UnitHistory(station_digest(view.station), station_digest(base.station), past)
 
 
-def _new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
+def _filter_new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
     """Those of the findings that are not there already."""
     if not kept:
         return []

@@ -10,11 +10,11 @@ from typing import IO, Any
 from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.features.findings.queries import MERGED_COLUMNS
-from app.features.groups.undo_stacks import format_pitch_size, group_of_log_entry
+from app.features.groups.undo_stacks import format_pitch_size, parse_logged_group
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT
-from app.features.policies.service import CUSTOM, policy_to_values, policy_with
+from app.features.policies.service import CUSTOM, policy_to_values, replace_thresholds
 from app.features.verdicts.service import STATES
 from app.formats.file_tree import BROKEN, FileTree
 from app.formats.json_reader import read_json
@@ -24,7 +24,15 @@ from app.soccer.annotation import Extras
 from app.soccer.codec import extras_from_json, policy_from_json, station_from_json
 from app.soccer.finding import FINDING_KINDS
 from app.soccer.frames import MAX_SIDE
-from app.soccer.group import CALIBRATIONS, MAX_NOTE, REASONS, Group, Station, View, make_left_out
+from app.soccer.group import (
+    CALIBRATIONS,
+    MAX_NOTE,
+    REASONS,
+    Group,
+    Station,
+    View,
+    make_view_exclusion,
+)
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
 
@@ -87,7 +95,7 @@ def read_merge_header(tree: FileTree) -> MergeHeader:
     try:
         policy = policy_from_json(_require_object(value["policy"]))
         # Its values reach the solver: a text in place of a number would break there.
-        policy_with(PAPER, policy_to_values(policy), name=CUSTOM)
+        replace_thresholds(PAPER, policy_to_values(policy), name=CUSTOM)
         _require_text(policy.name)
         return MergeHeader(_require_text(value["dataset"]), policy)
     except InputError as error:
@@ -131,15 +139,15 @@ def parse_station(value: Json) -> MergeStation:
         InputError: It is not what Touchline writes.
     """
     try:
-        station = _station_of_record(_require_object(value)["station"])
-        base = station if value["base"] is None else _station_of_record(value["base"])
+        station = _parse_station_record(_require_object(value)["station"])
+        base = station if value["base"] is None else _parse_station_record(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
             raise InputError("has a `base` that is not the same static camera as its `station`")
         return MergeStation(
-            station, base, _require_digests(value["states"]), _log_of_record(value["log"])
+            station, base, _require_digests(value["states"]), _parse_log_record(value["log"])
         )
     except _MISSHAPEN as error:
-        raise _record_error(error) from error
+        raise _make_record_error(error) from error
 
 
 def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
@@ -149,8 +157,8 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
         InputError: It is not what Touchline writes.
     """
     try:
-        group = _group_of_record(_require_object(value)["group"], shared)
-        base = group if value["base"] is None else _group_of_record(value["base"], shared)
+        group = _parse_group_record(_require_object(value)["group"], shared)
+        base = group if value["base"] is None else _parse_group_record(value["base"], shared)
         if group.key != base.key:
             raise InputError(
                 "has a `base` ({base.key}) that is not the same group as its `group` ({group.key})"
@@ -165,15 +173,17 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
                 key: _require_digests(item)
                 for key, item in _require_object(value["stations"]).items()
             },
-            pitches=_pitch_sizes_of_record(value, group, base),
-            log=_log_of_record(value["log"]),
-            verdicts=tuple(map(_verdict_of_record, _require_list(value["verdicts"], MAX_STATES))),
+            pitches=_parse_pitch_sizes(value, group, base),
+            log=_parse_log_record(value["log"]),
+            verdicts=tuple(
+                map(_parse_verdict_record, _require_list(value["verdicts"], MAX_STATES))
+            ),
             dismissals=tuple(
-                map(_dismissal_of_record, _require_list(value.get("dismissals", []), MAX_STATES))
+                map(_parse_dismissal_record, _require_list(value.get("dismissals", []), MAX_STATES))
             ),
         )
     except _MISSHAPEN as error:
-        raise _record_error(error) from error
+        raise _make_record_error(error) from error
 
 
 def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
@@ -187,27 +197,27 @@ def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
         return (
             _require_text(value["camera"]),
             _require_text(value["frame"]),
-            _extras_of_record(extras),
+            _parse_extras_record(extras),
         )
     except _MISSHAPEN as error:
-        raise _record_error(error) from error
+        raise _make_record_error(error) from error
 
 
-def _record_error(error: Exception) -> InputError:
+def _make_record_error(error: Exception) -> InputError:
     if isinstance(error, ReviewError):
         return InputError(error.message)
     what = f"lacks {error}" if isinstance(error, KeyError) else "is not what Touchline writes"
     return InputError(what)
 
 
-def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
+def _parse_group_record(value: Json, shared: Mapping[str, Station]) -> Group:
     views = _require_list(_require_object(value)["views"], MAX_VIEWS)
     names = {view["station"] for view in views if isinstance(view["station"], str)}
     if names - shared.keys():
         raise InputError(
             f'uses the static camera "{min(names - shared.keys())}", which the file does not have'
         )
-    group = group_of_log_entry(
+    group = parse_logged_group(
         {**value, "views": [{**view, "media": None} for view in views]}, shared
     )
     keys = [_require_text(view.key) for view in group.views]
@@ -219,12 +229,12 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
         raise InputError("has a pitch of an impossible size")
     for view, fields in zip(group.views, views, strict=True):
         _require_list(fields["balls"], MAX_BALLS)
-        _extras_of_record(fields["extras"])
+        _parse_extras_record(fields["extras"])
         if view.included not in (True, False):
             raise InputError("has a view whose `included` is neither true nor false")
         if view.left_out is not None:
-            _check_left_out(view)
-        if not isinstance(fields["station"], str) and _checked_station(view.station).shared:
+            _require_known_exclusion_reason(view)
+        if not isinstance(fields["station"], str) and _validate_station(view.station).shared:
             raise InputError(
                 f"contains the whole static camera {view.station.key} inside a view, which must"
                 " contain only its key"
@@ -232,17 +242,21 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
     return group
 
 
-def _check_left_out(view: View) -> None:
+def _require_known_exclusion_reason(view: View) -> None:
     why = view.left_out
-    if view.included or why is None or make_left_out(_require_text(why.reason), why.note) != why:
+    if (
+        view.included
+        or why is None
+        or make_view_exclusion(_require_text(why.reason), why.note) != why
+    ):
         raise InputError("has a view that was left out for a reason that Touchline does not know")
 
 
-def _station_of_record(value: Json) -> Station:
-    return _checked_station(station_from_json(_require_object(value)))
+def _parse_station_record(value: Json) -> Station:
+    return _validate_station(station_from_json(_require_object(value)))
 
 
-def _checked_station(station: Station) -> Station:
+def _validate_station(station: Station) -> Station:
     _require_text(station.key)
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
@@ -272,7 +286,7 @@ def _require_truth_values(what: str, *values: object) -> None:
         raise InputError(f"has {what} is neither true nor false")
 
 
-def _verdict_of_record(value: Json) -> Mapping[str, Any]:
+def _parse_verdict_record(value: Json) -> Mapping[str, Any]:
     values = {name: _require_object(value)[name] for name in VERDICT}
     for name in ("actor", "at", "inputs_hash", "policy_hash"):
         _require_text(values[name])
@@ -286,7 +300,7 @@ def _verdict_of_record(value: Json) -> Mapping[str, Any]:
     return values
 
 
-def _dismissal_of_record(value: Json) -> Mapping[str, Any]:
+def _parse_dismissal_record(value: Json) -> Mapping[str, Any]:
     values = {name: _require_object(value)[name] for name in MERGED_COLUMNS}
     for name in ("actor", "at", "sentence"):
         _require_text(values[name], most=MAX_NOTE)
@@ -301,7 +315,7 @@ def _dismissal_of_record(value: Json) -> Mapping[str, Any]:
     return values
 
 
-def _log_of_record(value: Json) -> tuple[Json, ...]:
+def _parse_log_record(value: Json) -> tuple[Json, ...]:
     for entry in _require_list(value, MAX_STATES):
         if entry["kind"] not in EDIT_KINDS:
             raise InputError("has a log entry of an unknown kind")
@@ -311,7 +325,7 @@ def _log_of_record(value: Json) -> tuple[Json, ...]:
     return tuple(value)
 
 
-def _extras_of_record(value: Json) -> Extras:
+def _parse_extras_record(value: Json) -> Extras:
     if value is None:
         return Extras()
     for name in ("boxes", "lines"):
@@ -321,7 +335,7 @@ def _extras_of_record(value: Json) -> Extras:
     return extras_from_json(value)
 
 
-def _pitch_sizes_of_record(value: Json, group: Group, base: Group) -> tuple[str, ...]:
+def _parse_pitch_sizes(value: Json, group: Group, base: Group) -> tuple[str, ...]:
     """The sizes that a group's pitch had; exports of before do not say more than two of them."""
     if "pitches" in value:
         return _require_digests(value["pitches"])

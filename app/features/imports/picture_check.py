@@ -122,11 +122,11 @@ class PictureCheck:
         if header is not None:
             if header.orientation != 1:
                 self.report.counts["pictures turned by EXIF"] += 1
-            difference = _shape_difference(view.size, header)
+            difference = _describe_shape_difference(view.size, header)
             if difference:
                 self.shapes.append(f"{place}{_file_name(view.media)}: {difference}")
                 self.found.append((group.key, view.key, f"{_SHAPE} ({difference}). {_ADVICE}"))
-        if places := list(self._annotations_outside(view)):
+        if places := list(self._iterate_annotations_outside(view)):
             more = f" and {len(places) - 1} more" if len(places) > 1 else ""
             self.outside.append(
                 f"{place}: {places[0]}{more}, of {view.size.width} x {view.size.height}"
@@ -159,11 +159,11 @@ class PictureCheck:
         """How many frames a video has; said while they are counted, which may take minutes."""
         name = PurePosixPath(media.path).name
 
-        def tell(frames: int) -> None:
+        def report_counted_frames(frames: int) -> None:
             self._report_progress(f"Counting the frames of {name}: {frames:,} so far.")
 
-        tell(0)
-        count = len(read_video_times(media, self.settings, tell))
+        report_counted_frames(0)
+        count = len(read_video_times(media, self.settings, report_counted_frames))
         self._report_progress("Reading the groups.")
         return count
 
@@ -171,7 +171,7 @@ class PictureCheck:
         if self.progress is not None:
             self.progress(self._passed, None, sentence)
 
-    def _annotations_outside(self, view: View) -> Iterator[str]:
+    def _iterate_annotations_outside(self, view: View) -> Iterator[str]:
         """Annotations of a view that are outside its picture."""
         size = view.size
         for ball in view.balls:
@@ -196,7 +196,7 @@ def _is_outside(x: float, y: float, size: ImageSize) -> bool:
     return not (-across <= x <= size.width + across and -down <= y <= size.height + down)
 
 
-def _shape_difference(size: ImageSize, header: ImageHeader) -> str:
+def _describe_shape_difference(size: ImageSize, header: ImageHeader) -> str:
     """How the shape of a picture differs from what is declared; empty where it does not."""
     width, height = header.width, header.height
     if abs(width / height / (size.width / size.height) - 1) <= SHAPES_APART:

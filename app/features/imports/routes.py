@@ -30,11 +30,11 @@ from app.features.imports.uploads import (
     list_own_uploads,
 )
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees, Services
 from app.http.documents import make_empty_response, respond_with
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
@@ -53,7 +53,7 @@ FolderPath = Annotated[
     response_model=FolderDocument,
     responses=responses(404),
 )
-@may(Action.LEAD, where=Where.EVERYWHERE)
+@may(Action.LEAD, where=RoleScope.EVERYWHERE)
 @paged()
 def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
@@ -63,7 +63,7 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
 @imports_router.post(
     "",
     operation_id="startImport",
-    **openapi_of_job_response(404, 413, 415, 503),
+    **describe_job_response_for_openapi(404, 413, 415, 503),
 )
 @may(
     Action.LEAD,
@@ -153,7 +153,7 @@ BODY: dict[str, Any] = {
         },
     },
 )
-@may(Action.LEAD, where=Where.SOMEWHERE)
+@may(Action.LEAD, where=RoleScope.SOMEWHERE)
 @limit(TRANSFER)
 async def upload_file(
     request: Request,
@@ -287,7 +287,7 @@ async def _run_in_disk_thread(work: Callable[..., T], *arguments: Any) -> T:
 
 
 @uploads_router.get("", operation_id="listUploads", responses=responses())
-@may(Action.LEAD, where=Where.SOMEWHERE)
+@may(Action.LEAD, where=RoleScope.SOMEWHERE)
 @paged()
 def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's.

@@ -21,8 +21,8 @@ from app.features.imports.ingest import (
 from app.features.imports.picture_check import PictureCheck
 from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
-from app.formats.file_tree import Limits, Root
-from app.formats.frames_reader import check_grouping, read_frame_list, read_frames
+from app.formats.file_tree import ImportLimits, Root
+from app.formats.frames_reader import parse_grouping_pattern, read_frame_list, read_frames
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.guess_format import guess_format, guess_from_content, holds_only_videos
 from app.formats.issia_3d import open_issia_3d
@@ -90,7 +90,7 @@ class BallCounter:
                 self.classes.update(str(box.get("class")) for box in view.extras.boxes)
             yield group
 
-    def without_ball(self) -> str | None:
+    def describe_missing_ball(self) -> str | None:
         """That the files bring no ball, with the classes that they have; None where they bring one."""
         if self.balls or not self.groups:
             return None
@@ -155,7 +155,7 @@ class ImportSource:
         Raises:
             InputError: Naming the option, and the formats that use it; or the grouping is none.
         """
-        check_grouping(self.grouping)
+        parse_grouping_pattern(self.grouping)
         usual = ImportSource(self.format, self.path)
         given = {
             name
@@ -210,7 +210,7 @@ class ImportResult:
         source = self.source
         problems = [problem.message for problem in self.report.problems] + self.result.problems
         name = source.shown(str(source.path))
-        if (unannotated := self._unannotated_problem()) is not None:
+        if (unannotated := self._describe_unannotated_source()) is not None:
             problem, hint = unannotated
             return f"nothing could be imported: {name} {problem}", hint
         sentence = f"nothing could be imported from {name} as {source.format}"
@@ -228,7 +228,7 @@ class ImportResult:
             "asks for (docs/formats.md)."
         )
 
-    def _unannotated_problem(self) -> tuple[str, str] | None:
+    def _describe_unannotated_source(self) -> tuple[str, str] | None:
         """What a source is that nothing was read of, where it has no annotations; what to do."""
         if self.imported_anything:
             return None
@@ -238,9 +238,9 @@ class ImportResult:
             return "holds pictures and no annotations", FRAMES_HINT
         return None
 
-    def _skipped_problems(self) -> list[DatasetFormatError]:
+    def _list_skipped_problems(self) -> list[DatasetFormatError]:
         """What was left out, and why: of what has no annotations that alone."""
-        unannotated = self._unannotated_problem()
+        unannotated = self._describe_unannotated_source()
         if unannotated is None:
             return self.report.problems
         return [DatasetFormatError(str(self.source.path), None, None, unannotated[0])]
@@ -270,7 +270,7 @@ class ImportResult:
                     "field": problem.field,
                     "problem": shown(problem.problem),
                 }
-                for problem in self._skipped_problems()
+                for problem in self._list_skipped_problems()
             ],
             "more_skipped": self.report.dropped,
             "remarks": [*map(shown, self.report.remarks), *self.result.problems],
@@ -307,7 +307,7 @@ def import_source(
         InputError: The format does not use one of the options.
     """
     source.check()
-    report, limits = ReaderReport(), Limits.of(settings)
+    report, limits = ReaderReport(), ImportLimits.of(settings)
     if source.format == "cameras":
         sizes: dict[str, ImageSize] = {}
         covariances: dict[str, Any] = {}
@@ -343,7 +343,7 @@ def import_source(
     folder = _open_static_folder(source, report, limits) if source.format in STATIC else None
     groups = _read_groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
-        groups = read_frame_list(source.frames, settings, report, limits).with_listed_frames(
+        groups = read_frame_list(source.frames, settings, report, limits).replace_listed_frames(
             iter(groups)
         )
     counts, check = BallCounter(), PictureCheck(report, settings, progress)
@@ -365,24 +365,24 @@ def import_source(
     else:
         result.findings += check.note(store, dataset)
     if folder is not None and source.calibration is None:
-        _report_contradicted(folder, dataset, source, report)
+        _report_contradicted_cameras(folder, dataset, source, report)
     if folder is not None and not dry_run:
         import_unassigned_frames(
-            store, dataset, _read_unassigned(folder), source=source.label, actor=actor
+            store, dataset, _iterate_unassigned_frames(folder), source=source.label, actor=actor
         )
-    if source.format not in BALLS_ELSEWHERE and (sentence := counts.without_ball()):
-        report.remark(sentence)
+    if source.format not in BALLS_ELSEWHERE and (sentence := counts.describe_missing_ball()):
+        report.add_remark(sentence)
     return ImportResult(source, report, result)
 
 
-def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
+def _read_picture_size(settings: Settings, data: bytes, name: str) -> ImageSize:
     header = read_header(data, name)
     check_size(header, settings, name)
     return ImageSize(header.width, header.height)
 
 
 def _read_groups(
-    source: ImportSource, settings: Settings, report: ReaderReport, limits: Limits
+    source: ImportSource, settings: Settings, report: ReaderReport, limits: ImportLimits
 ) -> Iterator[Group]:
     path, calibration = source.path, source.calibration or "given"
     match source.format:
@@ -403,14 +403,16 @@ def _read_groups(
         case "parquet":
             return read_parquet(path, report, limits=limits)
         case "frames":
-            size_of = partial(_size_of_picture, settings)
+            size_of = partial(_read_picture_size, settings)
             return read_frames(path, size_of, report, limits, source.grouping)
         case _:
             size = source.size or DEFAULT_SIZE
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
 
 
-def _open_static_folder(source: ImportSource, report: ReaderReport, limits: Limits) -> IssiaFolder:
+def _open_static_folder(
+    source: ImportSource, report: ReaderReport, limits: ImportLimits
+) -> IssiaFolder:
     options = IssiaOptions(
         frame_offset=source.frame_offset,
         flipped=source.flipped,
@@ -422,7 +424,7 @@ def _open_static_folder(source: ImportSource, report: ReaderReport, limits: Limi
     return read(source.path, options, report, limits)
 
 
-def _report_contradicted(
+def _report_contradicted_cameras(
     folder: IssiaFolder, dataset: str, source: ImportSource, report: ReaderReport
 ) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
@@ -441,9 +443,9 @@ def _report_contradicted(
     )
     shown = len(set[int]().union(*showing))
     where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'} and fail at the gate jac"
-    report.remark(describe_contradiction(off, where, f"`{command}`"))
+    report.add_remark(describe_contradiction(off, where, f"`{command}`"))
 
 
-def _read_unassigned(folder: IssiaFolder) -> Iterator[UnassignedFrame]:
+def _iterate_unassigned_frames(folder: IssiaFolder) -> Iterator[UnassignedFrame]:
     for item in folder.persons():
         yield UnassignedFrame(item.camera, str(item.frame), Extras(boxes=item.boxes))

@@ -84,7 +84,7 @@ def lock_upload_records(settings: Settings) -> Iterator[None]:
         BusyError: Another process writes for too long.
     """
     with _WRITING:
-        with _storage_errors():
+        with _convert_storage_errors():
             make_upload_folder(settings.uploads)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
@@ -140,15 +140,17 @@ def get_upload(settings: Settings, upload_id: str) -> Upload:
 
 def list_uploads(settings: Settings) -> list[Upload]:
     """All uploads, the newest first."""
-    return sorted(_all_uploads(settings), key=lambda item: (item.created, item.id), reverse=True)
+    return sorted(
+        _iterate_uploads(settings), key=lambda item: (item.created, item.id), reverse=True
+    )
 
 
-def save_upload(settings: Settings, upload_id: str) -> None:
+def mark_upload_permanent(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
     with lock_upload_records(settings):
         upload = get_upload(settings, upload_id)
         if not upload.kept:
-            with _storage_errors():
+            with _convert_storage_errors():
                 write_upload_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
@@ -172,10 +174,10 @@ def delete_upload(
         others = tuple(actor for actor in upload.by if not mine(actor))
         if not others:
             _remove_folder(settings.uploads / upload_id)
-            with _storage_errors():
+            with _convert_storage_errors():
                 sync_to_disk(settings.uploads)
             return
-        with _storage_errors():
+        with _convert_storage_errors():
             write_upload_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
@@ -207,13 +209,13 @@ def _is_expired(folder: Path, limit: datetime) -> bool:
     except FileNotFoundError:
         return False
     if upload is None:
-        return since < limit and not _may_be_kept(folder)
+        return since < limit and not _may_hold_dataset_frames(folder)
     if upload.size is None:
         since = datetime.fromisoformat(upload.created)
     return not upload.kept and since < limit
 
 
-def _may_be_kept(folder: Path) -> bool:
+def _may_hold_dataset_frames(folder: Path) -> bool:
     """Whether a record that is none of ours keeps frames of a dataset: it says so, or cannot say no."""
     try:
         values = json.loads((folder / _RECORD).read_bytes())
@@ -224,7 +226,7 @@ def _may_be_kept(folder: Path) -> bool:
     return not isinstance(values, dict) or values.get("kept") is not False
 
 
-def _all_uploads(settings: Settings) -> Iterator[Upload]:
+def _iterate_uploads(settings: Settings) -> Iterator[Upload]:
     for record in settings.uploads.glob(f"*/{_RECORD}"):
         upload = read_upload(record.parent)
         if upload is not None:
@@ -314,9 +316,9 @@ class UploadWriter:
         if self._quota is None:
             self._open_content()
         else:
-            self._reserve(declared, self._quota)
+            self._reserve_quota(declared, self._quota)
 
-    def _reserve(self, size: int, quota: int) -> None:
+    def _reserve_quota(self, size: int, quota: int) -> None:
         """Reserve so many bytes of the sender's quota, or some more where nobody says how many come."""
         by = self._by or ""
         with lock_upload_records(self._settings):
@@ -328,11 +330,11 @@ class UploadWriter:
                 self._open_content()
             # Without an id it is none that is listed; ``finish`` writes the one that counts.
             draft = Upload("", self._name, self._reserved, now(), by=(by,))
-            with _storage_errors():
+            with _convert_storage_errors():
                 write_upload_record(self._folder, draft)
 
     def _open_content(self) -> None:
-        with _storage_errors():
+        with _convert_storage_errors():
             settings = self._settings
             make_upload_folder(settings.uploads)
             content = self._folder / CONTENT
@@ -349,9 +351,9 @@ class UploadWriter:
         self.bytes += len(chunk)
         require_upload_size(self._settings, self.bytes)
         if self._quota is not None and self.bytes > self._reserved:
-            self._reserve(self.bytes, self._quota)
+            self._reserve_quota(self.bytes, self._quota)
         self._digest.update(chunk)
-        with _storage_errors():
+        with _convert_storage_errors():
             self._file.write(chunk)
 
     def finish(self, guess: Callable[[Path], str | None] = lambda path: None) -> Upload:
@@ -366,7 +368,7 @@ class UploadWriter:
         if not self.bytes:
             self.abort()
             raise InputError("the upload is empty", hint="Send the file as the request's body.")
-        with _storage_errors():
+        with _convert_storage_errors():
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
@@ -377,7 +379,7 @@ class UploadWriter:
             self.abort()
             return shared
         upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
-        with _storage_errors():
+        with _convert_storage_errors():
             sync_to_disk(self._folder / CONTENT)
             write_upload_record(self._folder, upload)
             return self._publish(upload)
@@ -428,7 +430,7 @@ def _add_sender(settings: Settings, upload_id: str, by: str | None = None) -> Up
         if upload is None or by is None or by in upload.by:
             return upload
         shared = replace(upload, by=(*upload.by, by))
-        with _storage_errors():
+        with _convert_storage_errors():
             write_upload_record(settings.uploads / upload_id, shared)
         return shared
 
@@ -452,7 +454,7 @@ def is_full_disk(error: OSError) -> bool:
 
 
 @contextmanager
-def _storage_errors() -> Iterator[None]:
+def _convert_storage_errors() -> Iterator[None]:
     try:
         yield
     except OSError as error:

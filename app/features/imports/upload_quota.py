@@ -12,7 +12,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.errors import TooLargeError
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 IDLE_SECONDS = 600.0
 """A half-sent upload in which nothing was written for so long has lost its sender."""
@@ -32,7 +32,7 @@ def count_used_bytes(settings: Settings, actor: str, but: Path | None = None) ->
         but: A folder that does not count.
     """
     return sum(
-        _count_bytes(record, person_of(actor))
+        _count_bytes(record, person_of_actor(actor))
         for record in settings.uploads.glob("*/upload.json")
         if record.parent != but
     )
@@ -55,7 +55,7 @@ def _count_bytes(record: Path, person: str) -> int:
     """How many bytes an upload counts for a person; 0: it is not theirs."""
     try:
         values = json.loads(record.read_bytes())
-        theirs = any(person_of(actor) == person for actor in values["by"])
+        theirs = any(person_of_actor(actor) == person for actor in values["by"])
         size = int(values.get("size") or values["bytes"])
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return 0

@@ -17,7 +17,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.config import Settings
-from app.db.idempotency import has_key, read_progress, save_progress
+from app.db.idempotency import has_idempotency_key, read_progress, save_progress
 from app.db.json_columns import Json
 from app.db.session import now
 from app.db.store import Store
@@ -44,7 +44,7 @@ from app.features.imports.upload_quota import count_used_bytes as used_bytes
 from app.features.imports.upload_quota import find_person_quota, require_within_quota
 from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
-from app.formats.guess_format import guess_format, guess_format_of_names
+from app.formats.guess_format import guess_format, guess_format_from_names
 from app.formats.safe_path import MAX_PART, require_safe_path, resolve_inside
 from app.json_text import canonical_json_text
 from app.object_store.path import StoredPath, find_path, is_address
@@ -79,7 +79,7 @@ class FolderListing:
     more: bool
 
 
-def name_import_folders(settings: Settings) -> dict[str, Path]:
+def map_import_folders_by_name(settings: Settings) -> dict[str, Path]:
     """The operator's folders by the names that requests use for them."""
     found: dict[str, Path] = {}
     for folder in settings.import_folders:
@@ -101,7 +101,7 @@ def resolve_folder(settings: Settings, path: str) -> Root:
     """
     if is_address(path):
         return _resolve_address(settings, path)
-    folders = name_import_folders(settings)
+    folders = map_import_folders_by_name(settings)
     if not folders:
         raise InputError(
             "the operator has allowed no folder for imports",
@@ -129,7 +129,9 @@ def _resolve_address(settings: Settings, address: str) -> StoredPath:
 def list_folder(settings: Settings, path: str = "") -> FolderListing:
     """The allowed folders and stores, or what is in one of them."""
     if not path:
-        roots = [FolderItem(name, name, True) for name in sorted(name_import_folders(settings))]
+        roots = [
+            FolderItem(name, name, True) for name in sorted(map_import_folders_by_name(settings))
+        ]
         stores = (f"{SCHEME}{name}" for name in sorted(settings.stores))
         roots += [FolderItem(address, address, True) for address in stores]
         return FolderListing("", None, tuple(roots), False)
@@ -138,7 +140,7 @@ def list_folder(settings: Settings, path: str = "") -> FolderListing:
         return _list_store_folder(found)
     if not found.is_dir():
         return FolderListing(path, guess_format(found), (), False)
-    items = list(islice(_folder_items(found, path.rstrip("/")), MAX_ITEMS + 1))
+    items = list(islice(_iterate_folder_items(found, path.rstrip("/")), MAX_ITEMS + 1))
     items.sort(key=lambda item: (not item.folder, item.name))
     more = len(items) > MAX_ITEMS
     return FolderListing(path, guess_format(found), tuple(items[:MAX_ITEMS]), more)
@@ -147,7 +149,7 @@ def list_folder(settings: Settings, path: str = "") -> FolderListing:
 def _list_store_folder(found: StoredPath) -> FolderListing:
     """What is in a folder of a store; one request, so that the format is guessed of this level."""
     if not found.is_dir():
-        return FolderListing(str(found), guess_format_of_names([found.name]), (), False)
+        return FolderListing(str(found), guess_format_from_names([found.name]), (), False)
     folders, objects = found.store.folder(found.key)
     at = str(found).rstrip("/")
     items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
@@ -156,10 +158,10 @@ def _list_store_folder(found: StoredPath) -> FolderListing:
     items = [item for item in items if not item.name.startswith(".") and _is_valid_name(item.name)]
     items.sort(key=lambda item: (not item.folder, item.name))
     shown, more = tuple(items[:MAX_ITEMS]), len(items) > MAX_ITEMS
-    return FolderListing(at, guess_format_of_names(names), shown, more)
+    return FolderListing(at, guess_format_from_names(names), shown, more)
 
 
-def _folder_items(folder: Path, path: str) -> Iterator[FolderItem]:
+def _iterate_folder_items(folder: Path, path: str) -> Iterator[FolderItem]:
     with os.scandir(folder) as entries:
         for entry in entries:
             hidden = entry.name.startswith(".")
@@ -236,10 +238,10 @@ def delete_own_upload(store: Store, upload_id: str, mine: Callable[[str], bool])
     before, and the response stored afterwards: sent again, a request that was stopped in between
     does the rest.
     """
-    if not has_key():
+    if not has_idempotency_key():
         delete_upload(store.settings, upload_id, mine)
         return
-    begun = _interrupted_deletion(store) or _begin_deletion(store, upload_id)
+    begun = _read_interrupted_deletion(store) or _begin_deletion(store, upload_id)
     with suppress(NotFoundError):
         # One that was sent once more meanwhile is another.
         if get_upload(store.settings, begun["upload"]).created == begun["created"]:
@@ -248,7 +250,7 @@ def delete_own_upload(store: Store, upload_id: str, mine: Callable[[str], bool])
         session.respond(None)
 
 
-def _interrupted_deletion(store: Store) -> Json | None:
+def _read_interrupted_deletion(store: Store) -> Json | None:
     """Which upload the same request was deleting when it was stopped; None: it was not."""
     with store.read() as session:
         return read_progress(session)
@@ -294,9 +296,9 @@ def begin_upload_in_parts(
         begun = Upload(folder.name, name, 0, now(), by=(by,), size=size)
         if upload is None and (quota := find_person_quota(settings)) is not None:
             require_within_quota(settings, size, quota, used_bytes(settings, by, but=folder))
-        with _storage_errors(upload or begun):
+        with _convert_storage_errors(upload or begun):
             if upload is None or upload.bytes < size:
-                _require_disk(settings, upload or begun)
+                _require_disk_space(settings, upload or begun)
             if upload is None:
                 _make_upload_folder(folder, begun)
     return upload or begun
@@ -312,7 +314,7 @@ def _make_upload_folder(folder: Path, upload: Upload) -> None:
     sync_to_disk(folder.parent)
 
 
-def _require_disk(settings: Settings, upload: Upload) -> None:
+def _require_disk_space(settings: Settings, upload: Upload) -> None:
     make_upload_folder(settings.uploads)
     missing, free = upload.whole_size - upload.bytes, shutil.disk_usage(settings.uploads).free
     if missing > free:
@@ -341,7 +343,7 @@ class PartWriter:
         self, settings: Settings, upload_id: str, offset: int, guess: Guess = lambda path: None
     ):
         self._settings, self._id, self._next, self._guess = settings, upload_id, offset, guess
-        self._require_next_byte(get_upload(settings, upload_id))
+        self._require_matching_offset(get_upload(settings, upload_id))
 
     def write(self, chunk: bytes) -> None:
         """Put some bytes on the disk.
@@ -353,7 +355,7 @@ class PartWriter:
         """
         with lock_upload_records(self._settings):
             upload = get_upload(self._settings, self._id)
-            self._require_next_byte(upload)
+            self._require_matching_offset(upload)
             fresh = chunk[upload.bytes - self._next :]
             grown = replace(upload, bytes=upload.bytes + len(fresh))
             if grown.bytes > upload.whole_size:
@@ -364,7 +366,7 @@ class PartWriter:
                 )
             if fresh:
                 path = content_path(self._settings, upload)
-                with _storage_errors(upload):
+                with _convert_storage_errors(upload):
                     _append_chunk(path, upload.bytes, fresh)
                     if grown.bytes == upload.whole_size:
                         grown = replace(grown, format=self._guess(path))
@@ -378,7 +380,7 @@ class PartWriter:
     def abort(self) -> None:
         """What was written stays."""
 
-    def _require_next_byte(self, upload: Upload) -> None:
+    def _require_matching_offset(self, upload: Upload) -> None:
         if self._next > upload.bytes:
             raise ConflictError(
                 f"this part of {upload.name} begins at byte {self._next:,}, and only {upload.bytes:,} bytes were received before it",
@@ -402,7 +404,7 @@ def _append_chunk(path: Path, offset: int, chunk: bytes) -> None:
 
 
 @contextmanager
-def _storage_errors(upload: Upload) -> Iterator[None]:
+def _convert_storage_errors(upload: Upload) -> Iterator[None]:
     try:
         yield
     except OSError as error:

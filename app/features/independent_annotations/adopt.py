@@ -24,15 +24,15 @@ from app.features.groups.edit import (
 from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
-from app.features.groups.state import GroupState, need_group
-from app.features.groups.submit import read_group_etag, solve_for_state, submit
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.state import GroupState, require_group
+from app.features.groups.submit import read_and_solve_group, read_group_etag, submit_edit
+from app.features.groups.view_paint import PaintUpdater
 from app.features.groups.view_queries import list_groups_of_station, save_station
 from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
     GOLD,
     IndependentAnnotation,
-    find_independent_annotation_row,
+    find_annotation_of_copy,
     update_annotation,
 )
 from app.features.independent_annotations.service import (
@@ -52,7 +52,7 @@ from app.features.verdicts.queries import (
     read_last_verdicts,
 )
 from app.features.webhooks.queries import HANDED_BACK, make_time_suffix, queue_webhook_messages
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 from app.soccer.group import Group, Station
 
 MAX_REASON = 500
@@ -64,7 +64,7 @@ def adopt_annotation(
     annotation_id: int,
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     also: Callable[[Session], None] | None = None,
 ) -> GroupState:
     """Take a person's annotation and verdict over into the original, in one transaction.
@@ -79,18 +79,18 @@ def adopt_annotation(
         StaleRevisionError: Somebody changed the original at the same moment.
     """
     annotation = get_annotation(store, annotation_id)
-    _require_ready(annotation)
+    _require_adoptable(annotation)
     # First: what changes the original from here on is seen by the edit that builds on it.
     etag = read_group_etag(store, annotation.group_id)
     with store.read() as session:
-        copy = need_group(session, annotation.copy_id)
-        original = need_group(session, annotation.group_id)
+        copy = require_group(session, annotation.copy_id)
+        original = require_group(session, annotation.group_id)
     copy = replace(copy, group=rename_views_as_original(original.group, copy.group))
     edit = CompositeEdit(tuple(make_edits_between(original.group, copy.group)))
     after: list[GroupState] = []
 
-    def settle(session: Session) -> None:
-        _require_ready(read_annotation(session, annotation_id))
+    def record_adoption(session: Session) -> None:
+        _require_adoptable(read_annotation(session, annotation_id))
         _adopt_stations(session, original, copy, annotation.person)
         copy_verdict_to_original(session, annotation, actor=annotation.person)
         at = now()
@@ -102,23 +102,23 @@ def adopt_annotation(
         if also is not None:
             also(session)
         refresh_queue(session, [original.id])
-        after.append(solve_for_state(session, original.id))
+        after.append(read_and_solve_group(session, original.id))
         session.respond(after[-1])
 
     if edit.edits:
-        submit(
+        submit_edit(
             store,
             annotation.group_id,
             edit,
             if_match=etag,
             actor=annotation.person,
-            then=lambda session, _state: settle(session),
+            then=lambda session, _state: record_adoption(session),
             paint=paint,
         )
     if not after:
         # The original says the same already.
         with store.write() as session:
-            settle(session)
+            record_adoption(session)
     return after[-1]
 
 
@@ -139,7 +139,7 @@ def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
             yield IncludeView(view.key, own.included, *reason)
         if view.station.shared:
             continue
-        lines = _line_changes(view.station, own.station)
+        lines = _make_line_edit(view.station, own.station)
         if lines is not None:
             yield SetLines(view.key, lines.lines, lines.proposed, lines.not_visible)
         if own.station.calibration != view.station.calibration:
@@ -148,7 +148,7 @@ def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
             yield SetPicture(view.key, own.station.picture)
 
 
-def _line_changes(before: Station, after: Station) -> SetStationLines | None:
+def _make_line_edit(before: Station, after: Station) -> SetStationLines | None:
     names = sorted({*before.lines, *after.lines})
     changed = {
         name: tuple(after.lines[name]) if name in after.lines else None
@@ -168,7 +168,7 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
     return SetStationLines(changed, proposed, not_visible)
 
 
-def _require_ready(annotation: IndependentAnnotation) -> None:
+def _require_adoptable(annotation: IndependentAnnotation) -> None:
     if annotation.kind == GOLD:
         raise ConflictError("this is an annotation of a gold group, whose true values are known")
     if annotation.submitted is None:
@@ -186,7 +186,7 @@ def _adopt_stations(
         if not held.station.shared or view is None:
             continue
         station, own, edits = held.station, view.station, list[StationEdit]()
-        lines = _line_changes(station, own)
+        lines = _make_line_edit(station, own)
         edits += [] if lines is None else [lines]
         if own.calibration != station.calibration:
             edits.append(SetStationCalibration(own.calibration))
@@ -220,7 +220,7 @@ def copy_verdict_to_original(
     )
     if annotation.verdict is None or given is None:
         return None
-    after = need_group(session, annotation.group_id)
+    after = require_group(session, annotation.group_id)
     verdict = StoredVerdict(
         **{
             **vars(given),
@@ -292,7 +292,7 @@ def log_return(
         actor: Who returns it.
         batch: Of which batch it is; None: of none.
     """
-    group = need_group(session, group_id)
+    group = require_group(session, group_id)
     body: dict[str, str | int] = {"did": RETURNED, "person": person, "reason": reason}
     if batch is not None:
         body["batch"] = batch
@@ -302,7 +302,7 @@ def log_return(
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"
     notify_person(
-        session, person, NotificationKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
+        session, person, NotificationKind.RETURNED, f"{person_of_actor(actor)} returned {group.group.label or group.group.key} to you{why}",
         actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
     )  # fmt: skip
 
@@ -311,10 +311,10 @@ def _announce_return(
     session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
 ) -> None:
     """Tell webhooks of the dataset, for a copy of the one that it is of."""
-    row = find_independent_annotation_row(session, group.id)
+    row = find_annotation_of_copy(session, group.id)
     where, details = group.dataset_id, {"group": group.id, "person": person}
     if row is not None:
-        where = need_group(session, row.group_id).dataset_id
+        where = require_group(session, row.group_id).dataset_id
         details = {"group": row.group_id, "person": person, "copy": group.id}
     event = f"group{group.id}_handed_back{make_time_suffix(at)}"
     queue_webhook_messages(

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 
-from app.db.log import LogEntry, group_entries
+from app.db.log import LogEntry, list_group_entries
 from app.db.session import Session
-from app.features.datasets.queries import find_dataset, policy_from_row
+from app.features.datasets.queries import find_dataset, parse_stored_policy
 from app.features.datasets.service import insert_dataset, save_policy
 from app.features.groups.edit import SetPaint
 from app.features.groups.edit_codec import edit_from_json
@@ -20,11 +20,11 @@ from app.features.imports.queries import find_newest_imports, list_shared_statio
 from app.features.independent_annotations.queries import (
     BARE,
     IMPORTED,
-    CopiesOf,
+    CopyDatasetKey,
     find_copy_dataset,
     read_gold_start,
 )
-from app.features.paint.queries import PAINT, insert_readings, read_readings
+from app.features.paint.queries import PAINT, insert_paint_readings, read_paint_readings
 from app.soccer.codec import hash_imported_group, view_from_json
 from app.soccer.group import Group, Station, View
 
@@ -56,13 +56,13 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     Frames are named, not copied; lines, balls, given cameras, what is known of the match and what
     was read of the paint are the copy's own from then on.
     """
-    dataset_id = _dataset_of_copies(session, order)
+    dataset_id = _get_or_make_copy_dataset(session, order)
     # Static cameras that a copy is there of already are as their person left them.
     own = {item.station.key: item.station for item in list_shared_stations(session, dataset_id)}
-    group = replace(start, views=tuple(_view_with_own_station(view, own) for view in start.views))
+    group = replace(start, views=tuple(_replace_view_station(view, own) for view in start.views))
     if order.name is not None:
         group = _hide_names(group, order.name)
-    insert_readings(session, dataset_id, group.paint.values())
+    insert_paint_readings(session, dataset_id, group.paint.values())
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
     shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
     origin = ImportOrigin(dataset_id, SOURCE, order.person)
@@ -75,27 +75,29 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
 def make_gold_group_start(session: Session, stored: StoredGroup) -> Group:
     """A gold group as its own start says, before it is stripped as all copies of the batch are."""
     if read_gold_start(session, stored.id) == IMPORTED:
-        return _group_as_imported(session, stored)
+        return _rebuild_imported_group(session, stored)
     return stored.group
 
 
-def without_extras(group: Group, start: str) -> Group:
+def strip_to_gold_start(group: Group, start: str) -> Group:
     """A group without what annotators of a batch with gold groups draw themselves.
 
     Every copy of such a batch is stripped alike, ordinary ones too: else what a copy begins with
     tells what it is of.
     """
     bare = start == BARE
-    group = replace(group, views=tuple(_view_at_start(view, start) for view in group.views))
+    group = replace(
+        group, views=tuple(_strip_view_to_gold_start(view, start) for view in group.views)
+    )
     if start == IMPORTED:
         return replace(group, paint={}, positions={})
     return replace(group, paint={} if bare else group.paint)
 
 
-def group_before_edits(session: Session, stored: StoredGroup, since: str) -> Group:
+def rebuild_group_before_edits(session: Session, stored: StoredGroup, since: str) -> Group:
     """A group without its edits from a time on, back to the import before, the last one first."""
     group = stored.group
-    for entry in reversed(group_entries(session, stored.id, verdicts=False)):
+    for entry in reversed(list_group_entries(session, stored.id, verdicts=False)):
         if entry.at < since:
             break
         if entry.kind == "import":
@@ -108,12 +110,12 @@ def group_before_edits(session: Session, stored: StoredGroup, since: str) -> Gro
 def _undo_entry(session: Session, entry: LogEntry, group: Group) -> Group:
     inverse = entry.body["inverse"]
     if inverse["edit"] == "set_paint":
-        read = read_readings(session, inverse["paint"].values())
+        read = read_paint_readings(session, inverse["paint"].values())
         return SetPaint({view: read[key] for view, key in inverse["paint"].items()}).apply(group)
     return edit_from_json(inverse).apply(group)
 
 
-def _group_as_imported(session: Session, stored: StoredGroup) -> Group:
+def _rebuild_imported_group(session: Session, stored: StoredGroup) -> Group:
     """The group as its dataset brought it last, without what people said since.
 
     Static cameras are as they are: the labels of one picture are not theirs alone.
@@ -133,14 +135,14 @@ def _group_as_imported(session: Session, stored: StoredGroup) -> Group:
     return replace(stored.group, views=tuple(views))
 
 
-def _view_at_start(view: View, start: str) -> View:
+def _strip_view_to_gold_start(view: View, start: str) -> View:
     station = view.station
     if start == BARE and not station.shared:
         station = replace(station, lines={}, proposed=(), not_visible=())
     return replace(view, station=station, balls=view.balls if start == IMPORTED else ())
 
 
-def _view_with_own_station(view: View, own: dict[str, Station]) -> View:
+def _replace_view_station(view: View, own: dict[str, Station]) -> View:
     station = own.get(view.station.key) if view.station.shared else None
     return view if station is None else replace(view, station=station)
 
@@ -177,21 +179,23 @@ def _rename_views(group: Group, names: Mapping[str, str]) -> Group:
     )
 
 
-def _dataset_of_copies(session: Session, order: CopyRequest) -> int:
+def _get_or_make_copy_dataset(session: Session, order: CopyRequest) -> int:
     """Id of the dataset of somebody's copies, which the first of them makes."""
     stored = order.original
-    copies = CopiesOf(stored.dataset_id, order.batch_id or 0, order.person)
+    copies = CopyDatasetKey(stored.dataset_id, order.batch_id or 0, order.person)
     row = find_copy_dataset(session, copies)
     if row is None:
-        name = _free_name(session, f"{stored.dataset[:_NAME]} {copies.batch_id} {order.person}")
+        name = _find_free_name(
+            session, f"{stored.dataset[:_NAME]} {copies.batch_id} {order.person}"
+        )
         return insert_dataset(session, name, stored.policy, order.person, copies)
     held = find_dataset(session, row.dataset_id)
-    if held is not None and policy_from_row(held.policy) != stored.policy:
+    if held is not None and parse_stored_policy(held.policy) != stored.policy:
         save_policy(session, row.dataset_id, stored.policy, order.person)
     return row.dataset_id
 
 
-def _free_name(session: Session, wanted: str) -> str:
+def _find_free_name(session: Session, wanted: str) -> str:
     """A name that a dataset can have and none has; those of scripts hold other letters, too."""
     plain = _OTHER.sub("-", wanted)[:_LONGEST].strip()
     names = (plain if n == 1 else f"{plain} copy {n}" for n in count(1))

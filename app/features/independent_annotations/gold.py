@@ -15,13 +15,13 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.annotation_distance import (
     DistanceFromTruth,
-    TrueView,
+    GroundTruthView,
     measure_distance_from_truth,
-    measure_error_in_world,
+    measure_error_against_true_cameras,
 )
-from app.features.datasets.service import need_dataset
-from app.features.groups.state import GroupState, need_group, read_states
-from app.features.groups.submit import load_solved
+from app.features.datasets.service import require_dataset_id
+from app.features.groups.state import GroupState, read_states, require_group
+from app.features.groups.submit import load_solved_group
 from app.features.groups.view_queries import find_dataset_of_group
 from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
@@ -46,7 +46,7 @@ from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
 from app.soccer.solution import Solution
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 
 KIND = "gold"
 JUDGED = ("accepted", "rejected")
@@ -150,7 +150,7 @@ def mark_gold_group(store: Store, group_id: int, start: str, *, actor: str) -> G
         ConflictError: Nobody has judged the group as it is now, or it is a copy.
     """
     check_gold_start(start)
-    state = load_solved(store, group_id)
+    state = load_solved_group(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
             "only a group whose current state was accepted or rejected can be a gold group",
@@ -160,11 +160,11 @@ def mark_gold_group(store: Store, group_id: int, start: str, *, actor: str) -> G
     with store.write() as session:
         if is_copy_dataset(session, state.dataset_id):
             raise ConflictError("a person's own annotation cannot be a gold group")
-        insert_gold(session, group_id, state.dataset_id, start, _truth_values(state), actor)
+        insert_gold(session, group_id, state.dataset_id, start, _truth_to_json(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
         append_entries(session, [NewLogEntry(KIND, actor, now(), body, state.dataset_id)])
-        _, marked = _require_gold(session, group_id)
+        _, marked = _require_gold_group(session, group_id)
         session.respond(marked)
     return marked
 
@@ -180,7 +180,7 @@ def set_gold_start(store: Store, group_id: int, start: str, *, actor: str) -> Go
     """
     check_gold_start(start)
     with store.write() as session:
-        dataset_id, gold = _require_gold(session, group_id)
+        dataset_id, gold = _require_gold_group(session, group_id)
         changed = replace(gold, start=start)
         if changed != gold:
             update_gold_start(session, group_id, start)
@@ -197,7 +197,7 @@ def unmark_gold_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
         NotFoundError: It is none.
     """
     with store.write() as session:
-        dataset_id, gone = _require_gold(session, group_id)
+        dataset_id, gone = _require_gold_group(session, group_id)
         delete_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
         append_entries(session, [NewLogEntry(KIND, actor, now(), body, dataset_id)])
@@ -212,10 +212,10 @@ def read_gold_report(store: Store, dataset: str | int) -> GoldReport:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        dataset_id = need_dataset(session, dataset)
+        dataset_id = require_dataset_id(session, dataset)
         found: dict[str, list[GoldResult]] = {}
         known = {
-            row.group_id: _gold_with_truth(session, row)
+            row.group_id: _read_gold_with_truth(session, row)
             for row in list_gold_heads(session, dataset_id)
         }
         annotations = [
@@ -227,11 +227,13 @@ def read_gold_report(store: Store, dataset: str | int) -> GoldReport:
             if annotation.submitted is None and not made:
                 continue
             gold, truth = known[annotation.group_id]
-            result = _gold_result(
-                gold, truth, _first_submission(session, annotation, made), max(len(made), 1)
+            result = _measure_gold_result(
+                gold, truth, _find_first_submission(session, annotation, made), max(len(made), 1)
             )
             found.setdefault(annotation.person, []).append(result)
-    people = tuple(_results_of_person(name, results) for name, results in sorted(found.items()))
+    people = tuple(
+        _summarize_person_results(name, results) for name, results in sorted(found.items())
+    )
     return GoldReport(tuple(gold for gold, _ in known.values()), people)
 
 
@@ -282,7 +284,7 @@ def check_gold_start(start: str) -> None:
         raise InputError(f"start must be one of {', '.join(STARTS)}", pointer="/start")
 
 
-def _truth_values(state: GroupState) -> Json:
+def _truth_to_json(state: GroupState) -> Json:
     ball = None if state.solution is None or state.solution.ball is None else state.solution.ball
     return {
         "group": group_to_json(state.group),
@@ -291,7 +293,7 @@ def _truth_values(state: GroupState) -> Json:
     }
 
 
-def _gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
+def _read_gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
     """A gold group, and what is true of it."""
     truth = read_gold_truth(session, row.group_id) or {}
     gold = GoldGroup(
@@ -305,14 +307,14 @@ def _gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
     return gold, truth
 
 
-def _require_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
+def _require_gold_group(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     """A gold group and the id of its dataset."""
     row = find_gold_head(session, group_id)
     if row is None and find_dataset_of_group(session, group_id) is None:
         raise NotFoundError.group(group_id)
     if row is None:
         raise NotFoundError(f"group {group_id} is not a gold group")
-    return row.dataset_id, _gold_with_truth(session, row)[0]
+    return row.dataset_id, _read_gold_with_truth(session, row)[0]
 
 
 @dataclass(frozen=True)
@@ -325,7 +327,7 @@ class _Submission:
     solution: Solution | None
 
 
-def _first_submission(
+def _find_first_submission(
     session: Session, annotation: IndependentAnnotation, made: Sequence[Mapping[str, Any]]
 ) -> _Submission:
     """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
@@ -335,15 +337,17 @@ def _first_submission(
         assert annotation.submitted is not None
         return _Submission(annotation.submitted, annotation.verdict, state.group, state.solution)
     first = made[0]
-    stored = need_group(session, annotation.copy_id)
+    stored = require_group(session, annotation.copy_id)
     if first["inputs_hash"] == stored.inputs_hash:
         return _Submission(first["at"], first["verdict"], state.group, state.solution)
     group = group_from_json(first["submitted"])
     known = read_known_calibrations(session, [group], state.policy)
-    return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
+    return _Submission(
+        first["at"], first["verdict"], group, solve_group(group, state.policy, known)
+    )
 
 
-def _gold_result(
+def _measure_gold_result(
     gold: GoldGroup, truth: Json, submission: _Submission, submissions: int
 ) -> GoldResult:
     group = group_from_json(truth["group"])
@@ -353,7 +357,9 @@ def _gold_result(
     verdict, judged = submission.verdict, truth["verdict"] in JUDGED
     annotated = rename_views_as_original(group, submission.group)
     if ball is not None and "views" in truth:
-        error = measure_error_in_world(group, true_views(truth), annotated, ball, own)
+        error = measure_error_against_true_cameras(
+            group, parse_true_views(truth), annotated, ball, own
+        )
     else:
         error = measure_distance_from_truth(group, annotated, ball, own)
     return GoldResult(
@@ -368,15 +374,17 @@ def _gold_result(
     )
 
 
-def true_views(truth: Json) -> dict[str, TrueView]:
+def parse_true_views(truth: Json) -> dict[str, GroundTruthView]:
     """The true cameras and balls of a truth that has them, by key of the view."""
     return {
-        key: TrueView(camera_from_json(view["camera"], "gold", key), ImagePoint(*view["center"]))
+        key: GroundTruthView(
+            camera_from_json(view["camera"], "gold", key), ImagePoint(*view["center"])
+        )
         for key, view in truth["views"].items()
     }
 
 
-def _results_of_person(name: str, results: list[GoldResult]) -> PersonResults:
+def _summarize_person_results(name: str, results: list[GoldResult]) -> PersonResults:
     results.sort(key=lambda one: one.submitted)
     judged = [one.right for one in results if one.right is not None]
     low, high = wilson_interval(sum(judged), len(judged))

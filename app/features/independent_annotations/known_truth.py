@@ -20,7 +20,7 @@ from app.errors import ConflictError, InputError
 from app.features.agreement.queries import AGREED, DECIDED, read_group_states
 from app.features.datasets.service import dataset_id
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.submit import solve_and_keep
+from app.features.groups.submit import solve_and_store_group
 from app.features.independent_annotations.gold import KIND, TruthSource, check_gold_start
 from app.features.independent_annotations.queries import (
     GOLD,
@@ -32,13 +32,13 @@ from app.features.independent_annotations.queries import (
     list_gold_without_copy,
 )
 from app.features.independent_annotations.service import begin_annotation_in_session
-from app.features.queue.queries import Listing
+from app.features.queue.queries import GroupListing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import Version, find_version, read_frozen_groups
 from app.formats.camera_json import camera_to_json
 from app.sample.scene import TRUTH, SceneTruth, read_truth
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 from app.soccer.codec import group_to_json
 from app.soccer.group import Group
 
@@ -97,14 +97,14 @@ def mark_groups_with_known_truth(
     check_gold_start(choice.start)
     number = dataset_id(store, dataset)
     query = parse_query(choice.query, longest=MAX_LISTED_LENGTH)
-    version = _version_of_choice(store, dataset, choice)
+    version = _find_version_of_choice(store, dataset, choice)
     with store.read() as session:
         if is_copy_dataset(session, number):
             raise ConflictError("a person's own annotation cannot be a gold group")
-        ids = Listing(session, number, query.conditions).ids(query.order)
-        found = _truths_of_sample(session, ids)
+        ids = GroupListing(session, number, query.conditions).ids(query.order)
+        found = _iterate_sample_truths(session, ids)
         if version is not None:
-            found = _truths_of_version(session, ids, version)
+            found = _iterate_version_truths(session, ids, version)
         truths = dict(islice(found, choice.size))
     if not truths:
         raise _no_truth_error(choice.source)
@@ -119,7 +119,9 @@ def mark_groups_with_known_truth(
     return chosen
 
 
-def _truths_of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tuple[int, Json]]:
+def _iterate_sample_truths(
+    session: Session, group_ids: Sequence[int]
+) -> Iterator[tuple[int, Json]]:
     """Truths of groups whose frames lie beside what is true of them."""
     known: dict[Path, Mapping[str, SceneTruth]] = {}
     for start in range(0, len(group_ids), BATCH):
@@ -127,7 +129,7 @@ def _truths_of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tu
         for group_id in group_ids[start : start + BATCH]:
             truth = _find_scene_truth(groups[group_id], known)
             if truth is not None:
-                yield group_id, _sample_truth(groups[group_id].group, truth)
+                yield group_id, _sample_truth_to_json(groups[group_id].group, truth)
 
 
 def _find_scene_truth(
@@ -157,7 +159,7 @@ def _read_truth_file(file: Path) -> Mapping[str, SceneTruth]:
     return read_truth(file)
 
 
-def _sample_truth(group: Group, truth: SceneTruth) -> Json:
+def _sample_truth_to_json(group: Group, truth: SceneTruth) -> Json:
     views: dict[str, Any] = {}
     for view in truth.views:
         center = view.camera.project(np.array([view.ball]))[0]
@@ -171,7 +173,7 @@ def _sample_truth(group: Group, truth: SceneTruth) -> Json:
     return {**values, "ball": [*truth.ball], "views": views}
 
 
-def _version_of_choice(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
+def _find_version_of_choice(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
     """The version that knows the truth; None where another source does."""
     if choice.source is not TruthSource.VERSION:
         return None
@@ -184,7 +186,7 @@ def _version_of_choice(store: Store, dataset: str | int, choice: GoldChoice) -> 
     return find_version(store, dataset, choice.version)
 
 
-def _truths_of_version(
+def _iterate_version_truths(
     session: Session, group_ids: Sequence[int], version: Version
 ) -> Iterator[tuple[int, Json]]:
     """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
@@ -219,7 +221,7 @@ def _no_truth_error(source: TruthSource) -> InputError:
 
 
 @dataclass(frozen=True)
-class BatchTerms:
+class BatchAnnotationTerms:
     """What a batch asks of own annotations.
 
     Attributes:
@@ -242,7 +244,7 @@ class BatchTerms:
 
 
 def begin_next_annotation(
-    store: Store, terms: BatchTerms, *, person: str, chance: Random | None = None
+    store: Store, terms: BatchAnnotationTerms, *, person: str, chance: Random | None = None
 ) -> IndependentAnnotation | None:
     """The independent annotation that a person shall work on now: the one that is open, else a new one.
 
@@ -261,14 +263,16 @@ def begin_next_annotation(
         None where there is nothing left for them.
     """
     with store.write() as session:
-        annotation = _next_annotation(session, terms, person_of(person), chance or SystemRandom())
+        annotation = _resume_or_begin_annotation(
+            session, terms, person_of_actor(person), chance or SystemRandom()
+        )
     if annotation is not None:
-        solve_and_keep(store, annotation.copy_id)
+        solve_and_store_group(store, annotation.copy_id)
     return annotation
 
 
-def _next_annotation(
-    session: Session, terms: BatchTerms, person: str, chance: Random
+def _resume_or_begin_annotation(
+    session: Session, terms: BatchAnnotationTerms, person: str, chance: Random
 ) -> IndependentAnnotation | None:
     annotations = list_annotations_of_batch(session, terms.batch_id, terms.dataset_id)
     mine = [annotation for annotation in annotations if annotation.person == person]
@@ -279,7 +283,7 @@ def _next_annotation(
     had = {annotation.group_id for annotation in mine}
     free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]
     kind, choice = INDEPENDENT, free if terms.gold_every else free[:1]
-    if terms.gold_every and is_gold_turn(
+    if terms.gold_every and is_next_annotation_gold(
         [annotation.kind for annotation in mine], terms.gold_every, len(free), chance
     ):
         fresh = list_unseen_gold_outside_batches(session, terms.dataset_id, person, terms.groups)
@@ -307,7 +311,7 @@ def list_unseen_gold_outside_batches(
     return [one for one in list_gold_without_copy(session, dataset_id, person) if one not in inside]
 
 
-def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
+def is_next_annotation_gold(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
     """Whether the independent annotation after these is a gold one: one of each ``every``, at a place by chance.
 
     The last ones of a batch, which may be fewer, have one among them, too: the last annotation is a gold
@@ -326,7 +330,7 @@ def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) ->
 
 
 def count_gold_left(kinds: Sequence[str], every: int, free: int, fresh: int) -> int:
-    """How many gold independent annotations are still to come, by ``is_gold_turn``: what is left for somebody counts
+    """How many gold independent annotations are still to come, by ``is_next_annotation_gold``: what is left for somebody counts
     them, so that it falls by one with each independent annotation, whatever it is of.
 
     Args:

@@ -109,7 +109,7 @@ class IndependentAnnotation:
     settled: str | None
 
 
-def _annotations_from_rows(
+def _fetch_annotations(
     session: Session, statement: Select[*tuple[Any, ...]], values: dict[str, Any] | None = None
 ) -> list[IndependentAnnotation]:
     return [IndependentAnnotation(**row._mapping) for row in session.execute(statement, values)]
@@ -138,7 +138,7 @@ def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotati
     """An independent annotation by its id."""
     return next(
         iter(
-            _annotations_from_rows(
+            _fetch_annotations(
                 session, _ANNOTATIONS.where(IndependentAnnotationModel.id == annotation_id)
             )
         ),
@@ -146,9 +146,9 @@ def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotati
     )
 
 
-def find_independent_annotation_row(session: Session, copy_id: int) -> IndependentAnnotation | None:
+def find_annotation_of_copy(session: Session, copy_id: int) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
-    return next(iter(_annotations_from_rows(session, _OF_COPY, {"copy": copy_id})), None)
+    return next(iter(_fetch_annotations(session, _OF_COPY, {"copy": copy_id})), None)
 
 
 def list_closed_copies(session: Session, dataset_id: int) -> set[int]:
@@ -166,7 +166,7 @@ def list_closed_copies(session: Session, dataset_id: int) -> set[int]:
 def list_annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
     """The independent annotations of a group in the order in which they began."""
     mine = IndependentAnnotationModel.group_id == group_id
-    return _annotations_from_rows(
+    return _fetch_annotations(
         session, _ANNOTATIONS.where(mine).order_by(IndependentAnnotationModel.id)
     )
 
@@ -178,9 +178,9 @@ def list_annotations_of_batch(
     batch = IndependentAnnotationModel.batch_id
     mine = batch.is_(None) if batch_id is None else batch == batch_id
     statement = _ANNOTATIONS.where(
-        mine, IndependentAnnotationModel.copy_id.in_(_copies_of(dataset_id))
+        mine, IndependentAnnotationModel.copy_id.in_(_select_copy_ids(dataset_id))
     )
-    return _annotations_from_rows(session, statement.order_by(IndependentAnnotationModel.id))
+    return _fetch_annotations(session, statement.order_by(IndependentAnnotationModel.id))
 
 
 def count_groups_left(
@@ -191,7 +191,7 @@ def count_groups_left(
     ``verdicts`` people may have a group.
     """
     annotation, group = IndependentAnnotationModel, BatchGroupModel
-    here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_copies_of(dataset_id)))
+    here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_select_copy_ids(dataset_id)))
     mine, this = annotation.person == person, annotation.group_id == group.group_id
     ends = (annotation.submitted.is_(None), annotation.settled.is_(None))
     begun_by_others = (
@@ -208,7 +208,7 @@ def count_groups_left(
     return session.scalar(begun) or 0, session.scalar(free) or 0
 
 
-def _copies_of(dataset_id: int) -> Select[int]:
+def _select_copy_ids(dataset_id: int) -> Select[int]:
     return (
         select(GroupModel.id)
         .join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
@@ -268,12 +268,12 @@ def read_annotations(
         where.append(IndependentAnnotationModel.person == person)
     if kind is not None:
         where.append(IndependentAnnotationModel.kind == kind)
-    return _annotations_from_rows(
+    return _fetch_annotations(
         session, statement.where(*where).order_by(IndependentAnnotationModel.id)
     )
 
 
-class CopyName(NamedTuple):
+class CopyAndOriginalNames(NamedTuple):
     """Names of a copy and of the group that it is a copy of.
 
     Attributes:
@@ -292,7 +292,7 @@ class CopyName(NamedTuple):
     number: int
 
 
-def read_copy_names(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyName]:
+def read_copy_names(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyAndOriginalNames]:
     """Names of copies and of their originals."""
     original = aliased(GroupModel)
     statement = (
@@ -311,7 +311,7 @@ def read_copy_names(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyN
         .join(original, original.id == IndependentAnnotationModel.group_id)
         .join(QueueModel, QueueModel.group_id == original.id)
     )
-    return session.rows(CopyName, statement.where(GroupModel.id.in_(copy_ids)))
+    return session.rows(CopyAndOriginalNames, statement.where(GroupModel.id.in_(copy_ids)))
 
 
 def count_annotations(session: Session, batch_id: int | None, person: str) -> int:
@@ -332,7 +332,7 @@ def update_annotation(session: Session, annotation_id: int, **values: str | None
 
 
 @dataclass(frozen=True)
-class CopiesOf:
+class CopyDatasetKey:
     """Of what a dataset holds copies: of the groups of ``of_id``, by a person, in a batch (0: none)."""
 
     of_id: int
@@ -340,7 +340,7 @@ class CopiesOf:
     person: str
 
 
-def insert_copy_dataset(session: Session, dataset_id: int, copies: CopiesOf) -> None:
+def insert_copy_dataset(session: Session, dataset_id: int, copies: CopyDatasetKey) -> None:
     """Say whose copies a dataset holds."""
     session.execute(insert(CopyDatasetModel), [{"dataset_id": dataset_id, **vars(copies)}])
 
@@ -350,7 +350,7 @@ def list_copy_datasets(session: Session, dataset_id: int) -> Sequence[CopyDatase
     return session.rows(CopyDataset, _COPIES.where(CopyDatasetModel.of_id == dataset_id))
 
 
-def find_copy_dataset(session: Session, copies: CopiesOf) -> CopyDataset | None:
+def find_copy_dataset(session: Session, copies: CopyDatasetKey) -> CopyDataset | None:
     """The dataset of such copies."""
     column = CopyDatasetModel
     mine = (column.of_id == copies.of_id) & (column.batch_id == copies.batch_id)

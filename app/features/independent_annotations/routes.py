@@ -12,7 +12,7 @@ from app.evaluation.annotation_distance import DistanceFromTruth
 from app.features.agreement.adjudicate import adopt_into_group
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.groups.routes import ETAG
-from app.features.groups.schemas import GroupDocument, group_response
+from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.guidelines.service import MAX_LETTERS
 from app.features.independent_annotations import gold, service
@@ -35,7 +35,7 @@ from app.features.queue.query import MAX_LISTED_LENGTH
 from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -202,7 +202,7 @@ def list_independent_annotations(
 
 
 def _begun_response(annotation: DisclosedAnnotation) -> Response:
-    return document(annotation, 201)
+    return make_document_response(annotation, 201)
 
 
 @annotations_router.post(
@@ -238,7 +238,7 @@ def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedA
     responses=responses(403, 404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@respond_with(document)
+@respond_with(make_document_response)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
 ) -> service.DisclosedAnnotation:
@@ -256,7 +256,7 @@ def hand_in(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@respond_with(document)
+@respond_with(make_document_response)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: ReturnReason | None = None
 ) -> service.DisclosedAnnotation:
@@ -275,7 +275,7 @@ def hand_back(
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
 
@@ -307,7 +307,7 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(document)
+@respond_with(make_document_response)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChoiceResult:
@@ -324,7 +324,7 @@ def choose(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@respond_with(document)
+@respond_with(make_document_response)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
     return gold.mark_gold_group(store, group, edit.start, actor=actor)
@@ -337,7 +337,7 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@respond_with(document)
+@respond_with(make_document_response)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.set_gold_start(store, group, edit.start, actor=actor)
@@ -350,7 +350,7 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
     responses=responses(404),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@respond_with(document)
+@respond_with(make_document_response)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     return gold.unmark_gold_group(store, group, actor=actor)

@@ -5,30 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from app.db.log import read_entries_of
+from app.db.log import iterate_group_entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.datasets.service import need_dataset
+from app.features.datasets.service import require_dataset_id
 from app.features.groups.queries import read_groups
-from app.features.groups.state import need_group
-from app.features.groups.submit import solve_and_keep
+from app.features.groups.state import require_group
+from app.features.groups.submit import solve_and_store_group
 from app.features.independent_annotations.copying import (
     CopyRequest,
     copy_group,
-    group_before_edits,
     make_gold_group_start,
-    without_extras,
+    rebuild_group_before_edits,
+    strip_to_gold_start,
 )
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
-    CopyName,
+    CopyAndOriginalNames,
     IndependentAnnotation,
     count_annotations,
     find_annotation,
+    find_annotation_of_copy,
     find_common_gold_start,
-    find_independent_annotation_row,
     insert_annotation,
     list_annotations_of_group,
     read_annotations,
@@ -38,7 +38,7 @@ from app.features.independent_annotations.submission_queries import RETURNED, su
 from app.features.people.visibility_queries import READER
 from app.features.queue.queries import read_columns
 from app.json_text import Moment
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 _KINDS = ("work", "take")
 """Kinds of such entries: about groups of batches, and about own annotations."""
@@ -61,11 +61,11 @@ class ReturnedGroup:
     reason: str
 
 
-def read_returned(session: Session, group_ids: Sequence[int]) -> dict[int, ReturnedGroup]:
+def read_returned_groups(session: Session, group_ids: Sequence[int]) -> dict[int, ReturnedGroup]:
     """How groups were returned last, by their ids; the caller knows that they wait again."""
     last = {
         entry.group_id: entry
-        for entry in read_entries_of(session, group_ids, _KINDS)
+        for entry in iterate_group_entries_of_kinds(session, group_ids, _KINDS)
         if entry.group_id is not None and entry.body.get("did") == RETURNED
     }
     names = {
@@ -74,7 +74,11 @@ def read_returned(session: Session, group_ids: Sequence[int]) -> dict[int, Retur
     }
     return {
         group: ReturnedGroup(
-            group, names.get(group, ""), person_of(entry.actor), entry.at, entry.body["reason"]
+            group,
+            names.get(group, ""),
+            person_of_actor(entry.actor),
+            entry.at,
+            entry.body["reason"],
         )
         for group, entry in last.items()
     }
@@ -124,10 +128,10 @@ def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAn
         ConflictError: It is a copy itself.
     """
     with store.write() as session:
-        annotation = begin_annotation_in_session(session, group_id, person=person_of(person))
+        annotation = begin_annotation_in_session(session, group_id, person=person_of_actor(person))
         begun = disclose_annotation_in_session(session, annotation)
         session.respond(begun)
-    solve_and_keep(store, annotation.copy_id)
+    solve_and_store_group(store, annotation.copy_id)
     return begun
 
 
@@ -155,14 +159,14 @@ def begin_annotation_in_session(
         nameless: The copy is of a batch with gold groups: it does not say which group it is of, and
             begins with what all copies of such a batch begin with.
     """
-    stored = need_group(session, group_id)
+    stored = require_group(session, group_id)
     others = [
         one for one in list_annotations_of_group(session, group_id) if one.batch_id == batch_id
     ]
     for one in others:
         if one.person == person:
             return one
-    if find_independent_annotation_row(session, group_id) is not None:
+    if find_annotation_of_copy(session, group_id) is not None:
         raise ConflictError(
             "this is an independent annotation already",
             hint="Start from the group that it was made from.",
@@ -173,12 +177,12 @@ def begin_annotation_in_session(
     if kind == GOLD:
         start = make_gold_group_start(session, stored)
     elif (blind or nameless) and since is not None:
-        start = group_before_edits(session, stored, since)
+        start = rebuild_group_before_edits(session, stored, since)
     elif not blind and ready:
-        start = need_group(session, ready[-1]).group
+        start = require_group(session, ready[-1]).group
     common = find_common_gold_start(session, stored.dataset_id) if nameless else None
     if common is not None:
-        start = without_extras(start, common)
+        start = strip_to_gold_start(start, common)
     order = CopyRequest(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
     copy_id = copy_group(session, order, start)
     annotation_id = insert_annotation(
@@ -235,8 +239,8 @@ def find_independent_annotation_of_group(
     store: Store, copy_id: int
 ) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
-    with store.read_one() as session:
-        return find_independent_annotation_row(session, copy_id)
+    with store.read_for_one_statement() as session:
+        return find_annotation_of_copy(session, copy_id)
 
 
 def list_annotations(
@@ -254,10 +258,10 @@ def list_annotations(
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        dataset_id = need_dataset(session, dataset)
-        whose = None if sees_all(dataset_id) else person_of(person)
+        dataset_id = require_dataset_id(session, dataset)
+        whose = None if sees_all(dataset_id) else person_of_actor(person)
         found = read_annotations(session, dataset_id, whose)
-        return _disclosed_annotations(session, found)
+        return _disclose_annotations(session, found)
 
 
 def disclose_annotation(store: Store, annotation: IndependentAnnotation) -> DisclosedAnnotation:
@@ -270,17 +274,17 @@ def disclose_annotation_in_session(
     session: Session, annotation: IndependentAnnotation
 ) -> DisclosedAnnotation:
     """``disclose_annotation`` within a session."""
-    return _disclosed_annotations(session, [annotation])[0]
+    return _disclose_annotations(session, [annotation])[0]
 
 
-def _disclosed_annotations(
+def _disclose_annotations(
     session: Session, annotations: Sequence[IndependentAnnotation]
 ) -> list[DisclosedAnnotation]:
     heads = {row.id: row for row in read_copy_names(session, [one.copy_id for one in annotations])}
     reader = READER.get()
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in annotations if one.submitted is None and one.settled is None]
-    back = read_returned(session, waiting)
+    back = read_returned_groups(session, waiting)
 
     def is_disclosed(one: IndependentAnnotation) -> bool:
         """Whether it may be known of what it is a copy, and what became of it: its person is told neither
@@ -298,7 +302,7 @@ def _disclosed_annotations(
             dataset=heads[one.copy_id].of_id,
             of=one.group_id if disclosed else None,
             number=heads[one.copy_id].number if disclosed else None,
-            title=_title_of_copy(heads[one.copy_id], disclosed),
+            title=_choose_copy_title(heads[one.copy_id], disclosed),
             person=one.person,
             place=one.place,
             begun=one.begun,
@@ -312,7 +316,7 @@ def _disclosed_annotations(
     ]
 
 
-def _title_of_copy(head: CopyName, disclosed: bool) -> str:
+def _choose_copy_title(head: CopyAndOriginalNames, disclosed: bool) -> str:
     return str((head.of_label or head.of_key) if disclosed else (head.label or head.key))
 
 

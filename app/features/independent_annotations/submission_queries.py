@@ -10,17 +10,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.db.json_columns import Json
-from app.db.log import NewLogEntry, append_entries, read_entries_of
+from app.db.log import NewLogEntry, append_entries, iterate_group_entries_of_kinds
 from app.db.session import Session
 from app.errors import ConflictError, ForbiddenError
 from app.features.agreement.queries import delete_open_agreement
 from app.features.groups.queries import read_groups
 from app.features.independent_annotations.queries import (
     IndependentAnnotation,
-    find_independent_annotation_row,
+    find_annotation_of_copy,
     update_annotation,
 )
-from app.soccer.actors import LOCAL_USER, person_of
+from app.soccer.actors import LOCAL_USER, person_of_actor
 from app.soccer.codec import group_to_json
 
 KIND = "take"
@@ -44,10 +44,10 @@ def require_annotation_open(annotation: IndependentAnnotation | None) -> None:
         )
 
 
-def _require_person(annotation: IndependentAnnotation, actor: str) -> None:
+def _require_own_annotation(annotation: IndependentAnnotation, actor: str) -> None:
     """Raise ForbiddenError where a copy is somebody else's."""
     # On a server without accounts everybody is the local user.
-    if person_of(actor) not in (annotation.person, LOCAL_USER):
+    if person_of_actor(actor) not in (annotation.person, LOCAL_USER):
         raise ForbiddenError(f"only {annotation.person} can submit and judge this annotation")
 
 
@@ -65,7 +65,7 @@ def submit_copy(
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already.
     """
-    _require_person(annotation, actor)
+    _require_own_annotation(annotation, actor)
     require_annotation_open(annotation)
     (stored,) = read_groups(session, [annotation.copy_id]).values()
     # Of a copy that was returned the verdict stays, unless its person gives another one.
@@ -89,13 +89,13 @@ def record_copy_verdict(session: Session, copy_id: int, state: str, *, actor: st
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already: its verdict stays, too.
     """
-    annotation = find_independent_annotation_row(session, copy_id)
+    annotation = find_annotation_of_copy(session, copy_id)
     if annotation is None:
         return
     if state != "unreviewed":
         submit_copy(session, annotation, actor=actor, at=at, verdict=state)
     else:
-        _require_person(annotation, actor)
+        _require_own_annotation(annotation, actor)
         require_annotation_open(annotation)
         update_annotation(session, annotation.id, verdict=None)
 
@@ -124,7 +124,7 @@ def list_submissions(
     Copies that were submitted before there were such entries have none.
     """
     found: dict[int, list[Mapping[str, Any]]] = {}
-    for entry in read_entries_of(session, copy_ids, (KIND,)):
+    for entry in iterate_group_entries_of_kinds(session, copy_ids, (KIND,)):
         if entry.group_id is not None and entry.body.get("did") == SUBMITTED:
             found.setdefault(entry.group_id, []).append({"at": entry.at, **entry.body})
     return found

@@ -16,10 +16,10 @@ import cv2
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.db.check import CheckResult, compare_records, compare_with_log
-from app.db.dialects.dialect import dialect_in
+from app.db.check import CheckResult, compare_with_log, summarize_faulty_records
+from app.db.dialects.dialect import get_session_dialect
 from app.db.dialects.sqlite import MIN_SQLITE
-from app.db.home import find_leftovers, make_home, open_to_others
+from app.db.home import find_leftovers, find_paths_open_to_others, make_home
 from app.db.log import (
     count_entries_after,
     find_last_entry_time,
@@ -27,7 +27,7 @@ from app.db.log import (
     iterate_entries_of_kinds,
 )
 from app.db.recovery.anchor import read_anchor
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
@@ -47,11 +47,11 @@ from app.features.groups.state_snapshot_queries import (
 from app.features.guidelines.queries import GUIDELINE, list_all_guidelines
 from app.features.integrity.records import (
     DELETED,
-    examine_computed,
+    examine_computed_records,
     examine_people,
     examine_versions,
 )
-from app.features.integrity.transfer import find_null_characters, list_null_characters
+from app.features.integrity.transfer import find_null_characters, format_null_characters
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import count_linked_admins, read_rules
 from app.features.queue.refresh_queries import find_outdated_rows
@@ -59,7 +59,7 @@ from app.features.solutions.service import list_stale_groups
 from app.features.what_if.service import examine_yields
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
-from app.soccer.codec import group_inputs_hash, paint_to_json, station_digest, view_digest
+from app.soccer.codec import hash_group_inputs, paint_to_json, station_digest, view_digest
 from app.wording import plural
 
 
@@ -70,7 +70,7 @@ def examine_guidelines(session: Session, restore: str) -> CheckResult:
         session: A read session on a log whose chain is whole.
         restore: What to do where a text is not what was written.
     """
-    logged = _logged_guidelines(session)
+    logged = _read_logged_guidelines(session)
     present = {
         (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
         for row in list_all_guidelines(session)
@@ -83,7 +83,7 @@ def _guideline_name(key: tuple[int, int]) -> str:
     return f"version {number} of dataset {dataset}"
 
 
-def _logged_guidelines(session: Session) -> dict[tuple[int, int], str]:
+def _read_logged_guidelines(session: Session) -> dict[tuple[int, int], str]:
     digests: dict[tuple[int, int], str] = {}
     for entry in iterate_entries_of_kinds(session, [GUIDELINE, DELETED]):
         assert entry.dataset_id is not None
@@ -117,7 +117,7 @@ def examine_database(store: Store) -> list[CheckResult]:
     log is broken: then nothing follows from it.
     """
     with store.read() as session:
-        restore = dialect_in(session).restoring
+        restore = get_session_dialect(session).restoring
         checks = [_check_file(session, restore)]
         entries = find_newest_entry_id(session)
         try:
@@ -129,7 +129,7 @@ def examine_database(store: Store) -> list[CheckResult]:
             checks.append(_check_texts(session))
             checks += _check_tables_against_log(session, logged, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
-        computed = examine_computed(session, restore)
+        computed = examine_computed_records(session, restore)
         is_whole = all(check.ok for check in computed)
         checks += [*computed, _check_queue(session, REBUILD if is_whole else restore)]
     return [*checks, *_check_solutions(store)]
@@ -137,8 +137,8 @@ def examine_database(store: Store) -> list[CheckResult]:
 
 def _check_file(session: Session, restore: str) -> CheckResult:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
-    dialect = dialect_in(session)
-    faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
+    dialect = get_session_dialect(session)
+    faults, lost = dialect.find_file_faults(session), dialect.count_lost_references(session)
     if faults:
         return CheckResult("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
     if lost:
@@ -152,7 +152,7 @@ def _check_texts(session: Session) -> CheckResult:
     if not found:
         return CheckResult("texts", True, "SQLite and PostgreSQL can keep each")
     sentence = (
-        f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {list_null_characters(found)}"
+        f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {format_null_characters(found)}"
     )
     return CheckResult(
         "texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there."
@@ -189,12 +189,12 @@ def _check_digests(session: Session) -> CheckResult:
     for group in iterate_groups(session):
         count += 1
         views = {view.key: view_digest(view) for view in group.group.views}
-        hashed = group_inputs_hash(group.group, paint_to_json(group.group.paint))
+        hashed = hash_group_inputs(group.group, paint_to_json(group.group.paint))
         present = {key: digest for key, (digest, _) in group.view_digests.items()}
         if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each matching its annotations"
-    return compare_records("digests", whole, apart, "not of what was said", REBUILD)
+    return summarize_faulty_records("digests", whole, apart, "not of what was said", REBUILD)
 
 
 def _check_queue(session: Session, mend: str) -> CheckResult:
@@ -205,7 +205,7 @@ def _check_queue(session: Session, mend: str) -> CheckResult:
         return CheckResult("queue", False, error.message, mend)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"
     wrong = "not as groups, verdicts and solutions say"
-    return compare_records("queue", whole, [str(number) for number in apart], wrong, mend)
+    return summarize_faulty_records("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
 def _check_solutions(store: Store) -> list[CheckResult]:
@@ -371,7 +371,7 @@ def _check_linked_admins(store: Store) -> CheckResult | None:
 
 
 def _check_permissions(settings: Settings) -> CheckResult:
-    found = open_to_others(settings)
+    found = find_paths_open_to_others(settings)
     if found:
         sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
         more = " and others" if found[1:] else ""
@@ -421,10 +421,10 @@ def _check_anchor(settings: Settings) -> CheckResult:
 def _check_clock(session: Session) -> CheckResult:
     now = datetime.now(UTC)
     # Two machines that edit in turn may differ by a little.
-    count, latest = count_entries_after(session, text_of(now + timedelta(minutes=5)))
+    count, latest = count_entries_after(session, format_utc_time(now + timedelta(minutes=5)))
     if count == 0:
         return CheckResult("clock", True, "not behind the log")
-    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {format_utc_time(now)}; the latest is of {latest}"
     last = find_last_entry_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
         return CheckResult("clock", False, sentence, "Set the clock of this machine.")

@@ -61,17 +61,17 @@ def backup(
 
     Frames are read where they are: those outside the home are in no backup.
     """
-    from app.db.backup import EXPORTS, FRAMES, back_up
+    from app.db.backup import EXPORTS, FRAMES, back_up_home
 
     folders = (*(FRAMES if with_frames else ()), *(EXPORTS if with_exports else ()))
-    manifest = back_up(read_settings(), out, folders)
+    manifest = back_up_home(read_settings(), out, folders)
     if json_:
         print_json({"out": str(out), **vars(manifest)})
         return
     size = out.stat().st_size / 1e6
     say(f"{out} ({size:,.1f} MB) is written and verified")
     say(
-        f"  {_contents_sentence(manifest.entries, manifest.rows)}, {plural(len(manifest.files) - 1, 'file')}"
+        f"  {_describe_contents(manifest.entries, manifest.rows)}, {plural(len(manifest.files) - 1, 'file')}"
     )
     if manifest.frames_elsewhere:
         say(
@@ -110,19 +110,21 @@ def transfer(
     settings = read_settings()
     printed: set[str] = set()
 
-    def tell(table: str, _rows: int) -> None:
+    def print_copied_table(table: str, _rows: int) -> None:
         if table not in printed and not json_:
             say(f"  {table}")
         printed.add(table)
 
     done = run_transfer(
-        *make_settings_of_both_databases(source, target, settings), tell, replace_null=replace_null
+        *make_settings_of_both_databases(source, target, settings),
+        print_copied_table,
+        replace_null=replace_null,
     )
     if json_:
         print_json(vars(done))
         return
     say(
-        f"{_contents_sentence(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied"
+        f"{_describe_contents(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied"
     )
     for name, digest in done.versions.items():
         say(f"  version {name} {digest[:12]}")
@@ -149,7 +151,7 @@ def restore(
         return
     say(f"{restored.home} is restored from {source}")
     say(
-        f"  {_contents_sentence(restored.entries, restored.rows)}, {plural(restored.files, 'file')}"
+        f"  {_describe_contents(restored.entries, restored.rows)}, {plural(restored.files, 'file')}"
     )
     if restored.foreign_log:
         say("  the write-ahead log beside it was another database's, and is left out")
@@ -160,6 +162,6 @@ def restore(
     )
 
 
-def _contents_sentence(entries: int, rows: dict[str, int]) -> str:
+def _describe_contents(entries: int, rows: dict[str, int]) -> str:
     groups, verdicts = rows.get("groups", 0), rows.get("verdict", 0)
     return f"{plural(entries, 'entry', 'entries')} of the log, {plural(groups, 'group')}, {plural(verdicts, 'verdict')}"

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.db.check import CheckResult, compare_records, compare_with_log
-from app.db.dialects.dialect import dialect_in
+from app.db.check import CheckResult, compare_with_log, summarize_faulty_records
+from app.db.dialects.dialect import get_session_dialect
 from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
 from app.db.log import LogEntry, iterate_entries_of_kinds
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.datasets.queries import policy_from_row
+from app.features.datasets.queries import parse_stored_policy
 from app.features.groups.queries import read_groups
-from app.features.people.queries import all_people, list_dataset_roles
+from app.features.people.queries import list_dataset_roles, list_people_rows
 from app.features.people.roles import PERSON
 from app.features.people.visibility_queries import read_aliases, show_entries_under_aliases
 from app.features.solutions.codec import SolutionSummary, summarize_solution
@@ -24,7 +24,7 @@ from app.features.solutions.queries import read_summary
 from app.features.solutions.stored_queries import (
     check_stored_calibrations,
     check_stored_paint_readings,
-    decode_row,
+    decode_solution_row,
     iterate_solution_batches,
     list_calibration_keys_of_row,
 )
@@ -33,15 +33,15 @@ from app.features.versions.frozen_queries import (
     SOLUTION,
     collect_shared_keys,
     compute_content_key,
+    decode_frozen_json,
     filter_stored_frozen_keys,
     iterate_frozen_batches,
     list_lost_calibrations,
     list_members_without_content,
-    read_json,
 )
 from app.features.versions.queries import VersionRow, iterate_annotation_rows, list_all_versions
 from app.features.versions.service import collect_calibration_keys, hash_version
-from app.soccer.codec import group_inputs_hash, paint_to_json, policy_from_json
+from app.soccer.codec import hash_group_inputs, paint_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -58,7 +58,7 @@ WRONG_VERSION = "not as it was frozen"
 
 
 @dataclass
-class KnownPeople:
+class PeopleSnapshot:
     """Who there is, and as what.
 
     Attributes:
@@ -81,7 +81,7 @@ def examine_people(session: Session, restore: str) -> list[CheckResult]:
         session: A read session on a log whose chain is whole.
         restore: What to do where a row is not what was said.
     """
-    logged, present = _logged_people(session), _present_people(session)
+    logged, present = _replay_logged_people(session), _read_present_people(session)
     for key, role in logged.unsure.items():
         if present.roles.get(key) == role:
             logged.roles[key] = role
@@ -94,10 +94,10 @@ def examine_people(session: Session, restore: str) -> list[CheckResult]:
     ]
 
 
-def _present_people(session: Session) -> KnownPeople:
-    people = all_people(session)
+def _read_present_people(session: Session) -> PeopleSnapshot:
+    people = list_people_rows(session)
     names = {row.id: row.name for row in people}
-    return KnownPeople(
+    return PeopleSnapshot(
         accounts={row.name: (row.role, bool(row.disabled)) for row in people},
         roles={
             (names[row.person_id], row.dataset_id): row.role for row in list_dataset_roles(session)
@@ -106,8 +106,8 @@ def _present_people(session: Session) -> KnownPeople:
     )
 
 
-def _logged_people(session: Session) -> KnownPeople:
-    people, deleted = KnownPeople(), None
+def _replay_logged_people(session: Session) -> PeopleSnapshot:
+    people, deleted = PeopleSnapshot(), None
     for entry in iterate_entries_of_kinds(session, [PERSON, DELETED, DATASET]):
         if entry.kind == DELETED:
             _replay_dataset_deletion(people, entry)
@@ -119,7 +119,7 @@ def _logged_people(session: Session) -> KnownPeople:
     return people
 
 
-def _replay_dataset_deletion(people: KnownPeople, deleted: LogEntry) -> None:
+def _replay_dataset_deletion(people: PeopleSnapshot, deleted: LogEntry) -> None:
     """Roles in a dataset go with it, or to the one that begins afresh in its place."""
     gone = {key: role for key, role in people.roles.items() if key[1] == deleted.dataset_id}
     for name, dataset in gone:
@@ -130,7 +130,9 @@ def _replay_dataset_deletion(people: KnownPeople, deleted: LogEntry) -> None:
             people.unsure[name, dataset] = role
 
 
-def _replay_dataset_creation(people: KnownPeople, made: LogEntry, deleted: LogEntry | None) -> None:
+def _replay_dataset_creation(
+    people: PeopleSnapshot, made: LogEntry, deleted: LogEntry | None
+) -> None:
     """A dataset that an earlier version made right after it deleted another may have its roles."""
     if deleted is None or made.body["name"] != deleted.body["name"]:
         return
@@ -139,41 +141,41 @@ def _replay_dataset_creation(people: KnownPeople, made: LogEntry, deleted: LogEn
         people.unsure[name, made.dataset_id] = people.unsure.pop((name, dataset))
 
 
-def _replay_account(people: KnownPeople, entry: LogEntry, name: str) -> None:
+def _replay_account(people: PeopleSnapshot, entry: LogEntry, name: str) -> None:
     _, disabled = people.accounts.get(name, ("", False))
     people.accounts[name] = (entry.body["role"], disabled)
 
 
-def _replay_disabling(people: KnownPeople, entry: LogEntry, name: str) -> None:
+def _replay_account_disabling(people: PeopleSnapshot, entry: LogEntry, name: str) -> None:
     people.accounts[name] = (entry.body["role"], entry.body["did"] == "disabled")
 
 
-def _replay_role_given(people: KnownPeople, entry: LogEntry, name: str) -> None:
+def _replay_role_given(people: PeopleSnapshot, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles[name, entry.dataset_id] = entry.body["role"]
 
 
-def _replay_role_taken(people: KnownPeople, entry: LogEntry, name: str) -> None:
+def _replay_role_taken(people: PeopleSnapshot, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles.pop((name, entry.dataset_id), None)
 
 
-def _replay_adoption(people: KnownPeople, entry: LogEntry, name: str) -> None:
+def _replay_name_adoption(people: PeopleSnapshot, entry: LogEntry, name: str) -> None:
     people.shown[entry.body["from"]] = name
 
 
-_STEPS: Mapping[str, Callable[[KnownPeople, LogEntry, str], None]] = {
+_STEPS: Mapping[str, Callable[[PeopleSnapshot, LogEntry, str], None]] = {
     "first admin": _replay_account,
     "invited": _replay_account,
     "came by single sign-on": _replay_account,
     "role": _replay_account,
-    "disabled": _replay_disabling,
-    "enabled": _replay_disabling,
+    "disabled": _replay_account_disabling,
+    "enabled": _replay_account_disabling,
     "role in dataset": _replay_role_given,
     "role taken": _replay_role_taken,
-    "adopted": _replay_adoption,
+    "adopted": _replay_name_adoption,
 }
 """What of the words about people changes who there is, and as what."""
 
@@ -182,7 +184,7 @@ def _record_name(key: str | tuple[str, int]) -> str:
     return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
 
 
-def examine_computed(session: Session, restore: str) -> list[CheckResult]:
+def examine_computed_records(session: Session, restore: str) -> list[CheckResult]:
     """Read every calibration, every reading of paint, and every solution of this solver.
 
     A solution has to be that of its row, and its summary that of its own figures; one that fits its
@@ -197,11 +199,11 @@ def examine_computed(session: Session, restore: str) -> list[CheckResult]:
     solutions, apart = 0, list[str]()
     for rows in iterate_solution_batches(session):
         solutions += len(rows)
-        apart += _differing_solutions(session, rows, {*damaged})
+        apart += _find_differing_solutions(session, rows, {*damaged})
     return [
-        _check_written_records("calibrations", calibrations, damaged, restore),
-        _check_written_records("readings of paint", readings, unread, restore),
-        _check_written_records("solutions", solutions, apart, restore),
+        _summarize_damaged_records("calibrations", calibrations, damaged, restore),
+        _summarize_damaged_records("readings of paint", readings, unread, restore),
+        _summarize_damaged_records("solutions", solutions, apart, restore),
     ]
 
 
@@ -214,29 +216,33 @@ def _count_damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
     return count, damaged
 
 
-def _check_written_records(
+def _summarize_damaged_records(
     name: str, count: int, apart: Sequence[str], restore: str
 ) -> CheckResult:
-    return compare_records(name, f"{count:,}, each as it was written", apart, WRONG, restore)
+    return summarize_faulty_records(
+        name, f"{count:,}, each as it was written", apart, WRONG, restore
+    )
 
 
-def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str]) -> Iterator[str]:
+def _find_differing_solutions(
+    session: Session, rows: Sequence[Any], damaged: Set[str]
+) -> Iterator[str]:
     """Names of the solutions that are not as they were written.
 
     What rests on a damaged calibration cannot be told; the calibration is named by itself.
     """
-    groups = _groups_with_sound_rows(session, [row.group_id for row in rows if row.current])
+    groups = _read_undamaged_groups(session, [row.group_id for row in rows if row.current])
     for row in rows:
         try:
             known = damaged.isdisjoint(list_calibration_keys_of_row(row))
-            is_whole = not known or _is_as_written(session, row, groups)
+            is_whole = not known or _is_solution_unchanged(session, row, groups)
         except StorageError:
             is_whole = False
         if not is_whole:
             yield f"{row.id} of group {row.group_id}"
 
 
-def _groups_with_sound_rows(session: Session, ids: Sequence[int]) -> dict[int, Group]:
+def _read_undamaged_groups(session: Session, ids: Sequence[int]) -> dict[int, Group]:
     """Groups of which a solution can be told to be theirs: what their rows say is what they hash.
 
     None where a row cannot be read: that is a fault of the tables.
@@ -248,22 +254,22 @@ def _groups_with_sound_rows(session: Session, ids: Sequence[int]) -> dict[int, G
     return {
         key: item.group
         for key, item in found.items()
-        if item.inputs_hash == group_inputs_hash(item.group, paint_to_json(item.group.paint))
+        if item.inputs_hash == hash_group_inputs(item.group, paint_to_json(item.group.paint))
     }
 
 
-def _is_as_written(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
-    solution, summary = decode_row(session, row), read_summary(row.summary)
+def _is_solution_unchanged(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
+    solution, summary = decode_solution_row(session, row), read_summary(row.summary)
     if row.facts is not None:
         facts_from_bytes([row.facts])
     if not row.current or row.group_id not in groups:
         return True
     group = groups[row.group_id]
-    is_theirs = _fits_group(group, solution, policy_from_row(row.policy))
-    return is_theirs and _are_equal_values(summary, summarize_solution(group, solution))
+    is_theirs = _is_solution_of_group(group, solution, parse_stored_policy(row.policy))
+    return is_theirs and _are_equal_summaries(summary, summarize_solution(group, solution))
 
 
-def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
+def _is_solution_of_group(group: Group, solution: Solution, policy: Policy) -> bool:
     """Whether a solution has the views of a group, with cameras of what was said of them."""
     if [view.key for view in group.views] != [view.view for view in solution.views]:
         return False
@@ -273,7 +279,7 @@ def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
     )
 
 
-def _are_equal_values(stored: SolutionSummary, computed: SolutionSummary) -> bool:
+def _are_equal_summaries(stored: SolutionSummary, computed: SolutionSummary) -> bool:
     return all(
         math.isclose(ours, theirs, rel_tol=_EQUAL, abs_tol=_EQUAL)
         if isinstance(ours, float) and isinstance(theirs, float)
@@ -288,41 +294,41 @@ def examine_versions(store: Store) -> list[CheckResult]:
     Whether solutions would come out as they were frozen is what ``verify`` tells.
     """
     with store.read() as session:
-        restore = dialect_in(session).restoring
+        restore = get_session_dialect(session).restoring
         versions = list_all_versions(session)
-        apart = [*_differing_versions(session, versions)]
+        apart = [*_find_differing_versions(session, versions)]
         count, changed = _check_frozen_contents(session)
         return [
-            compare_records(
+            summarize_faulty_records(
                 "frozen versions", f"{len(versions):,}, as frozen", apart, WRONG_VERSION, restore
             ),
-            compare_records(
+            summarize_faulty_records(
                 "frozen content", f"{count:,}, as frozen", changed, WRONG_VERSION, restore
             ),
         ]
 
 
-def _differing_versions(session: Session, versions: Any) -> Iterator[str]:
+def _find_differing_versions(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
         with report_damaged_values():
-            logged = _logged_freezes(session)
+            logged = _read_logged_freezes(session)
     except StorageError:
         # Nothing follows from a log that cannot be read, which is named by itself.
         logged = None
     for row in versions:
         entry = None if logged is None else logged.pop(row.id, None)
         why = None
-        if logged is not None and not _matches_log(row, entry):
+        if logged is not None and not _version_matches_log(row, entry):
             why = "the log says otherwise"
-        why = why or _fault_of_version(session, row)
+        why = why or _find_version_fault(session, row)
         if why is not None:
             yield f"{row.dataset}/{row.name} ({why})"
     for entry in (logged or {}).values():
         yield f"{entry.body.get('name')} of dataset {entry.dataset_id} (it is gone)"
 
 
-def _logged_freezes(session: Session) -> dict[int, LogEntry]:
+def _read_logged_freezes(session: Session) -> dict[int, LogEntry]:
     """What the log says of each version by its id, but for datasets that were deleted."""
     found: dict[int, LogEntry] = {}
     entries = iterate_entries_of_kinds(session, ("freeze", "dataset_deleted"))
@@ -334,7 +340,7 @@ def _logged_freezes(session: Session) -> dict[int, LogEntry]:
     return found
 
 
-def _matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
+def _version_matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
     if entry is None:
         return False
     logged = (
@@ -347,7 +353,7 @@ def _matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
     return logged == (row.dataset_id, row.name, row.hash, row.created, row.actor)
 
 
-def _fault_of_version(session: Session, row: VersionRow) -> str | None:
+def _find_version_fault(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
     rows = [item._asdict() for item in iterate_annotation_rows(session, row.id)]
     try:
@@ -383,7 +389,9 @@ def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
         named: dict[int, set[str]] = {}
         for row in rows:
             try:
-                named.setdefault(row.dataset_id, set()).update(_referenced_keys(row.key, row.body))
+                named.setdefault(row.dataset_id, set()).update(
+                    _find_referenced_keys(row.key, row.body)
+                )
             except StorageError:
                 apart.append(row.key)
         for dataset_id, keys in named.items():
@@ -391,7 +399,7 @@ def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
     return count, list(dict.fromkeys(apart))
 
 
-def _referenced_keys(key: str, body: bytes | None) -> set[str]:
+def _find_referenced_keys(key: str, body: bytes | None) -> set[str]:
     """Keys of what a content names.
 
     Raises:
@@ -405,5 +413,9 @@ def _referenced_keys(key: str, body: bytes | None) -> set[str]:
         if compute_content_key(key, body) != key:
             raise ValueError(f"the key {key} does not match the content stored under it")
         if key.startswith(SAID):
-            return collect_shared_keys(read_json(body))
-        return collect_calibration_keys(read_json(body)) if key.startswith(SOLUTION) else set()
+            return collect_shared_keys(decode_frozen_json(body))
+        return (
+            collect_calibration_keys(decode_frozen_json(body))
+            if key.startswith(SOLUTION)
+            else set()
+        )

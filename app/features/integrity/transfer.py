@@ -31,19 +31,19 @@ from app.config import Settings
 from app.db.dialects.dialect import (
     WRITE,
     Dialect,
-    dialect_in,
-    dialect_of,
+    get_dialect,
+    get_session_dialect,
     make_engine,
     report_storage_errors,
 )
-from app.db.home import make_file
-from app.db.locks import hold_database_alone, hold_server_lock
+from app.db.home import create_private_file
+from app.db.locks import hold_exclusive_database_lock, hold_server_lock
 from app.db.log import verify_chain
-from app.db.migrate import UNFINISHED, make_schema, read_schema_revision
+from app.db.migrate import UNFINISHED, apply_missing_migrations, read_schema_revision
 from app.db.recovery.anchor import read_anchor_of_database
 from app.db.session import Session
 from app.db.store import Store
-from app.durable import read_private
+from app.durable import read_private_file
 from app.errors import DamagedError, InputError
 from app.features.tables import Base
 from app.wording import plural
@@ -68,18 +68,18 @@ def make_settings_of_both_databases(
     """
     begin = _database_settings(source, "FROM", settings)
     # The files of a home that goes into a database stay in that home.
-    into = settings if _database_address(target, "TO") is None else begin
+    into = settings if _resolve_database_url(target, "TO") is None else begin
     return begin, _database_settings(target, "TO", into)
 
 
 def _database_settings(place: str, name: str, settings: Settings) -> Settings:
-    address = _database_address(place, name)
+    address = _resolve_database_url(place, name)
     if address is not None:
         return settings.model_copy(update={"database_url": address})
     return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
 
 
-def _database_address(place: str, name: str) -> str | None:
+def _resolve_database_url(place: str, name: str) -> str | None:
     """The address that an argument is, or that the file holds which it names; None: it is a home."""
     if "://" in place:
         if _PASSWORD.search(place):
@@ -91,7 +91,7 @@ def _database_address(place: str, name: str) -> str | None:
     file = Path(place)
     if not file.is_file():
         return None
-    address = read_private(file, name)
+    address = read_private_file(file, name)
     if "://" not in address:
         raise InputError(
             f"{file} holds no address of a database",
@@ -104,7 +104,7 @@ NULL_CHARACTER, REPLACEMENT = "\0", "\ufffd"
 
 
 @dataclass(frozen=True)
-class NullCharacter:
+class TextWithNullCharacter:
     """A text of the database that holds U+0000.
 
     Attributes:
@@ -124,9 +124,9 @@ class NullCharacter:
         return f"{self.table} {key} column {self.column}"
 
 
-def find_null_characters(session: Session) -> list[NullCharacter]:
+def find_null_characters(session: Session) -> list[TextWithNullCharacter]:
     """Every text of the database that holds U+0000, by table and column; none on PostgreSQL."""
-    if not dialect_in(session).is_file:
+    if not get_session_dialect(session).is_file:
         return []
     found = []
     for table in Base.metadata.sorted_tables:
@@ -140,11 +140,11 @@ def find_null_characters(session: Session) -> list[NullCharacter]:
                 values = dict(row._mapping)
                 text = values.pop("text_")
                 key = {name: values.get(name, text) for name in (item.name for item in keys)}
-                found.append(NullCharacter(table.name, key, column.name, str(text)))
+                found.append(TextWithNullCharacter(table.name, key, column.name, str(text)))
     return found
 
 
-def without_null_characters(row: Mapping[str, Any]) -> dict[str, Any]:
+def replace_null_characters(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row whose texts have U+FFFD, the replacement character, where they had U+0000."""
     return {
         name: value.replace(NULL_CHARACTER, REPLACEMENT) if isinstance(value, str) else value
@@ -152,7 +152,7 @@ def without_null_characters(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def list_null_characters(found: Sequence[NullCharacter], most: int = 5) -> str:
+def format_null_characters(found: Sequence[TextWithNullCharacter], most: int = 5) -> str:
     """Rows and columns as a sentence lists them."""
     return ", ".join(map(str, found[:most])) + (" and others" if len(found) > most else "")
 
@@ -204,20 +204,22 @@ def transfer_database(
         raise InputError(
             "source and target are the same database", hint="Name a target other than the source."
         )
-    dialect = dialect_of(target)
+    dialect = get_dialect(target)
     with ExitStack() as held:
         held.enter_context(hold_server_lock(source))
         if target.home != source.home:
             held.enter_context(hold_server_lock(target))
         store = held.enter_context(closing(Store.open(source)))
         if dialect.is_file:
-            held.enter_context(hold_database_alone(target, "nothing can be copied into it"))
-            make_file(target.database_file)
+            held.enter_context(
+                hold_exclusive_database_lock(target, "nothing can be copied into it")
+            )
+            create_private_file(target.database_file)
         engine = make_engine(target)
         held.callback(engine.dispose)
         held.enter_context(report_storage_errors(target))
         # Before the source is read: what goes wrong in there is told as the source's.
-        dialect.require_promises(engine)
+        dialect.require_supported_configuration(engine)
         with store.read() as session:
             writer = engine.execution_options(**WRITE)
             if not replace_null and (found := find_null_characters(session)):
@@ -225,11 +227,11 @@ def transfer_database(
             return _copy_all_tables(session, writer, dialect, target.yields, tell)
 
 
-def _null_character_error(found: Sequence[NullCharacter]) -> InputError:
+def _null_character_error(found: Sequence[TextWithNullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
         f"{count} the character U+0000, which databases no longer store:"
-        f" {list_null_characters(found)}",
+        f" {format_null_characters(found)}",
         hint="Run touchline transfer with --replace-null: it replaces the character with U+FFFD.",
     )
 
@@ -249,10 +251,10 @@ def _copy_all_tables(
         )
     _prepare_target(target, dialect, anchor.installation)
     copied = 0
-    for tables in _tables_by_transaction():
+    for tables in _group_tables_by_transaction():
         copied += _copy_tables(session, target, tables, tell)
     with Session(target) as copy:
-        rows = _require_equal(session, copy)
+        rows = _require_equal_rows(session, copy)
         entries = _require_same_chain(copy, anchor.entries, anchor.hash)
         dialect.settle(copy, _tables_to_copy(), anchor.installation)
         # Their marks are those of the changes of another database.
@@ -276,7 +278,7 @@ def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None
                 raise InputError(
                     "the target database contains tables of another program", hint=_EMPTY
                 )
-        make_schema(target, dialect, new=True)
+        apply_missing_migrations(target, dialect, new=True)
         with target.begin() as connection:
             connection.execute(text("DELETE FROM installation"))
             connection.execute(_REVISION, {"revision": UNFINISHED})
@@ -295,7 +297,7 @@ def _tables_to_copy() -> list[Table]:
     return [table for table in Base.metadata.sorted_tables if table.name != _MARKS]
 
 
-def _tables_by_transaction() -> Iterator[list[Table]]:
+def _group_tables_by_transaction() -> Iterator[list[Table]]:
     """Tables after those that they refer to; the groups of versions with these, which seal them."""
     together = [
         table for table in _tables_to_copy() if table.name in (f"{_VERSION}_group", _VERSION)
@@ -336,10 +338,10 @@ def _read_rows(connection: Connection, table: Table, after: int = 0) -> Iterator
     statement = select(table).order_by(*table.primary_key.columns).offset(after)
     found = connection.execute(statement, execution_options={"yield_per": _BATCH})
     for row in found:
-        yield without_null_characters(dict(row._mapping))
+        yield replace_null_characters(dict(row._mapping))
 
 
-def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
+def _require_equal_rows(session: Session, connection: Connection) -> dict[str, int]:
     """Rows by table, where every row of the copy is that of the source."""
     counts = {}
     for table in _tables_to_copy():

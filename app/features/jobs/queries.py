@@ -12,7 +12,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import json_member
 from app.db.json_columns import Json, parse_json_column
-from app.db.session import Base, Session, now, text_of
+from app.db.session import Base, Session, format_utc_time, now
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import (
@@ -134,7 +134,7 @@ def insert_job(session: Session, job: NewJob) -> int:
         "done": 0,
         "sentence": "",
         "tries": 0,
-        "request": _json_column(job.request),
+        "request": _to_json_column(job.request),
         "created": now(),
     }
     session.execute(insert(JobModel), [values])
@@ -147,7 +147,7 @@ def update_job(session: Session, job_id: int, *, begun: int = 0, **values: Any) 
         values["tries"] = JobModel.tries + begun
     for name in ("result", "problem"):
         if name in values:
-            values[name] = _json_column(values[name])
+            values[name] = _to_json_column(values[name])
     session.execute(update(JobModel).where(JobModel.id == job_id).values(values))
 
 
@@ -209,7 +209,7 @@ def list_job_ids_of_dataset(
     return list(session.scalars(found.order_by(JobModel.id)))
 
 
-def is_asked_to_end(session: Session, job_id: int) -> bool:
+def is_cancellation_requested(session: Session, job_id: int) -> bool:
     """Whether somebody wants a running job to end."""
     return bool(session.scalar(select(JobModel.ending).where(JobModel.id == job_id)))
 
@@ -226,7 +226,7 @@ def delete_job(session: Session, job_id: int) -> None:
     session.execute(delete(JobModel).where(JobModel.id == job_id))
 
 
-def trim_jobs(session: Session, kind: str, keep: int) -> None:
+def delete_oldest_jobs(session: Session, kind: str, keep: int) -> None:
     """Forget the oldest jobs of a kind that are over, so that the table does not grow forever."""
     oldest = (
         select(JobModel.id)
@@ -237,13 +237,13 @@ def trim_jobs(session: Session, kind: str, keep: int) -> None:
     session.execute(delete(JobModel).where(JobModel.id.in_(oldest)))
 
 
-def forget_jobs(session: Session, days: int) -> int:
+def delete_old_jobs(session: Session, days: int) -> int:
     """Forget jobs that ended so many days ago; one that made an export stays as long as its file.
 
     Returns:
         How many.
     """
-    oldest = text_of(datetime.now(UTC) - timedelta(days=days))
+    oldest = format_utc_time(datetime.now(UTC) - timedelta(days=days))
     gone = (
         delete(JobModel)
         .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest)
@@ -253,7 +253,7 @@ def forget_jobs(session: Session, days: int) -> int:
     return len(session.scalars(gone).all())
 
 
-def _json_column(value: Json) -> str | None:
+def _to_json_column(value: Json) -> str | None:
     return None if value is None else canonical_json_text(replace_non_finite(value))
 
 

@@ -26,7 +26,7 @@ from app.features.jobs.runner import JobRun
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify_person
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 TICK = 0.25
 """Seconds between two looks at the progress of the running job."""
@@ -56,7 +56,7 @@ class JobRecords:
             NotFoundError: There is none of that id.
         """
         with self._store.read() as session:
-            return need_job(session, job_id)
+            return require_job(session, job_id)
 
     def find(
         self,
@@ -84,7 +84,7 @@ class JobRecords:
         """Jobs that somebody sees and that wait or run, the oldest first."""
         return self.find(dataset_id=dataset_id, states=OPEN, visibility=visibility)[::-1]
 
-    def all_ids(self, *, dataset_id: int, kind: str) -> list[int]:
+    def list_job_ids(self, *, dataset_id: int, kind: str) -> list[int]:
         """Ids of all jobs of a kind in a dataset, however many there are."""
         with self._store.read() as session:
             return list_job_ids_of_kind(session, dataset_id, kind)
@@ -97,7 +97,7 @@ class JobRecords:
             ConflictError: It is not over.
         """
         with self._store.write() as session:
-            if need_job(session, job_id).state in OPEN:
+            if require_job(session, job_id).state in OPEN:
                 raise ConflictError(f"job {job_id} has not ended yet", hint="Cancel it first.")
             delete_job(session, job_id)
 
@@ -116,7 +116,7 @@ class JobRecords:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)
         if job is not None:
-            self._announce(job)
+            self._announce_job_change(job)
 
     def _save_end(self, job_id: int, by: str | None = None, **values: Any) -> Job | None:
         """Save how a job ended, and tell who asked for it, at once; ``by``: see ``cancel``."""
@@ -128,7 +128,7 @@ class JobRecords:
             if job is not None and job.state in _REPORTED:
                 notify_person(
                     session,
-                    person_of(job.actor),
+                    person_of_actor(job.actor),
                     NotificationKind.JOB,
                     f"{job.title}: {_REPORTED[job.state]}",
                     actor=job.actor,
@@ -136,15 +136,15 @@ class JobRecords:
                     dataset_id=job.dataset_id if job.dataset is not None else None,
                 )
         if job is not None:
-            self._announce(job)
+            self._announce_job_change(job)
         return job
 
-    def _announce(self, job: Job) -> None:
+    def _announce_job_change(self, job: Job) -> None:
         for listener in self._listeners:
             listener(job)
 
 
-def need_job(session: Session, job_id: int) -> Job:
+def require_job(session: Session, job_id: int) -> Job:
     """A job by its id; raises NotFoundError without one."""
     job = read_job(session, job_id)
     if job is None:

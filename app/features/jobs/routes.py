@@ -11,8 +11,8 @@ from app.features.jobs.queries import OPEN, Job
 from app.features.jobs.schemas import JobDocument, JobKind, JobPage
 from app.http.cursor import parse_cursor
 from app.http.deps import Actor, AppServices, Id, SeesWhole
-from app.http.documents import respond_with, respond_with_document
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.documents import make_document_responder, respond_with
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
 from app.soccer.choices import JobState
@@ -27,7 +27,7 @@ DatasetFilter = Annotated[
 
 
 @router.get("", operation_id="listJobs", responses=responses(404))
-@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
+@may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 def list_jobs(
     services: AppServices,
     visibility: SeesWhole,
@@ -62,7 +62,7 @@ def get_job(job: Id, services: AppServices) -> Job:
     "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
 )
 @may(Action.LEAD, job=OwnedKind.JOB)
-@respond_with(respond_with_document(JobDocument.model_validate))
+@respond_with(make_document_responder(JobDocument.model_validate))
 def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
     return services.jobs.cancel(job, by=actor)

@@ -13,7 +13,12 @@ from typing import Any, TypeVar
 
 import structlog
 
-from app.db.database_worker import refuse_question, run_in_this_thread, run_in_worker, with_grace
+from app.db.database_worker import (
+    ignore_question,
+    make_stop_with_grace_period,
+    run_in_this_thread,
+    run_in_worker,
+)
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
@@ -21,7 +26,7 @@ from app.features.datasets.queries import has_more_groups
 from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
 from app.formats.export_formats import describe_missing_content
 from app.progress import ReportProgress
-from app.wording import counted, plural
+from app.wording import format_named_count, plural
 from app.worker_process import EndReason, WorkerEnded
 
 log = structlog.get_logger("touchline.jobs")
@@ -67,11 +72,11 @@ def report_counts_in_words(progress: JobProgress, what: str) -> ReportProgress:
     Where the work says a sentence, it is that one.
     """
 
-    def count(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_counts(done: int, total: int | None = None, sentence: str = "") -> None:
         of = "" if total is None else f" of {total:,}"
         progress(done, total, sentence or f"{done:,}{of} {what}")
 
-    return count
+    return report_counts
 
 
 class JobProgress:
@@ -113,7 +118,7 @@ class JobProgress:
         if self.cancelled.is_set():
             raise JobCancelled
 
-    def check_within(self, seconds: float) -> None:
+    def wait_and_check(self, seconds: float) -> None:
         """``check``, once the server stops or this time is over."""
         self._closing.wait(seconds)
         self.check()
@@ -239,7 +244,7 @@ def run_job_in_worker(
     dataset_id: int | None,
     progress: JobProgress,
     report: ReportProgress | None = None,
-    answer: Callable[[Any], Any] = refuse_question,
+    answer: Callable[[Any], Any] = ignore_question,
 ) -> Result:
     """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).
 
@@ -261,7 +266,7 @@ def run_job_in_worker(
     report = report or progress
     if dataset_id is not None and _is_small_dataset(store, dataset_id):
         return run_in_this_thread(store, work, *arguments, progress=report, answer=answer)
-    stop = with_grace(progress.check)
+    stop = make_stop_with_grace_period(progress.check)
     try:
         with leave_work_to_next_server(progress):
             return run_in_worker(
@@ -281,7 +286,7 @@ def leave_work_to_next_server(progress: JobProgress) -> Iterator[None]:
     try:
         yield
     except (WorkerEnded, OverloadedError, TooLargeError):
-        progress.check_within(STOP_SECONDS)
+        progress.wait_and_check(STOP_SECONDS)
         raise
 
 
@@ -300,8 +305,8 @@ def describe_result(kind: str, result: Json) -> str | None:
         return None
 
 
-def _solving_sentence(result: Json) -> str:
-    pitches = _pitch_estimate_sentence(result)
+def _describe_solving(result: Json) -> str:
+    pitches = _describe_pitch_estimates(result)
     if not result["solved"] and not result["failed"]:
         return pitches or "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
@@ -315,7 +320,7 @@ def _solving_sentence(result: Json) -> str:
     )
 
 
-def _pitch_estimate_sentence(result: Json) -> str:
+def _describe_pitch_estimates(result: Json) -> str:
     """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
     if not result.get("estimated"):
         return ""
@@ -329,7 +334,7 @@ def _pitch_estimate_sentence(result: Json) -> str:
     return f"The pitch of {matches} was estimated: {found}."
 
 
-def _import_sentence(result: Json) -> str:
+def _describe_import(result: Json) -> str:
     counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
     would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
     counted_groups = ", ".join(f"{count:,} {name}" for name, count in counts.items())
@@ -338,54 +343,54 @@ def _import_sentence(result: Json) -> str:
     return f"{plural(sum(counts.values()), 'group')} read: {counted_groups}{more}{would}."
 
 
-def _export_sentence(result: Json) -> str:
+def _describe_export(result: Json) -> str:
     counts = result["counts"]
-    written = ", ".join(counted(count, name) for name, count in counts.items())
+    written = ", ".join(format_named_count(count, name) for name, count in counts.items())
     missing = describe_missing_content(result.get("format", ""), counts)
     return f"Written: {written}." + ("" if missing is None else f" {missing}.")
 
 
-def _version_sentence(result: Json) -> str:
+def _describe_version(result: Json) -> str:
     return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
 
 
-def _verification_sentence(result: Json) -> str:
+def _describe_verification(result: Json) -> str:
     return str(result["sentence"])
 
 
-def _evaluation_sentence(result: Json) -> str:
+def _describe_evaluation(result: Json) -> str:
     return f"Evaluation {result['name']} is ready."
 
 
-def _acceptance_sentence(result: Json) -> str:
+def _describe_acceptance(result: Json) -> str:
     refused = sum(result["refused"].values())
     more = f"; {plural(refused, 'view')} refused" if refused else ""
     groups = plural(result["groups"], "group")
     return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
 
 
-def _practice_sentence(result: Json) -> str:
+def _describe_practice(result: Json) -> str:
     groups = plural(result["groups"], "practice group")
     return f"{groups} made." if result["made"] else f"The {groups} already exist."
 
 
-def _rig_adjustment_sentence(result: Json) -> str:
+def _describe_rig_adjustment(result: Json) -> str:
     cameras = plural(len(result["cameras"]), "camera")
     if result["accepted"] is None:
         return f"An adjustment of {cameras} is proposed."
     return f"The adjustment of {cameras} was accepted ({result['accepted']})."
 
 
-def _shared_positions_sentence(result: Json) -> str:
+def _describe_shared_positions(result: Json) -> str:
     shared, matches = result["shared"], plural(result["matches"], "match", "matches")
     return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
 
 
-def _paint_reading_sentence(result: Json) -> str:
+def _describe_paint_reading(result: Json) -> str:
     return f"The paint of {plural(result['read'], 'picture')} was read."
 
 
-def _line_proposals_sentence(result: Json) -> str:
+def _describe_line_proposals(result: Json) -> str:
     looked = result["proposed"] + result["unsure"] + result["nothing"]
     return (
         f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
@@ -393,19 +398,19 @@ def _line_proposals_sentence(result: Json) -> str:
     )
 
 
-def _picture_estimates_sentence(result: Json) -> str:
+def _describe_picture_estimates(result: Json) -> str:
     items = result["items"]
     proposed = sum(item["proposed"] is not None for item in items)
     matches = plural(len(items), "match", "matches")
     return f"{matches} estimated, {proposed:,} with a proposal."
 
 
-def _recording_index_sentence(result: Json) -> str:
+def _describe_recording_index(result: Json) -> str:
     shots, frames = plural(result["shots"], "shot"), plural(result["frames"], "frame")
     return f"{result['name']} has {frames} in {shots}."
 
 
-def _instants_sentence(result: Json) -> str:
+def _describe_instants(result: Json) -> str:
     there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
     changed, views, outside = (
         result.get(name, 0) for name in ("changed", "linked_views", "outside")
@@ -417,7 +422,7 @@ def _instants_sentence(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
-def _ball_search_sentence(result: Json) -> str:
+def _describe_ball_search(result: Json) -> str:
     there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
     count = len(result["without"])
     without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
@@ -425,13 +430,13 @@ def _ball_search_sentence(result: Json) -> str:
     return f"The ball was tracked over {stretches}{there}{without}."
 
 
-def _camera_tracking_sentence(result: Json) -> str:
+def _describe_camera_tracking(result: Json) -> str:
     counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
     given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
     return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
 
 
-def _link_sentence(result: Json) -> str:
+def _describe_link(result: Json) -> str:
     live, replay = result["rays"]
     seen = f"{live:,} rays of the live shot, {replay:,} of the replay"
     left = f", {result['left_out']:,} left out" if result["left_out"] else ""
@@ -440,23 +445,23 @@ def _link_sentence(result: Json) -> str:
 
 
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
-    "solve": _solving_sentence,
-    "import": _import_sentence,
-    "export": _export_sentence,
-    "freeze": _version_sentence,
-    "verify": _verification_sentence,
-    "evaluate": _evaluation_sentence,
-    "bulk": _acceptance_sentence,
-    "practice": _practice_sentence,
-    "rig": _rig_adjustment_sentence,
-    "positions": _shared_positions_sentence,
-    "paint": _paint_reading_sentence,
-    "proposals": _line_proposals_sentence,
-    "pictures": _picture_estimates_sentence,
-    "recording": _recording_index_sentence,
-    "instants": _instants_sentence,
-    "ball": _ball_search_sentence,
-    "track": _camera_tracking_sentence,
-    "link": _link_sentence,
+    "solve": _describe_solving,
+    "import": _describe_import,
+    "export": _describe_export,
+    "freeze": _describe_version,
+    "verify": _describe_verification,
+    "evaluate": _describe_evaluation,
+    "bulk": _describe_acceptance,
+    "practice": _describe_practice,
+    "rig": _describe_rig_adjustment,
+    "positions": _describe_shared_positions,
+    "paint": _describe_paint_reading,
+    "proposals": _describe_line_proposals,
+    "pictures": _describe_picture_estimates,
+    "recording": _describe_recording_index,
+    "instants": _describe_instants,
+    "ball": _describe_ball_search,
+    "track": _describe_camera_tracking,
+    "link": _describe_link,
 }
 """By the kind of the job."""

@@ -9,7 +9,7 @@ from fastapi import Response
 from pydantic import Field
 
 from app.features.jobs.queries import Job
-from app.http.documents import Document, ListDocument, document
+from app.http.documents import Document, ListDocument, make_document_response
 from app.http.problem import Responses, responses
 from app.soccer.choices import JobState
 
@@ -97,10 +97,10 @@ def make_location_header(job: Job) -> dict[str, str]:
 
 def make_job_response(job: Job) -> Response:
     """The answer of a job that was started."""
-    return document(JobDocument.model_validate(job), 202, make_location_header(job))
+    return make_document_response(JobDocument.model_validate(job), 202, make_location_header(job))
 
 
-def openapi_of_job_response(*statuses: int) -> dict[str, Any]:
+def describe_job_response_for_openapi(*statuses: int) -> dict[str, Any]:
     """What a route says of itself that answers 202 with a job.
 
     Args:

@@ -34,12 +34,12 @@ from app.features.jobs.queries import (
     WAITING,
     Job,
     NewJob,
+    delete_oldest_jobs,
     insert_job,
     read_jobs,
-    trim_jobs,
     update_job,
 )
-from app.features.jobs.records import JobRecords, Then, need_job, record_cancellation
+from app.features.jobs.records import JobRecords, Then, record_cancellation, require_job
 from app.features.jobs.runner import JobProgress, JobRun, RunQueue, Work
 
 log = structlog.get_logger("touchline.jobs")
@@ -117,12 +117,12 @@ class Jobs(JobRecords):
     def _take_over_open_jobs(self) -> None:
         with self._store.write() as session:
             for kind, keep in KEPT.items():
-                trim_jobs(session, kind, keep)
+                delete_oldest_jobs(session, kind, keep)
             left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
             for job in left:
-                update_job(session, job.id, **self._recovered_columns(job))
+                update_job(session, job.id, **self._build_recovered_columns(job))
         with self._changed:
-            resumed = [self._make_resumed_run(job) for job in left if self._is_resumed(job)]
+            resumed = [self._make_resumed_run(job) for job in left if self._is_resumable(job)]
             self._queue = self._queue.with_waiting_runs(*resumed)
             self._start_workers()
 
@@ -161,7 +161,7 @@ class Jobs(JobRecords):
             known = self._find_waiting_job(session, new) if once else None
             if not once:
                 self._require_queue_room(session, actor)
-            job = need_job(session, insert_job(session, new) if known is None else known)
+            job = require_job(session, insert_job(session, new) if known is None else known)
             if known is None:
                 log_job_request(session, actor, job.id, kind, title, dataset_id)
             then(session, job)
@@ -169,7 +169,7 @@ class Jobs(JobRecords):
                 enter(JobRun(work, JobProgress(job, self._closing)))
         if known is not None:
             return job
-        self._announce(job)
+        self._announce_job_change(job)
         return job
 
     def cancel(self, job_id: int, *, by: str | None = None) -> Job:
@@ -200,7 +200,7 @@ class Jobs(JobRecords):
         if by is None:
             return self.get(job_id)
         with self._store.write() as session:
-            return record_cancellation(session, need_job(session, job_id), by)
+            return record_cancellation(session, require_job(session, job_id), by)
 
     def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
@@ -209,7 +209,7 @@ class Jobs(JobRecords):
         if running is not None:
             running.progress.job = replace(running.job, dataset_id=dataset_id)
 
-    def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
+    def list_open_job_ids(self, dataset_id: int, *kinds: str) -> list[int]:
         """Ids of a dataset's jobs that wait or run here, of some kinds or, without any, of all.
 
         Within a write transaction that stays true to its end. A record that is open and that
@@ -244,7 +244,7 @@ class Jobs(JobRecords):
         Work that asks ``JobProgress.require_not_cancelled`` in its transactions writes nothing in any
         that begins after this.
         """
-        self.cancel_each(self.ids_of(dataset_id, *kinds))
+        self.cancel_each(self.list_open_job_ids(dataset_id, *kinds))
 
     def cancel_all(self, dataset_id: int) -> None:
         """End all jobs of a dataset and wait until none of them runs any more.
@@ -270,7 +270,7 @@ class Jobs(JobRecords):
         """Whether a job of a kind waits or runs here; waits for nothing."""
         return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.runs)
 
-    def are_idle(self) -> bool:
+    def is_idle(self) -> bool:
         """Whether none waits or runs."""
         return not self._queue.runs
 
@@ -292,7 +292,7 @@ class Jobs(JobRecords):
         if any(worker.is_alive() for worker in self._workers):
             for run in self._queue.running:
                 log.warning("a job did not end in time", job=run.job.id)
-                self._uncount_start(run)
+                self._undo_start_count(run)
 
     def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
@@ -300,12 +300,12 @@ class Jobs(JobRecords):
         for run in self._queue.waiting:
             if (run.job.kind, run.job.dataset_id) != place:
                 continue
-            if new.dataset_id is not None or need_job(session, run.job.id).actor == new.actor:
+            if new.dataset_id is not None or require_job(session, run.job.id).actor == new.actor:
                 return run.job.id
         return None
 
     def _require_queue_room(self, session: Session, actor: str) -> None:
-        waiting = self._actors_of_waiting_jobs(session)
+        waiting = self._list_actors_of_waiting_jobs(session)
         own = waiting.count(actor)
         if len(waiting) >= self._capacity:
             raise OverloadedError(
@@ -317,7 +317,7 @@ class Jobs(JobRecords):
                 hint="Send it again when some of them are done.",
             )
 
-    def _actors_of_waiting_jobs(self, _session: Session) -> list[str]:
+    def _list_actors_of_waiting_jobs(self, _session: Session) -> list[str]:
         """Who asked for each job that waits."""
         return [run.job.actor for run in self._queue.waiting]
 
@@ -329,7 +329,7 @@ class Jobs(JobRecords):
         """
         entered: list[JobRun] = []
 
-        def enter(run: JobRun) -> None:
+        def enqueue_run(run: JobRun) -> None:
             with self._changed:
                 entered.append(run)
                 self._queue = self._queue.with_waiting_runs(run)
@@ -337,7 +337,7 @@ class Jobs(JobRecords):
         with self._changed:
             self._entering += 1
         try:
-            yield enter
+            yield enqueue_run
         except BaseException:
             with self._changed:
                 for run in entered:
@@ -348,9 +348,9 @@ class Jobs(JobRecords):
                 self._entering -= 1
                 self._start_workers()
 
-    def _recovered_columns(self, job: Job) -> dict[str, Any]:
+    def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
-        if self._is_resumed(job):
+        if self._is_resumable(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
         sentence = "The server stopped before this was done. Start it again."
         if job.kind in self._resumers:
@@ -360,7 +360,7 @@ class Jobs(JobRecords):
         problem = {"detail": sentence, "hint": None, "pointer": None}
         return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
 
-    def _is_resumed(self, job: Job) -> bool:
+    def _is_resumable(self, job: Job) -> bool:
         return job.kind in self._resumers and job.tries < MOST_TRIES
 
     def _make_resumed_run(self, job: Job) -> JobRun:
@@ -427,14 +427,14 @@ class Jobs(JobRecords):
         if values is not None:
             self._record_end(run, **values)
         else:
-            self._uncount_start(run)
+            self._undo_start_count(run)
 
     def _record_start(self, run: JobRun) -> bool:
         """Write that a job is begun; False where it shall not be."""
         self._save_columns(run.job.id, state=RUNNING, started=now(), begun=1)
         return True
 
-    def _uncount_start(self, run: JobRun) -> None:
+    def _undo_start_count(self, run: JobRun) -> None:
         """Let a server that stops in good order count for no death: it is none of this job's doing."""
         with self._changed:
             counted, run.counted = run.counted, False

@@ -27,14 +27,14 @@ from app.features.jobs.queries import (
     WAITING,
     Job,
     NewJob,
-    is_asked_to_end,
+    delete_oldest_jobs,
+    is_cancellation_requested,
     list_job_ids_of_dataset,
     read_job,
     read_jobs,
-    trim_jobs,
     update_job,
 )
-from app.features.jobs.records import need_job, record_cancellation
+from app.features.jobs.records import record_cancellation, require_job
 from app.features.jobs.runner import JobProgress, JobRun, Work
 from app.features.jobs.service import CLOSE_SECONDS, KEPT, WAIT_FOR_JOB, Jobs, Pool
 
@@ -61,8 +61,8 @@ class SharedProgress(JobProgress):
         if self._closing.is_set():
             # Another process may carry it out by now.
             raise JobCancelled
-        with self._store.read_one() as session:
-            if is_asked_to_end(session, self.job_id):
+        with self._store.read_for_one_statement() as session:
+            if is_cancellation_requested(session, self.job_id):
                 self.cancelled.set()
         super().require_not_cancelled()
 
@@ -97,7 +97,7 @@ class SharedJobs(Jobs):
         """Carry out jobs from when no other process does."""
         self._alone = False
         self._store.sharing.subscribe(self._receive_notification)
-        self._lead_or_log_failure()
+        self._try_to_lead()
         self._leader = threading.Thread(target=self._watch_jobs, name="leader", daemon=True)
         self._leader.start()
 
@@ -121,21 +121,21 @@ class SharedJobs(Jobs):
     def cancel(self, job_id: int, *, by: str | None = None) -> Job:
         """See ``Jobs``."""
         with self._store.write() as session:
-            if need_job(session, job_id).state in (DONE, FAILED):
+            if require_job(session, job_id).state in (DONE, FAILED):
                 raise ConflictError(f"job {job_id} has already ended")
-            self._request_end(session, [job_id])
-            job = record_cancellation(session, need_job(session, job_id), by)
-        self._announce(job)
+            self._request_cancellation(session, [job_id])
+            job = record_cancellation(session, require_job(session, job_id), by)
+        self._announce_job_change(job)
         return job
 
-    def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
+    def list_open_job_ids(self, dataset_id: int, *kinds: str) -> list[int]:
         """See ``Jobs``; whichever process works on them."""
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             return list_job_ids_of_dataset(session, dataset_id, kinds, OPEN)
 
     def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """See ``Jobs``."""
-        self._request_end(session, ids)
+        self._request_cancellation(session, ids)
 
     def signal_cancel(self, ids: Collection[int]) -> None:
         """See ``Jobs``."""
@@ -145,7 +145,7 @@ class SharedJobs(Jobs):
         """See ``Jobs``."""
         self.cancel_kind(dataset_id)
         until = time.monotonic() + CLOSE_SECONDS
-        while left := self._running_of(dataset_id):
+        while left := self._list_running_job_ids(dataset_id):
             if time.monotonic() > until:
                 raise ConflictError(
                     f"job {left[0]} of this dataset did not stop in time", hint=WAIT_FOR_JOB
@@ -161,15 +161,15 @@ class SharedJobs(Jobs):
 
     def is_open(self, job_id: int, kind: str) -> bool:
         """See ``Jobs``; asks the database."""
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             job = read_job(session, job_id)
         return job is not None and job.kind == kind and job.state in OPEN
 
-    def _running_of(self, dataset_id: int) -> list[int]:
-        with self._store.read_one() as session:
+    def _list_running_job_ids(self, dataset_id: int) -> list[int]:
+        with self._store.read_for_one_statement() as session:
             return list_job_ids_of_dataset(session, dataset_id, (), (RUNNING,))
 
-    def _request_end(self, session: Session, ids: Collection[int]) -> None:
+    def _request_cancellation(self, session: Session, ids: Collection[int]) -> None:
         """End what waits, and let what runs see that it shall end."""
         for number in ids:
             job = read_job(session, number)
@@ -181,8 +181,8 @@ class SharedJobs(Jobs):
 
     # What a row says is told to all, and heard from all.
 
-    def _announce(self, job: Job) -> None:
-        super()._announce(job)
+    def _announce_job_change(self, job: Job) -> None:
+        super()._announce_job_change(job)
         self._apply_job_row(job)
         try:
             self._store.publish(f"{_WORD} {job.id}")
@@ -195,10 +195,10 @@ class SharedJobs(Jobs):
         kind, _, number = word.partition(" ")
         if kind != _WORD:
             return
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             job = read_job(session, int(number))
         if job is not None:
-            super()._announce(job)
+            super()._announce_job_change(job)
             self._apply_job_row(job)
 
     def _apply_job_row(self, job: Job) -> None:
@@ -214,17 +214,17 @@ class SharedJobs(Jobs):
             self._look.wait(LOOK_SECONDS)
             self._look.clear()
             if not self._ended.is_set():
-                self._lead_or_log_failure()
+                self._try_to_lead()
 
-    def _lead_or_log_failure(self) -> None:
+    def _try_to_lead(self) -> None:
         try:
-            self._lead_and_start_waiting()
+            self._claim_leadership()
         except ReviewError as error:
             log.warning("jobs could not be looked after", error=error.message)
         except Exception:
             log.exception("jobs could not be looked after")
 
-    def _lead_and_start_waiting(self) -> None:
+    def _claim_leadership(self) -> None:
         sharing = self._store.sharing
         if self._lost is None:
             if not sharing.claim(CLAIM):
@@ -257,15 +257,15 @@ class SharedJobs(Jobs):
         """Settle what a process that died was at; what waits is begun as its turn comes."""
         with self._store.write() as session:
             for kind, keep in KEPT.items():
-                trim_jobs(session, kind, keep)
+                delete_oldest_jobs(session, kind, keep)
             for job in read_jobs(session, states=(RUNNING,), limit=MOST):
                 ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
                 update_job(
-                    session, job.id, **(ended if job.ending else self._recovered_columns(job))
+                    session, job.id, **(ended if job.ending else self._build_recovered_columns(job))
                 )
 
     def _enqueue_waiting_jobs(self) -> None:
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._apply_cancellation(job)
@@ -309,7 +309,7 @@ class SharedJobs(Jobs):
                 return job.id
         return None
 
-    def _actors_of_waiting_jobs(self, session: Session) -> list[str]:
+    def _list_actors_of_waiting_jobs(self, session: Session) -> list[str]:
         """See ``Jobs``."""
         return [job.actor for job in read_jobs(session, states=(WAITING,), limit=MOST)]
 
@@ -320,8 +320,8 @@ class SharedJobs(Jobs):
             if job is None or job.state != WAITING or not (self._alone or self.is_leader()):
                 return False
             update_job(session, run.job.id, state=RUNNING, started=now(), begun=1)
-            job = need_job(session, run.job.id)
-        self._announce(job)
+            job = require_job(session, run.job.id)
+        self._announce_job_change(job)
         return True
 
     def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:

@@ -12,7 +12,7 @@ from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
 from app.features.maintenance.service import LONGEST, Banner, clear_banner, set_banner
 from app.features.queue.changes import read_position
 from app.http.deps import Actor, AppStore
-from app.http.metrics import SharedNumbers
+from app.http.metrics import SharedProcessMetrics
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
 from app.http.request_limits import limit
@@ -118,7 +118,7 @@ def get_readiness(store: AppStore) -> Readiness:
 @limit(None)
 def get_metrics(request: Request) -> Response:
     """Requests, request limits, event streams, processes, jobs, files and room, in Prometheus' text format."""
-    shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)
+    shared: SharedProcessMetrics | None = getattr(request.app.state, "shared_metrics", None)
     if shared is not None:
         shared.refresh()
     registry: CollectorRegistry = request.app.state.answered_metrics

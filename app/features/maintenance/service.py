@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 from app.config import Settings, is_local
 from app.db.json_columns import parse_json_column
-from app.db.session import now, text_of
+from app.db.session import format_utc_time, now
 from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.service import add_audit_event
@@ -66,7 +66,7 @@ def set_banner(
             "the notice would never be shown: `until` must be later than now and than the start",
             pointer="/until",
         )
-    begin, end = (None if time is None else text_of(time) for time in (starts, until))
+    begin, end = (None if time is None else format_utc_time(time) for time in (starts, until))
     banner = Banner(text, begin, end)
     with store.write() as session:
         write_team_setting(session, _BANNER, json_text(asdict(banner)))

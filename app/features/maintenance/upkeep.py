@@ -14,18 +14,18 @@ import structlog
 
 from app.config import Settings
 from app.db.home import delete_leftovers
-from app.db.idempotency import delete_old_responses, shorten_responses
+from app.db.idempotency import delete_old_responses, delete_oldest_response_bodies
 from app.db.log import find_newest_entry_id
 from app.db.recovery.anchor import sync_anchor
-from app.db.recovery.preopen_check import log_file
-from app.db.session import text_of
+from app.db.recovery.preopen_check import find_write_ahead_log_file
+from app.db.session import format_utc_time
 from app.db.store import Store
 from app.errors import ReviewError
 from app.features.datasets.queries import delete_expired_cache_entries
 from app.features.datasets.service import delete_unused_calibrations
 from app.features.exports.jobs import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
-from app.features.jobs.queries import count_jobs, forget_jobs
+from app.features.jobs.queries import count_jobs, delete_old_jobs
 from app.features.jobs.service import Jobs
 from app.features.queue.queries import count_groups_to_solve
 from app.features.webhooks.queries import forget_deliveries, has_old_deliveries
@@ -69,15 +69,17 @@ def clean_up(store: Store, wanted: Callable[[], bool] = lambda: True) -> Cleanup
     """
     settings = store.settings
     steps: dict[str, Callable[[], int]] = {
-        "answers": lambda: _shorten_responses(store),
-        "jobs": lambda: _forget_jobs(store),
+        "answers": lambda: _delete_excess_responses(store),
+        "jobs": lambda: _delete_old_jobs(store),
         "uploads": lambda: expire_uploads(settings),
         "cached": lambda: delete_expired_cache_entries(settings),
         "leftovers": lambda: delete_leftovers(settings),
-        "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
-        "expired_exports": lambda: ExportFolder(settings.exports).expire(settings.export_days),
+        "exports": lambda: ExportFolder(settings.exports).delete_unfinished_zips(),
+        "expired_exports": lambda: ExportFolder(settings.exports).delete_expired_zips(
+            settings.export_days
+        ),
         "calibrations": lambda: delete_unused_calibrations(store, wanted),
-        "deliveries": lambda: forget_old_deliveries(store),
+        "deliveries": lambda: delete_old_deliveries(store),
     }
     gone = {name: _run_step(name, step) or 0 for name, step in steps.items() if wanted()}
     _run_step("anchor", lambda: sync_anchor(settings.database_file))
@@ -95,24 +97,24 @@ def _run_step(name: str, step: Callable[[], T]) -> T | None:
     return None
 
 
-def _shorten_responses(store: Store) -> int:
+def _delete_excess_responses(store: Store) -> int:
     with store.write() as session:
         deleted = delete_old_responses(session)
-        return deleted + shorten_responses(session, store.settings.answer_bytes)
+        return deleted + delete_oldest_response_bodies(session, store.settings.answer_bytes)
 
 
-def _forget_jobs(store: Store) -> int:
+def _delete_old_jobs(store: Store) -> int:
     with store.write() as session:
-        return forget_jobs(session, store.settings.job_days)
+        return delete_old_jobs(session, store.settings.job_days)
 
 
-def forget_old_deliveries(store: Store, at: datetime | None = None) -> int:
+def delete_old_deliveries(store: Store, at: datetime | None = None) -> int:
     """Forget what webhooks were told long before a time (None: now); returns how many messages.
 
     Nothing is written where there is none.
     """
     before = (at or datetime.now(UTC)) - DELIVERIES_KEPT
-    text = text_of(before)
+    text = format_utc_time(before)
     with store.read() as session:
         if not has_old_deliveries(session, text):
             return 0
@@ -120,7 +122,7 @@ def forget_old_deliveries(store: Store, at: datetime | None = None) -> int:
         return forget_deliveries(session, text)
 
 
-class Upkeep:
+class UpkeepScheduler:
     """Tidies from time to time, on a thread of its own, while no job is under way."""
 
     def __init__(self, store: Store, jobs: Jobs):
@@ -131,7 +133,7 @@ class Upkeep:
 
     def start(self) -> None:
         """Begin, some time after the start."""
-        self._thread = threading.Thread(target=self._work, name="upkeep", daemon=True)
+        self._thread = threading.Thread(target=self._run_until_stopped, name="upkeep", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -144,24 +146,24 @@ class Upkeep:
         if self._thread is not None:
             self._thread.join(seconds)
 
-    def _work(self) -> None:
+    def _run_until_stopped(self) -> None:
         wait = FIRST_SECONDS
         while not self._closing.wait(wait):
             wait = BUSY_SECONDS
-            if self._jobs.is_leader() and self._jobs.are_idle():
+            if self._jobs.is_leader() and self._jobs.is_idle():
                 self.round()
                 wait = BETWEEN_SECONDS
 
     def round(self) -> None:
         """Tidy once, and look at the whole database once in a while."""
         self._rounds += 1
-        tidied = clean_up(self._store, self._is_wanted)
+        tidied = clean_up(self._store, self._may_continue)
         if tidied != CleanupCounts():
             log.info("tidied", **vars(tidied))
         if self._rounds % ROUNDS_BETWEEN_CHECKS == 1:
-            _run_step("check", lambda: self._store.require_whole(self._is_wanted))
+            _run_step("check", lambda: self._store.require_intact_database(self._may_continue))
 
-    def _is_wanted(self) -> bool:
+    def _may_continue(self) -> bool:
         return not self._closing.is_set()
 
 
@@ -196,7 +198,7 @@ class HomeReport:
         return max(0.0, waits.total_seconds())
 
 
-def read_home(store: Store) -> HomeReport:
+def read_home_report(store: Store) -> HomeReport:
     """The home of this moment, read in one short transaction.
 
     Raises:
@@ -215,7 +217,7 @@ def read_home(store: Store) -> HomeReport:
 def read_database_file_sizes(settings: Settings) -> dict[str, int]:
     """Bytes of the database and of its write-ahead log, where they are."""
     database, sizes = settings.database_file, {}
-    for name, path in {"database": database, "wal": log_file(database)}.items():
+    for name, path in {"database": database, "wal": find_write_ahead_log_file(database)}.items():
         # SQLite deletes its log when the last connection is closed.
         with suppress(FileNotFoundError):
             sizes[name] = path.stat().st_size

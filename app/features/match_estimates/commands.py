@@ -113,14 +113,14 @@ def _print_pitches(found: DatasetPitches, match: str | None, json_: bool) -> Non
     for item in items:
         values = pitch_state_to_json(item)
         size = f"{item.pitch.length:g} x {item.pitch.width:g} m"
-        shown = f"length {_metres_with_sigma(values, 'length')}, width {_metres_with_sigma(values, 'width')}"
+        shown = f"length {_format_metres_with_sigma(values, 'length')}, width {_format_metres_with_sigma(values, 'width')}"
         proposed = item.proposed
         advice = "" if proposed is None else f"; use {proposed.length:g} x {proposed.width:g} m"
         name = item.match or "groups without a match"
         say(f"{name}: {size}; lines show {item.problem or shown}{advice}")
 
 
-def _metres_with_sigma(values: dict[str, Any], name: str) -> str:
+def _format_metres_with_sigma(values: dict[str, Any], name: str) -> str:
     found = (values["estimate"] or {}).get(name)
     if found is None:
         return "unknown"
@@ -177,10 +177,10 @@ def picture(
         raise typer.BadParameter("--accept and --as-taken contradict each other")
     if as_taken and match is None:
         raise typer.BadParameter("--as-taken needs --match")
-    _pictures_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
+    _estimate_pictures_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
 
 
-def _pictures_of_dataset(
+def _estimate_pictures_of_dataset(
     dataset: str,
     match: str | None,
     accept: bool,
@@ -188,37 +188,39 @@ def _pictures_of_dataset(
     workers: int | None,
     json_: bool,
 ) -> None:
-    from app.features.datasets.service import need_match
+    from app.features.datasets.service import filter_by_existing_match
     from app.features.match_estimates.pictures import (
-        change_pictures,
-        choose_requested_pictures,
-        estimate_pictures,
+        choose_requested_geometries,
+        estimate_picture_geometries,
+        set_picture_geometries,
     )
 
     with open_store_to_solve("Estimating", workers) as (store, executor, progress):
-        found = estimate_pictures(store, dataset, executor, progress)
-        chosen = need_match(found, match, dataset)
-        wanted = choose_requested_pictures(chosen, accept=accept, as_taken=as_taken)
+        found = estimate_picture_geometries(store, dataset, executor, progress)
+        chosen = filter_by_existing_match(found, match, dataset)
+        wanted = choose_requested_geometries(chosen, accept=accept, as_taken=as_taken)
         changed = 0
         if wanted:
             with store.write() as session:
-                changed = change_pictures(session, dataset, wanted, actor=get_current_actor())
+                changed = set_picture_geometries(
+                    session, dataset, wanted, actor=get_current_actor()
+                )
     if json_:
-        print_json([{**_picture_values(item), "changed": item.match in wanted} for item in chosen])
+        print_json([{**_picture_to_json(item), "changed": item.match in wanted} for item in chosen])
         return
     for item in chosen:
-        say(f"{item.match}: {_picture_sentence(item)}")
+        say(f"{item.match}: {_describe_picture(item)}")
     if wanted:
         say(f"{plural(changed, 'view')} changed; run touchline solve --dataset {dataset}")
 
 
-def _picture_sentence(state: PictureState) -> str:
+def _describe_picture(state: PictureState) -> str:
     if state.estimate is None:
         return state.sentence
     return f"{state.sentence}; {'use it with --accept' if state.proposed else 'nothing to change'}"
 
 
-def _picture_values(state: PictureState) -> dict[str, Any]:
+def _picture_to_json(state: PictureState) -> dict[str, Any]:
     from dataclasses import asdict
 
     values = asdict(state)
@@ -260,7 +262,7 @@ def positions(
     from app.features.match_estimates.positions import (
         get_positions,
         share_positions,
-        take_back_positions,
+        undo_position_sharing,
     )
 
     if share and undo:
@@ -282,7 +284,7 @@ def positions(
         with open_store() as store:
             if undo:
                 with store.write() as session:
-                    take_back_positions(session, dataset, match, actor=get_current_actor())
+                    undo_position_sharing(session, dataset, match, actor=get_current_actor())
             found = get_positions(store, dataset)
     print_sentences(filter_by_match(found.items, match), json_)
 
@@ -304,14 +306,14 @@ def noise(
     json_: Json = False,
 ) -> None:
     """Estimate how noisy a dataset's balls and lines are, from what its views disagree about."""
-    from app.features.policies.noise import apply_noise, read_noise, take_noise_back
+    from app.features.policies.noise import apply_noise, read_noise, reset_noise_factors
 
     if apply and alike:
         raise typer.BadParameter("--apply and --alike contradict each other")
     with open_store() as store:
         if alike:
             with store.write() as session:
-                take_noise_back(session, dataset, actor=get_current_actor())
+                reset_noise_factors(session, dataset, actor=get_current_actor())
         found = read_noise(store, dataset)
         policy = apply_noise(store, found, actor=get_current_actor()).policy if apply else None
     if json_:
@@ -386,7 +388,7 @@ def rig(
         accept_rig,
         propose_adjustment,
         rig_proposal_to_json,
-        take_back,
+        undo_accepted_rig,
     )
 
     if undo and accept is not None:
@@ -394,7 +396,7 @@ def rig(
     with open_store() as store:
         if undo:
             print_values(
-                {"taken_back": take_back(store, dataset, actor=get_current_actor())}, json_
+                {"taken_back": undo_accepted_rig(store, dataset, actor=get_current_actor())}, json_
             )
             return
         proposed = propose_adjustment(store, dataset, lines)
@@ -410,7 +412,7 @@ def rig(
 def _print_cameras(values: dict[str, Any]) -> None:
     say("camera    moved m  turned deg  focal %  picture px  sigma m  sigma px  lines px")
     for item in values["cameras"]:
-        lines = _change_text(item["lines_before_px"], item["lines_after_px"])
+        lines = _format_change(item["lines_before_px"], item["lines_after_px"])
         say(
             f"{item['key']:9} {item['moved_m']:7.2f} {item['turned_degrees']:11.3f} "
             f"{item['focal_percent']:8.2f} {item['picture_px']:11.1f} "
@@ -418,11 +420,11 @@ def _print_cameras(values: dict[str, Any]) -> None:
         )
     say("pair            frames  gap px          held out  gap px          2nd ahead, frames")
     for item in values["pairs"]:
-        gap = _change_text(item["before_px"], item["after_px"])
-        unseen = _change_text(item["held_out_before_px"], item["held_out_after_px"])
+        gap = _format_change(item["before_px"], item["after_px"])
+        unseen = _format_change(item["held_out_before_px"], item["held_out_after_px"])
         say(
             f"{item['a'] + ' ' + item['b']:15} {item['frames']:6}  {gap:14} "
-            f"{item['held_out']:9}  {unseen:14}  {_offset_text(item)}"
+            f"{item['held_out']:9}  {unseen:14}  {_format_offset(item)}"
         )
     say(
         f"{values['frames']} instants, {values['gross']} left out; balls move "
@@ -435,11 +437,11 @@ def _print_cameras(values: dict[str, Any]) -> None:
     say(_ENDS[values["accepted"]])
 
 
-def _change_text(before: float | None, after: float | None) -> str:
+def _format_change(before: float | None, after: float | None) -> str:
     return "" if before is None or after is None else f"{before:.1f} -> {after:.1f}"
 
 
-def _offset_text(item: dict[str, Any]) -> str:
+def _format_offset(item: dict[str, Any]) -> str:
     if item["offset_frames"] is None:
         return ""
     return f"{item['offset_frames']:+.3f} +- {item['offset_sigma_frames']:.3f}"

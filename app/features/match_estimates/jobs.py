@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
@@ -19,31 +19,31 @@ from app.features.datasets.service import (
     DatasetHead,
     dataset_id,
     get_dataset_head,
-    require_matches,
+    require_dataset_with_matches,
 )
 from app.features.jobs.queries import Job
-from app.features.jobs.records import need_job
+from app.features.jobs.records import require_job
 from app.features.jobs.runner import JobProgress, Work, report_counts_in_words
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.pictures import estimate_pictures
+from app.features.match_estimates.pictures import estimate_picture_geometries
 from app.features.match_estimates.positions import (
-    require_sharable,
+    require_shareable_positions,
     share_positions,
-    take_back_positions,
+    undo_position_sharing,
 )
 from app.features.match_estimates.rig import (
     accept_rig,
     propose_adjustment,
-    require_adjustable,
+    require_adjustable_cameras,
     rig_proposal_to_json,
-    take_back,
+    undo_accepted_rig,
 )
-from app.features.solve.jobs import change_and_solve, request_solve
+from app.features.solve.jobs import change_and_return_job, request_solve_job
 from app.soccer.codec import picture_to_json
 
 
 @dataclass(frozen=True)
-class MatchCall:
+class MatchJobContext:
     """What one job was asked for.
 
     Attributes:
@@ -69,20 +69,22 @@ class MatchCall:
 
     def solve(self) -> None:
         """Solve what it leaves stale, soon."""
-        request_solve(self.jobs, self.store, self.dataset_id, actor=self.job.actor)
+        request_solve_job(self.jobs, self.store, self.dataset_id, actor=self.job.actor)
 
 
-def with_matches(store: Store, dataset: str | int, matches: Collection[str] | None) -> DatasetHead:
+def get_dataset_with_matches(
+    store: Store, dataset: str | int, matches: Collection[str] | None
+) -> DatasetHead:
     """The dataset that has all of these matches.
 
     Raises:
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        return require_matches(session, dataset, matches)
+        return require_dataset_with_matches(session, dataset, matches)
 
 
-class TakeBack(Protocol):
+class UndoCallback(Protocol):
     """Takes back what jobs of a kind gave last.
 
     Args:
@@ -122,11 +124,11 @@ class MatchJob:
 
     kind: str
     title: str
-    work: Callable[[MatchCall, JobProgress], Json]
+    work: Callable[[MatchJobContext, JobProgress], Json]
     require: Callable[[Store, str | int, Collection[str] | None], Dataset | DatasetHead] = (
-        with_matches
+        get_dataset_with_matches
     )
-    undo: TakeBack | None = None
+    undo: UndoCallback | None = None
     has_runs: bool = False
     resumes: bool = True
 
@@ -150,19 +152,19 @@ class MatchJob:
         return jobs.submit(
             self.kind,
             self.title.format(found.name),
-            self._work(jobs, store),
+            self._make_work(jobs, store),
             dataset_id=found.id,
             actor=actor,
             request=request,
         )
 
-    def take_up(self, jobs: Jobs, store: Store) -> None:
+    def register_with_jobs(self, jobs: Jobs, store: Store) -> None:
         """Let another process carry out what this one is asked for, or the next one go on with it."""
         (jobs.register_resume if self.resumes else jobs.register_work)(
-            self.kind, self._work(jobs, store)
+            self.kind, self._make_work(jobs, store)
         )
 
-    def take_back(
+    def undo_last_job(
         self, jobs: Jobs, store: Store, dataset: str | int, match: str | None = None, *, actor: str
     ) -> Job:
         """Take back what such jobs gave, end those at it, and solve what that leaves stale, soon:
@@ -175,8 +177,10 @@ class MatchJob:
         assert undo is not None
         ended: list[int] = []
 
-        def change(session: Session) -> None:
-            present = [need_job(session, other) for other in jobs.ids_of(number, self.kind)]
+        def undo_in_session(session: Session) -> None:
+            present = [
+                require_job(session, other) for other in jobs.list_open_job_ids(number, self.kind)
+            ]
             wanted = (None, match)
             stopped = [job for job in present if match is None or job.request["match"] in wanted]
             undo(session, number, match, actor=actor, stopped=stopped)
@@ -184,18 +188,20 @@ class MatchJob:
             # Whoever is at it waits for this transaction, and asks in the next whether to go on.
             jobs.cancel_on_commit(session, ended)
 
-        job = change_and_solve(jobs, store, number, change, actor=actor)
+        job = change_and_return_job(jobs, store, number, undo_in_session, actor=actor)
         jobs.cancel_each(ended)
         return job
 
-    def _work(self, jobs: Jobs, store: Store) -> Work:
-        return lambda progress: self.work(MatchCall(jobs, store, progress.job), progress)
+    def _make_work(self, jobs: Jobs, store: Store) -> Work:
+        return lambda progress: self.work(MatchJobContext(jobs, store, progress.job), progress)
 
 
-def _estimate_pictures(call: MatchCall, progress: JobProgress) -> Json:
+def _estimate_pictures(call: MatchJobContext, progress: JobProgress) -> Json:
     with call.jobs.pool() as executor:
         counter = report_counts_in_words(progress, "matches")
-        found = estimate_pictures(call.store, call.dataset_id, executor, counter, call.matches)
+        found = estimate_picture_geometries(
+            call.store, call.dataset_id, executor, counter, call.matches
+        )
     return {
         "items": [
             {
@@ -215,7 +221,7 @@ def _estimate_pictures(call: MatchCall, progress: JobProgress) -> Json:
 PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate_pictures)
 
 
-def _share_positions(call: MatchCall, progress: JobProgress) -> Json:
+def _share_positions(call: MatchJobContext, progress: JobProgress) -> Json:
     try:
         with call.jobs.pool() as executor:
             found = share_positions(
@@ -238,14 +244,14 @@ POSITIONS = MatchJob(
     "positions",
     "Share the main cameras' positions of {}",
     _share_positions,
-    require_sharable,
-    take_back_positions,
+    require_shareable_positions,
+    undo_position_sharing,
     resumes=False,
 )
 
 
-def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
-    """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept_rig`` takes it (none:
+def _adjust_rig(call: MatchJobContext, progress: JobProgress) -> Json:
+    """The proposal and what of it was saved; ``classify_entry`` is asked for as ``rig.accept_rig`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
     what, inputs = call.job.request["what"], call.job.request["inputs"]
     progress(0, None, "Adjusting cameras to lines and balls.")
@@ -263,17 +269,19 @@ def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
     return {**rig_proposal_to_json(proposed), "accepted": what}
 
 
-RIG = MatchJob("rig", "Adjust the cameras of {}", _adjust_rig, require_adjustable, resumes=False)
+RIG = MatchJob(
+    "rig", "Adjust the cameras of {}", _adjust_rig, require_adjustable_cameras, resumes=False
+)
 
 
-def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
+def undo_rig_adjustment(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
     """Take an accepted rig back, and solve its dataset, soon; returns the number of cameras.
 
     Raises:
         ConflictError: There is nothing to take back.
     """
     found = get_dataset_head(store, dataset)
-    count = take_back(store, found.id, actor=actor)
-    with without_response():
-        request_solve(jobs, store, found.id, actor=actor)
+    count = undo_accepted_rig(store, found.id, actor=actor)
+    with without_pending_response():
+        request_solve_job(jobs, store, found.id, actor=actor)
     return count

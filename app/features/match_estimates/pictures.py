@@ -15,12 +15,16 @@ from dataclasses import dataclass
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import GeometryError
-from app.features.datasets.service import need_dataset, read_dataset_head, require_matches
+from app.features.datasets.service import (
+    read_dataset_head,
+    require_dataset_id,
+    require_dataset_with_matches,
+)
 from app.features.groups.edit import SetPicture
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.match_estimates.queries import MatchPictures, match_pictures
-from app.features.pitches.queries import list_groups_of_match, match_pitches
+from app.features.match_estimates.queries import MatchPictures, read_match_pictures
+from app.features.pitches.queries import list_groups_of_match, read_match_pitches
 from app.progress import ReportProgress
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
@@ -69,24 +73,24 @@ class PictureState:
 
 
 @dataclass(frozen=True)
-class _PictureTask:
+class _PictureGeometryTask:
     match: str
     frames: tuple[PictureFrame, ...]
     used: tuple[PictureGeometry | None, ...]
     policy: CalibrationPolicy
 
 
-def read_pictures(store: Store, dataset: str | int) -> list[MatchPictures]:
+def read_picture_geometries(store: Store, dataset: str | int) -> list[MatchPictures]:
     """What main cameras' pictures of a dataset's matches are taken to be.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return match_pictures(session, need_dataset(session, dataset))
+        return read_match_pictures(session, require_dataset_id(session, dataset))
 
 
-def estimate_pictures(
+def estimate_picture_geometries(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
@@ -107,18 +111,18 @@ def estimate_pictures(
     """
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        names = (item.match for item in match_pitches(session, found.id) if item.match)
+        names = (item.match for item in read_match_pitches(session, found.id) if item.match)
         matches = [match for match in names if only is None or match in only]
     tasks = (_make_task(store, found.id, match, found.policy.calibration) for match in matches)
     states = []
-    for state in run_tasks(_estimate_match, tasks, executor):
+    for state in run_tasks(_run_picture_task, tasks, executor):
         states.append(state)
         if progress is not None:
             progress(len(states), len(matches))
     return sorted(states, key=lambda state: state.match)
 
 
-def choose_requested_pictures(
+def choose_requested_geometries(
     chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
     """What somebody wants the pictures of matches to be, by match.
@@ -133,7 +137,7 @@ def choose_requested_pictures(
     return {item.match: item.proposed for item in chosen if accept and item.proposed}
 
 
-def change_pictures(
+def set_picture_geometries(
     session: Session,
     dataset: str | int,
     wanted: Mapping[str, PictureGeometry | None],
@@ -153,34 +157,34 @@ def change_pictures(
     Raises:
         NotFoundError: There is no such dataset or match.
     """
-    found = require_matches(session, dataset, [*wanted])
+    found = require_dataset_with_matches(session, dataset, [*wanted])
     return sum(
-        _give_picture(
+        _set_picture_of_groups(
             session, found.id, list_groups_of_match(session, found.id, match), picture, actor
         )
         for match, picture in wanted.items()
     )
 
 
-def _give_picture(
+def _set_picture_of_groups(
     session: Session,
     dataset_id: int,
     ids: Sequence[int],
     picture: PictureGeometry | None,
     actor: str,
 ) -> int:
-    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPicture]:
-        views = {number: _main_view(stored.group) for number, stored in some.items()}
+    def make_picture_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPicture]:
+        views = {number: _find_main_camera_view(stored.group) for number, stored in some.items()}
         return {
             number: SetPicture(view.key, picture)
             for number, view in views.items()
             if view is not None
         }
 
-    return edit_groups(session, dataset_id, "edit", ids, edits, actor=actor)
+    return edit_groups(session, dataset_id, "edit", ids, make_picture_edits, actor=actor)
 
 
-def _main_view(group: Group) -> View | None:
+def _find_main_camera_view(group: Group) -> View | None:
     """The main camera's view, the first; None where it is static, given or without lines."""
     view = next(iter(group.views), None)
     if view is None or view.station.shared or not view.station.lines:
@@ -191,24 +195,28 @@ def _main_view(group: Group) -> View | None:
 
 def _make_task(
     store: Store, dataset_id: int, match: str, policy: CalibrationPolicy
-) -> _PictureTask:
-    seen = list(_main_views(store, dataset_id, match))
+) -> _PictureGeometryTask:
+    seen = list(_iterate_main_camera_views(store, dataset_id, match))
     frames = tuple(PictureFrame(view.station.lines, view.size, at.pitch) for at, view in seen)
-    return _PictureTask(match, frames, tuple(view.station.picture for _, view in seen), policy)
+    return _PictureGeometryTask(
+        match, frames, tuple(view.station.picture for _, view in seen), policy
+    )
 
 
-def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Group, View]]:
+def _iterate_main_camera_views(
+    store: Store, dataset_id: int, match: str
+) -> Iterator[tuple[Group, View]]:
     with store.read() as session:
         ids = list_groups_of_match(session, dataset_id, match)
         for start in range(0, len(ids), _BATCH):
             batch = read_groups(session, ids[start : start + _BATCH], extras=False)
             for stored in batch.values():
-                view = _main_view(stored.group)
+                view = _find_main_camera_view(stored.group)
                 if view is not None:
                     yield stored.group, view
 
 
-def _estimate_match(task: _PictureTask) -> PictureState:
+def _run_picture_task(task: _PictureGeometryTask) -> PictureState:
     """Of one match; runs in a worker."""
     used = max(set(task.used), key=task.used.count) if task.used else None
     try:

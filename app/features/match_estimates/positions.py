@@ -26,13 +26,13 @@ from app.features.jobs.queries import Job
 from app.features.match_estimates.queries import (
     POSITION,
     MatchPositions,
-    find_last_share,
-    match_positions,
+    find_last_position_sharing,
+    read_match_positions,
     read_position_inputs,
 )
 from app.features.solutions.queries import read_calibrations
 from app.progress import ReportProgress
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.soccer.group import Group, SharedPosition, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -139,25 +139,27 @@ def share_positions(
         ConflictError: The dataset's policy does not use shared positions.
         NotFoundError: There is no such dataset or match.
     """
-    found = require_sharable(store, dataset, matches)
+    found = require_shareable_positions(store, dataset, matches)
     policy = found.policy.calibration
     with store.read() as session:
-        chosen = _matches_with_inputs(session, found, matches)
+        chosen = _list_matches_to_share(session, found, matches)
     tasks = (_make_task(store, item, policy) for item in chosen)
-    for done, (task, positions) in enumerate(run_tasks(_estimate_match, tasks, executor), start=1):
+    for done, (task, positions) in enumerate(
+        run_tasks(_run_position_task, tasks, executor), start=1
+    ):
         edits = {group: SetPositions(at) for group, at in positions.items()}
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
             then = read_position_inputs(session, found.id, task.match).get(task.match)
             body = {"match": task.match, "inputs": task.inputs, "before": then}
-            _give_positions(session, found.id, edits, actor, body)
+            _save_position_edits(session, found.id, edits, actor, body)
         if progress is not None:
             progress(done, len(chosen))
     return get_positions(store, found.id)
 
 
-def require_sharable(
+def require_shareable_positions(
     store: Store, dataset: str | int, matches: Collection[str] | None = None
 ) -> DatasetHead:
     """The dataset, unless nothing would use what is shared.
@@ -168,7 +170,7 @@ def require_sharable(
     """
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        _matches_with_inputs(session, found, matches)
+        _list_matches_to_share(session, found, matches)
     if not found.policy.calibration.share_position:
         raise ConflictError(
             f'the policy of "{found.name}" does not use a camera position that frames of a match share',
@@ -177,7 +179,7 @@ def require_sharable(
     return found
 
 
-def take_back_positions(
+def undo_position_sharing(
     session: Session,
     dataset: str | int,
     match: str | None,
@@ -203,8 +205,8 @@ def take_back_positions(
     """
     match = match or ""
     found = read_dataset_head(session, dataset)
-    _matches_with_inputs(session, found, [match])
-    entries = find_last_share(session, found.id, match)
+    _list_matches_to_share(session, found, [match])
+    entries = find_last_position_sharing(session, found.id, match)
     if stopped and not any(
         job.started and entries and job.started <= entries[0].at for job in stopped
     ):
@@ -222,10 +224,10 @@ def take_back_positions(
         "before": share.body["inputs"],
         "takes_back": share.at,
     }
-    _give_positions(session, found.id, edits, actor, body)
+    _save_position_edits(session, found.id, edits, actor, body)
 
 
-def _give_positions(
+def _save_position_edits(
     session: Session, dataset_id: int, edits: Mapping[int, Edit], actor: str, body: dict[str, Any]
 ) -> None:
     """One entry for each group that changes, and for the first in any case: it says from what.
@@ -234,14 +236,14 @@ def _give_positions(
     """
     ids = sorted(edits)
 
-    def of_match(some: Mapping[int, StoredGroup]) -> dict[int, Edit]:
+    def select_edits_of_match(some: Mapping[int, StoredGroup]) -> dict[int, Edit]:
         return {
             number: edits[number]
             for number, stored in some.items()
             if stored.group.match == body["match"]
         }
 
-    where = (session, dataset_id, POSITION, ids, of_match)
+    where = (session, dataset_id, POSITION, ids, select_edits_of_match)
     edit_groups(*where, actor=actor, body=body, always_logged=ids[0] if ids else None)
 
 
@@ -249,14 +251,14 @@ def _read_positions(session: Session, dataset: str | int) -> DatasetPositions:
     found = read_dataset_head(session, dataset)
     policy, then = found.policy.calibration, read_position_inputs(session, found.id)
     items = tuple(
-        _position_state(item, then.get(item.match), policy)
-        for item in match_positions(session, found.id)
+        _make_position_state(item, then.get(item.match), policy)
+        for item in read_match_positions(session, found.id)
         if item.views
     )
     return DatasetPositions(found.id, found.name, policy.share_position, items)
 
 
-def _position_state(
+def _make_position_state(
     item: MatchPositions, then: str | None, policy: CalibrationPolicy
 ) -> PositionState:
     x = y = z = sigma = 0.0
@@ -273,10 +275,10 @@ def _position_state(
         current=None if then is None else then == _inputs_digest(item, policy),
         used=policy.share_position,
     )
-    return replace(found, sentence=_state_sentence(found))
+    return replace(found, sentence=_describe_state(found))
 
 
-def _state_sentence(state: PositionState) -> str:
+def _describe_state(state: PositionState) -> str:
     if state.current is None:
         return f"none of {state.views} pictures of the main camera uses a shared position"
     verb = "use" if state.used else "keep"
@@ -296,15 +298,15 @@ def _inputs_digest(item: MatchPositions, policy: CalibrationPolicy) -> str:
     # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
     values = asdict(replace(policy, share_position=True))
     del values["source"]
-    return digest([SOLVER_VERSION, values, item.inputs])
+    return digest_json([SOLVER_VERSION, values, item.inputs])
 
 
-def _matches_with_inputs(
+def _list_matches_to_share(
     session: Session, dataset: DatasetHead, matches: Collection[str] | None
 ) -> list[tuple[MatchPositions, str]]:
     """Matches to share in, each with the key of what it will be shared from."""
     policy = dataset.policy.calibration
-    known = {item.match: item for item in match_positions(session, dataset.id) if item.views}
+    known = {item.match: item for item in read_match_positions(session, dataset.id) if item.views}
     for match in matches or ():
         if match not in known:
             raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
@@ -329,22 +331,22 @@ def _make_task(
             }
             known = read_calibrations(session, keys.values())
             pictures += (
-                _main_picture(number, it.group, known.get(keys[number]))
+                _make_main_picture(number, it.group, known.get(keys[number]))
                 for number, it in stored.items()
             )
     return _PositionTask(item.match, inputs, tuple(pictures), policy)
 
 
-def _main_picture(group_id: int, group: Group, alone: Calibration | None) -> _MainPicture:
+def _make_main_picture(group_id: int, group: Group, alone: Calibration | None) -> _MainPicture:
     view = group.views[0]
     return _MainPicture(group_id, view.key, view.station, group.pitch, alone)
 
 
-def _estimate_match(
+def _run_position_task(
     task: _PositionTask,
 ) -> tuple[_PositionTask, dict[int, dict[str, SharedPosition]]]:
     """Positions by group and view; runs in a worker."""
-    found = list(_calibrated_alone(task))
+    found = list(_calibrate_pictures_alone(task))
     places = [place for _, _, place in found if place is not None]
     every, row = FramePlaces(places), iter(range(len(places)))
     positions: dict[int, dict[str, SharedPosition]] = {}
@@ -355,14 +357,14 @@ def _estimate_match(
         at = {}
         if near is not None:
             at[picture.view] = SharedPosition(
-                _rounded_position(near.mean), _rounded_position(near.sigma)
+                _round_position(near.mean), _round_position(near.sigma)
             )
         positions[picture.group_id] = at
     # What was read travels back no farther than it must.
     return replace(task, pictures=()), positions
 
 
-def _calibrated_alone(
+def _calibrate_pictures_alone(
     task: _PositionTask,
 ) -> Iterator[tuple[_MainPicture, Calibration | None, FramePlace | None]]:
     """Pictures, calibrated; None where solving would take no position from others."""
@@ -379,6 +381,6 @@ def _calibrated_alone(
         yield picture, alone, find_camera_place(alone, station.size)
 
 
-def _rounded_position(values: np.ndarray) -> tuple[float, float, float]:
+def _round_position(values: np.ndarray) -> tuple[float, float, float]:
     x, y, z = np.round(values, _DIGITS).tolist()
     return x, y, z

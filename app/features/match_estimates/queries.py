@@ -14,7 +14,7 @@ from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.json_text import canonical_json_text
-from app.soccer.codec import digest, picture_from_json, positions_from_json
+from app.soccer.codec import digest_json, picture_from_json, positions_from_json
 from app.soccer.group import SharedPosition
 from app.soccer.picture import PictureGeometry
 
@@ -39,14 +39,14 @@ class NoiseFactor(NamedTuple):
 Factors = tuple[NoiseFactor, ...]
 
 
-def read_factors(session: Session, dataset_id: int) -> Factors:
+def read_noise_factors(session: Session, dataset_id: int) -> Factors:
     """The factors that are accepted for a dataset; none where all balls are alike."""
-    return factors_from_text(
+    return noise_factors_from_text(
         session.scalar(select(DatasetModel.noise).where(DatasetModel.id == dataset_id))
     )
 
 
-def factors_from_text(text: str | None) -> Factors:
+def noise_factors_from_text(text: str | None) -> Factors:
     """The factors that a dataset's row holds."""
     if text is None:
         return ()
@@ -54,14 +54,14 @@ def factors_from_text(text: str | None) -> Factors:
         return tuple(NoiseFactor(*row) for row in parse_json_column(text))
 
 
-def write_factors(session: Session, dataset_id: int, factors: Factors) -> None:
+def write_noise_factors(session: Session, dataset_id: int, factors: Factors) -> None:
     """Accept factors for a dataset; its groups are the caller's to change."""
-    text = canonical_json_text(factors_to_json(factors)) if factors else None
+    text = canonical_json_text(noise_factors_to_json(factors)) if factors else None
     mine = DatasetModel.id == dataset_id
     session.execute(update(DatasetModel).where(mine).values(noise=text))
 
 
-def factors_to_json(factors: Factors) -> Json:
+def noise_factors_to_json(factors: Factors) -> Json:
     """``[[camera, person, ratio], ...]``."""
     return [list(item) for item in factors]
 
@@ -93,7 +93,7 @@ class MatchPictures:
     mixed: bool
 
 
-def match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
+def read_match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
     """Every match of a dataset whose main camera has lines, by name."""
     group, station, count = GroupModel, StationModel, func.count()
     statement = (
@@ -152,10 +152,10 @@ class MatchPositions:
     @property
     def inputs(self) -> str:
         """Digest of the parts, in whatever order they were read."""
-        return digest(sorted(self.parts))
+        return digest_json(sorted(self.parts))
 
 
-def match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
+def read_match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
     """Every match of a dataset, by name; the main camera is that of each group's first view."""
     group = GroupModel
     statement = (
@@ -180,11 +180,11 @@ def match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
         item.views += row.has_lines
         item.parts.append([row.pitch_length, row.pitch_width, row.digest])
         if row.positions is not None:
-            item.positions += read_positions(row.positions).values()
+            item.positions += parse_positions_column(row.positions).values()
     return list(found.values())
 
 
-def read_positions(text: str) -> Mapping[str, SharedPosition]:
+def parse_positions_column(text: str) -> Mapping[str, SharedPosition]:
     """The positions of a group from their column."""
     with report_damaged_values():
         return positions_from_json(parse_json_column(text))
@@ -204,7 +204,7 @@ def read_position_inputs(
         Keys by match; None for one whose first share was taken back.
     """
     rows = session.execute(
-        _share_entries_statement(
+        _select_sharing_entries(
             func.max(LogModel.id), GroupModel.match, dataset_id=dataset_id, match=match
         ).group_by(GroupModel.match)
     ).all()
@@ -212,18 +212,20 @@ def read_position_inputs(
     found: dict[str, str | None] = {}
     for number, name in rows:
         entry: LogEntry | None = newest[number]
-        if not _was_in_match(newest[number], name):
+        if not _was_group_in_match(newest[number], name):
             # Its group was given that in another match.
-            entry = next((of[0] for of in _shares_by_time(session, dataset_id, name)), None)
+            entry = next(
+                (of[0] for of in _group_sharing_entries_by_time(session, dataset_id, name)), None
+            )
         if entry is not None:
             found[name] = entry.body["inputs"]
     return found
 
 
-def find_last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
+def find_last_position_sharing(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
     """The entries of a match's newest share that was not taken back; none where there is none."""
     taken_back = set()
-    for entries in _shares_by_time(session, dataset_id, match):
+    for entries in _group_sharing_entries_by_time(session, dataset_id, match):
         first = entries[0]
         if first.at in taken_back:
             continue
@@ -235,20 +237,24 @@ def find_last_share(session: Session, dataset_id: int, match: str) -> list[LogEn
     return []
 
 
-def _shares_by_time(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEntry]]:
+def _group_sharing_entries_by_time(
+    session: Session, dataset_id: int, match: str
+) -> Iterator[list[LogEntry]]:
     """The entries that groups were given while in a match, by time, the newest first."""
-    statement = _share_entries_statement(
+    statement = _select_sharing_entries(
         LogModel.id, LogModel.at, dataset_id=dataset_id, match=match
     )
     rows = session.execute(statement.order_by(LogModel.id.desc())).all()
     for _, of_time in groupby(rows, key=lambda row: row.at):
         ids = sorted(row.id for row in of_time)
-        entries = [entry for entry in read_entries(session, ids) if _was_in_match(entry, match)]
+        entries = [
+            entry for entry in read_entries(session, ids) if _was_group_in_match(entry, match)
+        ]
         if entries:
             yield entries
 
 
-def _share_entries_statement(*columns: Any, dataset_id: int, match: str | None) -> Any:
+def _select_sharing_entries(*columns: Any, dataset_id: int, match: str | None) -> Any:
     """Columns of the entries about the groups of a match, or of all, as these are now."""
     statement = (
         select(*columns)
@@ -258,6 +264,6 @@ def _share_entries_statement(*columns: Any, dataset_id: int, match: str | None) 
     return statement if match is None else statement.where(GroupModel.match == match)
 
 
-def _was_in_match(entry: LogEntry, match: str) -> bool:
+def _was_group_in_match(entry: LogEntry, match: str) -> bool:
     """Whether the group was in the match then; the first entries did not say."""
     return bool(entry.body.get("match", match) == match)

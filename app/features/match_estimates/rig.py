@@ -12,17 +12,22 @@ from app.db.log import read_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.datasets.service import DatasetHead, need_dataset, read_dataset_head
+from app.features.datasets.service import DatasetHead, read_dataset_head, require_dataset_id
 from app.features.groups.edit import SetStationCamera
 from app.features.groups.queries import read_groups
 from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import list_station_pitches
 from app.features.imports.queries import list_known_groups, list_shared_stations
-from app.features.stations.service import StationState, load_station, submit_stations, undo_stations
+from app.features.stations.service import (
+    StationState,
+    load_station,
+    submit_station_edits,
+    undo_stations,
+)
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
-from app.soccer.codec import digest, lines_to_json
+from app.soccer.codec import digest_json, lines_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import View
 from app.soccer.pitch import Pitch
@@ -75,7 +80,7 @@ def propose_adjustment(
     """
     states, pitch, policy = load_adjustable_cameras(store, dataset)
     with store.read() as session:
-        frames = _rig_frames(session, states[0].dataset_id)
+        frames = _read_rig_frames(session, states[0].dataset_id)
     own = None if lines is None else _read_lines(lines, states)
     cameras = [
         RigCamera(
@@ -92,7 +97,7 @@ def propose_adjustment(
         proposal = propose_rig(*arguments)
     else:
         proposal = executor.submit(propose_rig, *arguments).result()
-    inputs = digest(
+    inputs = digest_json(
         [
             SOLVER_VERSION,
             PROPOSAL_VERSION,
@@ -116,7 +121,7 @@ def load_adjustable_cameras(
         ConflictError: They were adjusted already.
     """
     with store.read() as session:
-        found = read_dataset_head(session, need_dataset(session, dataset))
+        found = read_dataset_head(session, require_dataset_id(session, dataset))
         stations = [item.id for item in list_shared_stations(session, found.id)]
         pitches = {pitch for _, pitch in list_station_pitches(session, found.id)}
     states = [load_station(store, station) for station in stations]
@@ -138,7 +143,7 @@ def load_adjustable_cameras(
     return states, pitches.pop(), found.policy
 
 
-def require_adjustable(
+def require_adjustable_cameras(
     store: Store, dataset: str | int, _matches: Collection[str] | None = None
 ) -> DatasetHead:
     """The dataset, unless its cameras cannot be adjusted; raises as ``load_adjustable_cameras`` does."""
@@ -162,7 +167,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
     Raises:
         StaleRevisionError: A camera has changed since.
         ConflictError: The size of the pitch has changed since.
-        InputError: ``what`` is neither.
+        InputError: ``classify_entry`` is neither.
     """
     if what not in (CAMERAS, SIGMA):
         raise InputError('`accept` must be "cameras" or "sigma"')
@@ -177,7 +182,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
     ]
     datasets = {state.dataset_id for state in proposed.stations.values()}
 
-    def check(session: Session) -> None:
+    def require_same_pitch(session: Session) -> None:
         found = {pitch for item in datasets for _, pitch in list_station_pitches(session, item)}
         if found != {proposed.pitch}:
             raise ConflictError(
@@ -185,21 +190,22 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
                 hint="Make a new proposal, and accept that.",
             )
 
-    submit_stations(store, edits, actor=actor, check=check)
+    submit_station_edits(store, edits, actor=actor, check=require_same_pitch)
 
 
-def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
+def undo_accepted_rig(store: Store, dataset: str | int, *, actor: str) -> int:
     """Undo an accepted rig, all its cameras at once; returns how many there were.
 
     Raises:
         ConflictError: No camera's last edit is an accepted rig.
     """
     with store.read() as session:
-        found = need_dataset(session, dataset)
+        found = require_dataset_id(session, dataset)
         adjusted = [
             item.id
             for item in list_shared_stations(session, found)
-            if item.station.given_covariance is not None and _was_adjusted_last(session, item.id)
+            if item.station.given_covariance is not None
+            and _is_last_edit_adjustment(session, item.id)
         ]
     if not adjusted:
         raise ConflictError(
@@ -281,7 +287,7 @@ def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:
     return lines
 
 
-def _rig_frames(session: Session, dataset_id: int) -> list[RigFrame]:
+def _read_rig_frames(session: Session, dataset_id: int) -> list[RigFrame]:
     """Every instant of a dataset that at least two static cameras show the ball in."""
     known = list_known_groups(session, dataset_id)
     numbered = all(item.key.isascii() and item.key.isdigit() for item in known)
@@ -306,6 +312,6 @@ def _ball_center(view: View) -> ImagePoint | None:
     return ball.center if view.included and ball is not None and not ball.inferred else None
 
 
-def _was_adjusted_last(session: Session, station_id: int) -> bool:
+def _is_last_edit_adjustment(session: Session, station_id: int) -> bool:
     done = read_station_stacks(session, station_id).done
     return bool(done) and read_entry(session, done[-1]).body["edit"]["edit"] == EDIT

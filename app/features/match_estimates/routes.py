@@ -10,18 +10,18 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from app.db.session import Session
 from app.features.groups.schemas import PictureEdit
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
-from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, take_rig_back
-from app.features.match_estimates.pictures import change_pictures, read_pictures
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
+from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, undo_rig_adjustment
+from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
 from app.features.match_estimates.positions import PositionState, get_positions
 from app.features.match_estimates.queries import MatchPictures
 from app.features.policies import noise as noises
 from app.features.policies.noise import Advice
 from app.features.policies.service import read_policy
-from app.features.solve.jobs import change_and_solve
+from app.features.solve.jobs import change_and_return_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
-from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -86,7 +86,7 @@ class RigRequest(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _seen(self) -> RigRequest:
+    def _require_inputs_to_accept(self) -> RigRequest:
         if self.accept is not None and self.inputs is None:
             raise ValueError("to accept a proposal, send the `inputs` of that proposal")
         return self
@@ -172,7 +172,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
 
 
 @positions_router.post(
-    "", operation_id="sharePositions", **openapi_of_job_response(404, 409, 413, 415)
+    "", operation_id="sharePositions", **describe_job_response_for_openapi(404, 409, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
@@ -188,7 +188,9 @@ def share_positions(
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete("", operation_id="revertPositions", **openapi_of_job_response(404, 409))
+@positions_router.delete(
+    "", operation_id="revertPositions", **describe_job_response_for_openapi(404, 409)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def take_back_positions(
@@ -201,13 +203,13 @@ def take_back_positions(
 
     Once more takes back the share before that one; 409 when nothing is shared any more.
     """
-    return POSITIONS.take_back(services.jobs, services.store, dataset, match, actor=actor)
+    return POSITIONS.undo_last_job(services.jobs, services.store, dataset, match, actor=actor)
 
 
 @rig_router.post(
     "/datasets/{dataset}/rig",
     operation_id="adjustRig",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
@@ -224,8 +226,8 @@ def adjust_rig(
     return RIG.request(services.jobs, services.store, dataset, actor=actor, **subject)
 
 
-def _taken_back(count: int) -> Response:
-    return document(RigTakenBack(taken_back=count))
+def _make_take_back_response(count: int) -> Response:
+    return make_document_response(RigTakenBack(taken_back=count))
 
 
 @rig_router.delete(
@@ -235,10 +237,10 @@ def _taken_back(count: int) -> Response:
     responses=responses(404, 409),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(_taken_back)
+@respond_with(_make_take_back_response)
 def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
-    return take_rig_back(services.jobs, services.store, dataset, actor=actor)
+    return undo_rig_adjustment(services.jobs, services.store, dataset, actor=actor)
 
 
 @noise_router.get(
@@ -255,7 +257,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     return services.noises.read(dataset)
 
 
-@noise_router.post("", operation_id="acceptNoise", **openapi_of_job_response(404, 412))
+@noise_router.post("", operation_id="acceptNoise", **describe_job_response_for_openapi(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
@@ -267,13 +269,13 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     found, store = services.noises.read(dataset), services.store
     state = read_policy(store, found.dataset_id)
 
-    def change(session: Session) -> None:
+    def reset_noise(session: Session) -> None:
         noises.accept_noise(session, found, state, actor)
 
-    return change_and_solve(services.jobs, store, found.dataset_id, change, actor=actor)
+    return change_and_return_job(services.jobs, store, found.dataset_id, reset_noise, actor=actor)
 
 
-@noise_router.delete("", operation_id="revertNoise", **openapi_of_job_response(404))
+@noise_router.delete("", operation_id="revertNoise", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
@@ -283,10 +285,10 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
     The policy stays as it is.
     """
 
-    def change(session: Session) -> None:
-        noises.take_noise_back(session, dataset, actor=actor)
+    def reset_noise(session: Session) -> None:
+        noises.reset_noise_factors(session, dataset, actor=actor)
 
-    return change_and_solve(services.jobs, services.store, dataset, change, actor=actor)
+    return change_and_return_job(services.jobs, services.store, dataset, reset_noise, actor=actor)
 
 
 @pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
@@ -294,11 +296,11 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
 @paged()
 def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesDocument:
     """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
-    return MatchPicturesDocument.model_validate({"items": read_pictures(store, dataset)})
+    return MatchPicturesDocument.model_validate({"items": read_picture_geometries(store, dataset)})
 
 
 @pictures_router.post(
-    "", operation_id="estimateMatchPictures", **openapi_of_job_response(404, 413, 415)
+    "", operation_id="estimateMatchPictures", **describe_job_response_for_openapi(404, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
@@ -313,7 +315,9 @@ def estimate_match_pictures(
     return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@pictures_router.patch("", operation_id="setMatchPicture", **openapi_of_job_response(404, 413, 415))
+@pictures_router.patch(
+    "", operation_id="setMatchPicture", **describe_job_response_for_openapi(404, 413, 415)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def set_match_picture(
@@ -325,7 +329,9 @@ def set_match_picture(
     """
     picture = None if change.picture is None else change.picture.picture()
 
-    def changed(session: Session) -> None:
-        change_pictures(session, dataset, {change.match: picture}, actor=actor)
+    def apply_picture_change(session: Session) -> None:
+        set_picture_geometries(session, dataset, {change.match: picture}, actor=actor)
 
-    return change_and_solve(services.jobs, services.store, dataset, changed, actor=actor)
+    return change_and_return_job(
+        services.jobs, services.store, dataset, apply_picture_change, actor=actor
+    )

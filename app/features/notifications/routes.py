@@ -13,7 +13,7 @@ from app.features.notifications.service import NotificationState
 from app.features.people.session_routes import Me
 from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
-from app.http.documents import ListDocument, respond_with, respond_with_document
+from app.http.documents import ListDocument, make_document_responder, respond_with
 from app.http.permissions import Action, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -67,9 +67,9 @@ def get_notifications(
     responses=responses(401, 409, 413, 415),
 )
 @may(Action.ACCOUNT)
-@respond_with(respond_with_document(NotificationsDocument.model_validate))
+@respond_with(make_document_responder(NotificationsDocument.model_validate))
 def mark_notifications_read(
     body: SeenNotifications, store: AppStore, _team: AppTeam, me: Me
 ) -> NotificationState:
     """One has seen some of it, or all."""
-    return bell.read_all(store, me, body.ids)
+    return bell.mark_as_read(store, me, body.ids)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from app.db.session import Session, now, text_of
+from app.db.session import Session, format_utc_time, now
 from app.db.store import Store
 from app.features.notifications.queries import (
     Notification,
@@ -20,7 +20,7 @@ from app.features.notifications.queries import (
 from app.features.people.logins import Login, read_roles
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 KEPT_DAYS = 90
 """So long somebody can read what they were told."""
@@ -62,7 +62,7 @@ def notify_person(
     Returns:
         Whether they were told.
     """
-    if kind is not NotificationKind.JOB and person_of(actor) == person:
+    if kind is not NotificationKind.JOB and person_of_actor(actor) == person:
         return False
     row = find_person_by_name(session, person)
     if row is None or row.disabled:
@@ -86,7 +86,7 @@ def read_notifications(
         return _read_state(session, login, limit, before)
 
 
-def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationState:
+def mark_as_read(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationState:
     """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
         mark_read(session, login.person_id, login.visibility, ids, now())
@@ -105,4 +105,4 @@ def _read_state(
 
 
 def _oldest_shown_time() -> str:
-    return text_of(datetime.now(UTC) - timedelta(days=KEPT_DAYS))
+    return format_utc_time(datetime.now(UTC) - timedelta(days=KEPT_DAYS))

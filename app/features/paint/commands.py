@@ -30,7 +30,7 @@ Tripod = Annotated[
 ]
 
 
-class CamerasOn(StrEnum):
+class PitchReference(StrEnum):
     """Of which pitch the cameras of a clip are."""
 
     PLAN = "plan"
@@ -62,14 +62,14 @@ def paint(
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
     from app.features.datasets.service import filter_by_match
-    from app.features.paint.service import get_paint, read_paint, take_back_paint
+    from app.features.paint.service import get_paint, read_paint, undo_paint_reading
 
     if show and undo:
         raise typer.BadParameter("show what was read or take it back, one at a time")
     with open_store() as store:
         if undo:
             with store.write() as session:
-                take_back_paint(session, dataset, actor=get_current_actor())
+                undo_paint_reading(session, dataset, actor=get_current_actor())
         if undo or show:
             found = get_paint(store, dataset)
         else:
@@ -99,14 +99,14 @@ def snap(
     json_: Json = False,
 ) -> None:
     """Cameras from clicked lines and the paint of their pictures."""
-    from app.features.file_tools.paint import snap_files
+    from app.features.file_tools.paint import snap_cameras_to_paint
 
     if size != "native":
         raise typer.BadParameter(
             "each picture is read in its own size; leave this out", param_hint="--size"
         )
     with show_progress("Snapping") as progress:
-        rows = snap_files(
+        rows = snap_cameras_to_paint(
             lines, images, out, settings=read_settings(), tripod=tripod, progress=progress
         )
     _print_rows(rows, json_)
@@ -239,11 +239,11 @@ def _propose_for_files(
     tripod: str | None,
     json_: bool,
 ) -> None:
-    from app.features.file_tools.propose import count_proposals, propose_files
+    from app.features.file_tools.propose import count_proposals, propose_cameras_of_files
 
     wanted = None if size == "native" else parse_size(size)
     with show_progress("Proposing") as progress:
-        rows = propose_files(
+        rows = propose_cameras_of_files(
             images, out, read_settings(), size=wanted, known=known, tripod=tripod, progress=progress
         )
     if json_:
@@ -270,12 +270,12 @@ def track(
         ),
     ] = None,
     pitch: Annotated[
-        CamerasOn,
+        PitchReference,
         typer.Option(
             help="plan: cameras lay the markings of 105 x 68 m on the paint; shown: they are those "
             "of the pitch that the clip shows, of its own length, width and crown (track.json)."
         ),
-    ] = CamerasOn.PLAN,
+    ] = PitchReference.PLAN,
     turn: Annotated[
         bool,
         typer.Option(
@@ -290,11 +290,11 @@ def track(
     OUT gets camera_<frame>.json, and track.json with the outcome of each frame: tracked (on the
     paint), bridged (carried by the background between tracked frames) or lost (no camera).
     """
-    from app.features.file_tools.track import count_outcomes, track_files
+    from app.features.file_tools.track import count_outcomes, track_cameras_of_clip
 
     with show_progress("Tracking") as progress:
-        on_shown = pitch is CamerasOn.SHOWN
-        result = track_files(
+        on_shown = pitch is PitchReference.SHOWN
+        result = track_cameras_of_clip(
             clip, out, lines or (), on_shown=on_shown, turn=turn, progress=progress
         )
     if json_:

@@ -9,9 +9,9 @@ from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.jobs.runner import JobProgress, report_counts_in_words
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.jobs import MatchCall, MatchJob
+from app.features.match_estimates.jobs import MatchJob, MatchJobContext
 from app.features.paint.proposals import forget_proposals, propose_views
-from app.features.paint.service import read_paint, require_readable, take_back_paint
+from app.features.paint.service import read_paint, require_paint_in_use, undo_paint_reading
 
 REPORTED = (
     *("views", "without_picture", "read"),
@@ -20,7 +20,7 @@ REPORTED = (
 """What a result counts of all matches."""
 
 
-def _read_paint(call: MatchCall, progress: JobProgress) -> Json:
+def _run_paint_job(call: MatchJobContext, progress: JobProgress) -> Json:
     try:
         found = read_paint(
             call.store,
@@ -40,14 +40,14 @@ def _read_paint(call: MatchCall, progress: JobProgress) -> Json:
 PAINT = MatchJob(
     "paint",
     "Read the paint of the pictures of {}",
-    _read_paint,
-    require_readable,
-    take_back_paint,
+    _run_paint_job,
+    require_paint_in_use,
+    undo_paint_reading,
     has_runs=True,
 )
 
 
-def stop_and_forget(jobs: Jobs, store: Store, dataset: str | int) -> int:
+def cancel_and_forget_proposals(jobs: Jobs, store: Store, dataset: str | int) -> int:
     """``forget_proposals``, and no search that was asked for before keeps anything after it.
 
     Raises:
@@ -59,7 +59,7 @@ def stop_and_forget(jobs: Jobs, store: Store, dataset: str | int) -> int:
     return forget_proposals(store, number)
 
 
-def _propose_lines(call: MatchCall, progress: JobProgress) -> Json:
+def _run_proposal_job(call: MatchJobContext, progress: JobProgress) -> Json:
     run = propose_views(
         call.store,
         call.dataset_id,
@@ -70,4 +70,6 @@ def _propose_lines(call: MatchCall, progress: JobProgress) -> Json:
     return asdict(run)
 
 
-PROPOSALS = MatchJob("proposals", "Propose cameras for views of {} that have none", _propose_lines)
+PROPOSALS = MatchJob(
+    "proposals", "Propose cameras for views of {} that have none", _run_proposal_job
+)

@@ -13,13 +13,17 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
 from sqlalchemy.orm import aliased
 
-from app.db.dialects.dialect import insert, select_json_array_items, select_numbers
+from app.db.dialects.dialect import insert, select_from_number_list, select_json_array_items
 from app.db.json_columns import parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.paint.queries import ProposalModel
 from app.features.queue.tables import QueueModel
-from app.features.solutions.queries import SolutionModel, is_current, list_undetermined_calibrations
+from app.features.solutions.queries import (
+    SolutionModel,
+    is_current_solution,
+    list_undetermined_calibrations,
+)
 from app.json_text import canonical_json_text
 from app.soccer.annotation import Lines
 from app.soccer.codec import lines_from_json, lines_to_json
@@ -114,7 +118,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     )
     alone = or_(StationModel.shared.is_(False), ViewModel.id.in_(first))
     bare = and_(_has_no_lines_or_camera(), ViewModel.media_path.is_not(None), alone)
-    return or_(bare, ViewModel.id.in_(select_numbers(sorted(lost))))
+    return or_(bare, ViewModel.id.in_(select_from_number_list(sorted(lost))))
 
 
 def list_views_without_camera_from_lines(
@@ -130,7 +134,7 @@ def list_views_without_camera_from_lines(
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
         .join(QueueModel, QueueModel.group_id == GroupModel.id)
-        .join(SolutionModel, is_current())
+        .join(SolutionModel, is_current_solution())
         .join(named, named.c.key == ViewModel.position)
         .join(StationModel, StationModel.id == ViewModel.station_id)
         .where(
@@ -187,7 +191,7 @@ def list_views_to_propose_for(
     return list(found.items())
 
 
-def match_proposals(
+def count_proposals_by_match(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[MatchProposals]:
     """How far each match of a dataset is, or each of these, by name."""
@@ -196,16 +200,16 @@ def match_proposals(
     # What was said of a view as it was before says nothing of it now.
     looked = and_(is_candidate, _is_open_proposal())
 
-    def number(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
+    def count_where(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
         return func.coalesce(func.sum(case((and_(*conditions), 1), else_=0)), 0)
 
     statement = (
         select(
             GroupModel.match,
-            number(is_candidate),
-            number(looked),
-            *(number(looked, outcome == name) for name in PROPOSAL_OUTCOMES),
-            number(outcome == "proposed", StationModel.proposed.is_not(None)),
+            count_where(is_candidate),
+            count_where(looked),
+            *(count_where(looked, outcome == name) for name in PROPOSAL_OUTCOMES),
+            count_where(outcome == "proposed", StationModel.proposed.is_not(None)),
         )
         .join(ViewModel, ViewModel.group_id == GroupModel.id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
@@ -230,7 +234,7 @@ def read_proposals(session: Session, views: Iterable[int]) -> dict[int, Proposal
     return found
 
 
-def group_proposals(session: Session, group_id: int) -> list[tuple[str, bool, Proposal]]:
+def read_group_proposals(session: Session, group_id: int) -> list[tuple[str, bool, Proposal]]:
     """Key of the view, whether it is open, and the proposal, in the order of a group's views."""
     statement = (
         select(ViewModel.key, _is_open_proposal().label("open"), *_PROPOSAL.columns)

@@ -14,17 +14,21 @@ from typing import Any
 
 from app.db.store import Store
 from app.errors import ImageError, NotFoundError, TooLargeError
-from app.features.datasets.service import DatasetHead, need_dataset, require_matches
+from app.features.datasets.service import (
+    DatasetHead,
+    require_dataset_id,
+    require_dataset_with_matches,
+)
 from app.features.groups.pictures import UNREADABLE, PictureTask, ProposalTask, read_proposal
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.state import read_group_head
 from app.features.groups.view_paint import list_nearby_cameras
 from app.features.paint.proposal_queries import (
     MatchProposals,
+    count_proposals_by_match,
     delete_proposals,
-    group_proposals,
     list_views_to_propose_for,
-    match_proposals,
+    read_group_proposals,
     read_proposals,
     save_proposals,
 )
@@ -32,7 +36,7 @@ from app.features.paint.proposal_queries import Proposal as Proposal
 from app.media.frames import VideoIndexer
 from app.paint.propose import SEARCH_VERSION
 from app.progress import ReportProgress
-from app.soccer.codec import camera_to_json, digest, station_digest
+from app.soccer.codec import camera_to_json, digest_json, station_digest
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 
@@ -98,8 +102,8 @@ def get_proposals(
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = require_matches(session, dataset, matches)
-        items = match_proposals(session, found.id, matches)
+        found = require_dataset_with_matches(session, dataset, matches)
+        items = count_proposals_by_match(session, found.id, matches)
     return DatasetProposals(found.id, found.name, tuple(items))
 
 
@@ -112,7 +116,7 @@ def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Pr
     with store.read() as session:
         if read_group_head(session, group_id) is None:
             raise NotFoundError.group(group_id)
-        return group_proposals(session, group_id)
+        return read_group_proposals(session, group_id)
 
 
 def propose_views(
@@ -142,7 +146,7 @@ def propose_views(
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = require_matches(session, dataset, matches)
+        found = require_dataset_with_matches(session, dataset, matches)
         pending = list_views_to_propose_for(session, found.id, matches)
     count, total = workers or store.settings.image_workers, sum(len(views) for _, views in pending)
     run = ProposalRun()
@@ -175,7 +179,7 @@ def forget_proposals(store: Store, dataset: str | int) -> int:
         NotFoundError: There is no such dataset.
     """
     with store.write() as session:
-        gone = delete_proposals(session, need_dataset(session, dataset))
+        gone = delete_proposals(session, require_dataset_id(session, dataset))
         session.respond(gone)
     return gone
 
@@ -219,7 +223,7 @@ def _make_task(
         known=tuple(known),
         pitch=pitch,
         policy=policy,
-        sought_with=digest(inputs),
+        sought_with=digest_json(inputs),
         old=old,
         drawn=station.lines,
         beside=station_digest(station) if station.lines else "",
@@ -230,16 +234,16 @@ def _run_tasks(
     store: Store, pool: WorkerPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
 ) -> list[Proposal | None]:
     futures = [
-        PictureTask(pool, *videos.with_index(task.media, read_proposal, task, store.settings))
+        PictureTask(pool, *videos.wrap_with_index(task.media, read_proposal, task, store.settings))
         for task in tasks
     ]
-    return [_proposal_of_task(task, reads) for task, reads in zip(tasks, futures, strict=True)]
+    return [_wait_for_proposal(task, reads) for task, reads in zip(tasks, futures, strict=True)]
 
 
-def _proposal_of_task(task: ProposalTask, reads: PictureTask) -> Proposal | None:
+def _wait_for_proposal(task: ProposalTask, reads: PictureTask) -> Proposal | None:
     try:
         found: Proposal | None = reads.result()
     except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
-        return task.proposal_without_picture(UNREADABLE)
+        return task.make_proposal_without_picture(UNREADABLE)
     return found

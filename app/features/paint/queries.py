@@ -11,7 +11,7 @@ from sqlalchemy import BindParameter, ForeignKey, Index, Table, bindparam, func,
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.dialect import any_of, insert, select_json_object_values
+from app.db.dialects.dialect import any_value_of, insert, select_json_object_values
 from app.db.json_columns import decompress, parse_json_column, report_damaged_values
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Base, Session
@@ -25,7 +25,7 @@ FOLLOWS = "follows"
 _EVIDENCE = cast(Table, PaintEvidenceModel.__table__)
 _DIGESTS: BindParameter[Any] = bindparam("digests", expanding=True)
 _READINGS = (
-    select(_EVIDENCE.c.digest, any_of(_EVIDENCE.c.body).label("body"))
+    select(_EVIDENCE.c.digest, any_value_of(_EVIDENCE.c.body).label("body"))
     .where(_EVIDENCE.c.digest.in_(_DIGESTS))
     .group_by(_EVIDENCE.c.digest)
 )
@@ -61,7 +61,9 @@ class ProposalModel(Base):
     beside: Mapped[str] = mapped_column(server_default=text("''"))
 
 
-def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintReading]) -> None:
+def insert_paint_readings(
+    session: Session, dataset_id: int, readings: Iterable[PaintReading]
+) -> None:
     """Keep readings under their digests; what is there already stays."""
     unique = {reading.digest: reading for reading in readings}
     if unique:
@@ -79,7 +81,7 @@ def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintR
         )
 
 
-def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintReading]:
+def read_paint_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintReading]:
     """Readings by digest; unknown ones are left out.
 
     Raises:
@@ -89,12 +91,12 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
     for start in range(0, len(wanted), _BATCH):
         some = wanted[start : start + _BATCH]
         for row in session.execute(_READINGS, {"digests": some}):
-            found[row.digest] = reading_from_row(row.digest, row.body)
+            found[row.digest] = decode_paint_reading(row.digest, row.body)
     return found
 
 
 @lru_cache(maxsize=64)
-def reading_from_row(digest: str, body: bytes) -> PaintReading:
+def decode_paint_reading(digest: str, body: bytes) -> PaintReading:
     with report_damaged_values():
         reading = reading_from_text(decompress(body).decode())
         if reading.digest != digest:
@@ -130,7 +132,7 @@ class MatchPaint:
     reasons: Mapping[str | None, int]
 
 
-def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
+def read_match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     """What was read of the pictures of each match of a dataset, by name."""
     group = GroupModel
     statement = (
@@ -154,7 +156,7 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
         .group_by(group.id)
         .order_by(group.match, group.number)
     )
-    reasons = _readings_by_reason(session, dataset_id)
+    reasons = _count_readings_by_reason(session, dataset_id)
     rows: dict[str, list[Any]] = {}
     for row in session.execute(statement):
         rows.setdefault(row.match, []).append(row)
@@ -171,7 +173,9 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     ]
 
 
-def _readings_by_reason(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
+def _count_readings_by_reason(
+    session: Session, dataset_id: int
+) -> dict[str, dict[str | None, int]]:
     """How many readings each match has by their reason; nothing of them is decoded."""
     group = GroupModel
     named = select_json_object_values(group.paint)
@@ -196,7 +200,7 @@ def find_last_paint_run(session: Session, dataset_id: int) -> list[LogEntry]:
     """The entries of a dataset's newest reading that was not taken back; none where there is none."""
     taken_back: set[str] = set()
     runs: dict[str, list[LogEntry]] = {}
-    for entry in _log_entries(session, dataset_id):
+    for entry in _read_paint_log_entries(session, dataset_id):
         if FOLLOWS in entry.body:
             continue
         back = entry.body.get("takes_back")
@@ -208,7 +212,7 @@ def find_last_paint_run(session: Session, dataset_id: int) -> list[LogEntry]:
     return runs[left[-1]] if left else []
 
 
-def _log_entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
+def _read_paint_log_entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
     """Of the groups that a dataset has, oldest first."""
     statement = (
         select(LogModel.id)

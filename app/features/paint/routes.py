@@ -21,22 +21,22 @@ from app.features.groups.view_paint import (
     make_paint_request,
     make_proposal_request,
 )
-from app.features.groups.view_routes import CLIENT_GONE, with_view_in_error
+from app.features.groups.view_routes import CLIENT_GONE, add_view_to_errors
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import (
     ACCEPTED,
     JobDocument,
+    describe_job_response_for_openapi,
     make_job_response,
-    openapi_of_job_response,
 )
 from app.features.match_estimates.routes import MatchRequest
-from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget
+from app.features.paint.jobs import PAINT, PROPOSALS, cancel_and_forget_proposals
 from app.features.paint.proposal_queries import MatchProposals, Proposal
 from app.features.paint.proposals import get_group_proposals, get_proposals
 from app.features.paint.service import PaintState, get_paint
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
-from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -199,7 +199,7 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
 
 
 @paint_router.post(
-    "", operation_id="readDatasetPaint", **openapi_of_job_response(404, 409, 413, 415)
+    "", operation_id="readDatasetPaint", **describe_job_response_for_openapi(404, 409, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
@@ -214,7 +214,9 @@ def read_paint(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete("", operation_id="revertDatasetPaint", **openapi_of_job_response(404, 409))
+@paint_router.delete(
+    "", operation_id="revertDatasetPaint", **describe_job_response_for_openapi(404, 409)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -223,7 +225,7 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
     Once more takes back the reading before that one; 409 when there is none any more. A reading
     that waits or runs is cancelled, and is the one that is taken back, as far as it came.
     """
-    return PAINT.take_back(services.jobs, services.store, dataset, actor=actor)
+    return PAINT.undo_last_job(services.jobs, services.store, dataset, actor=actor)
 
 
 @view_paint_router.post(
@@ -274,7 +276,7 @@ async def _wait_for_result(
     request: Request, question: ViewPaintRequest, ask: Callable[[], PoolTask]
 ) -> Any:
     """What was found, or None where nobody waits for it any more."""
-    with with_view_in_error(question.view.key):
+    with add_view_to_errors(question.view.key):
         return await ask().result_unless_client_gone(request.is_disconnected)
 
 
@@ -321,12 +323,12 @@ def accept_proposed_lines(
         matches = None if request.match is None else [request.match]
         found = get_proposals(services.store, dataset, matches)
         counts = {name: found.count(name) for name in ("views", "looked")}
-        return document(ProposalPlanDocument(**counts))
+        return make_document_response(ProposalPlanDocument(**counts))
     return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-def _forgotten_response(gone: int) -> Response:
-    return document(ForgottenProposalsDocument(forgotten=gone))
+def _make_forgotten_response(gone: int) -> Response:
+    return make_document_response(ForgottenProposalsDocument(forgotten=gone))
 
 
 @proposals_router.delete(
@@ -336,13 +338,13 @@ def _forgotten_response(gone: int) -> Response:
     responses=responses(404),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(_forgotten_response)
+@respond_with(_make_forgotten_response)
 def forget(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
 
     A search that waits or runs is cancelled, and nothing that it finds is kept afterwards.
     """
-    return stop_and_forget(services.jobs, services.store, dataset)
+    return cancel_and_forget_proposals(services.jobs, services.store, dataset)
 
 
 @proposals_router.get(

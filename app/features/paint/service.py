@@ -15,14 +15,18 @@ from typing import Any
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, TooLargeError
-from app.features.datasets.queries import group_ids
-from app.features.datasets.service import DatasetHead, need_dataset, require_matches
+from app.features.datasets.queries import list_group_ids
+from app.features.datasets.service import (
+    DatasetHead,
+    require_dataset_id,
+    require_dataset_with_matches,
+)
 from app.features.groups.edit import SetPaint
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.pictures import (
     PaintTask,
     PictureTask,
-    mark_outdated_beside_other_people,
+    mark_paint_outdated_by_other_people,
     read_view_paint,
 )
 from app.features.groups.queries import StoredGroup, read_groups
@@ -31,11 +35,11 @@ from app.features.paint.queries import (
     PAINT,
     MatchPaint,
     find_last_paint_run,
-    insert_readings,
-    match_paint,
-    read_readings,
+    insert_paint_readings,
+    read_match_paint,
+    read_paint_readings,
 )
-from app.features.paint.tripod import share_tripods
+from app.features.paint.tripod import solve_match_tripods
 from app.features.solutions.service import read_known_calibrations
 from app.media.frames import VideoIndexer
 from app.progress import ReportProgress
@@ -105,10 +109,12 @@ def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        found = require_matches(session, dataset)
-        matches = match_paint(session, found.id)
-        old = _count_outdated(session, found, matches)
-    items = tuple(_paint_state(item, None if old is None else old[item.match]) for item in matches)
+        found = require_dataset_with_matches(session, dataset)
+        matches = read_match_paint(session, found.id)
+        old = _count_outdated_readings(session, found, matches)
+    items = tuple(
+        _make_paint_state(item, None if old is None else old[item.match]) for item in matches
+    )
     return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
 
 
@@ -143,9 +149,9 @@ def read_paint(
         NotFoundError: There is no such dataset or match.
         OverloadedError: Processes were killed over one picture, twice; what was read stays.
     """
-    found = require_readable(store, dataset, matches)
+    found = require_paint_in_use(store, dataset, matches)
     with store.read() as session:
-        ids = group_ids(session, found.id, matches)
+        ids = list_group_ids(session, found.id, matches)
     run, count, done = run or now(), workers or store.settings.image_workers, 0
     with (
         closing(VideoIndexer(store.settings)) as videos,
@@ -156,19 +162,19 @@ def read_paint(
             tasks = _make_tasks(store, some, found)
             views = [task.view.media for of_group in tasks.values() for task in of_group]
             videos.make_ready(views, done, len(ids), progress)
-            readings = _read_pictures(store, pool, videos, tasks)
+            readings = _read_paint_of_pictures(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
                     require_wanted()
-                _give_readings(session, found.id, readings, actor, {"run": run})
+                _save_reading_edits(session, found.id, readings, actor, {"run": run})
             done += len(some)
             if progress is not None:
                 progress(done, len(ids))
-    share_tripods(store, found, matches, actor, run, require_wanted)
+    solve_match_tripods(store, found, matches, actor, run, require_wanted)
     return get_paint(store, found.id)
 
 
-def require_readable(
+def require_paint_in_use(
     store: Store, dataset: str | int, matches: Collection[str] | None = None
 ) -> DatasetHead:
     """The dataset, unless nothing would use what is read.
@@ -178,7 +184,7 @@ def require_readable(
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = require_matches(session, dataset, matches)
+        found = require_dataset_with_matches(session, dataset, matches)
     if found.policy.calibration.source != "paint":
         raise ConflictError(
             f'the policy of "{found.name}" does not use the paint in pictures',
@@ -187,7 +193,7 @@ def require_readable(
     return found
 
 
-def take_back_paint(
+def undo_paint_reading(
     session: Session,
     dataset: str | int,
     _match: str | None = None,
@@ -210,7 +216,7 @@ def take_back_paint(
         ConflictError: Nothing was read, or all of it is taken back.
         NotFoundError: There is no such dataset.
     """
-    found = require_matches(session, dataset)
+    found = require_dataset_with_matches(session, dataset)
     entries = find_last_paint_run(session, found.id)
     stopped_runs = {job.request["run"] for job in stopped}
     if stopped and not (entries and entries[0].body["run"] in stopped_runs):
@@ -225,16 +231,16 @@ def take_back_paint(
         # A run that was begun again may have given a group something twice.
         before.setdefault(entry.group_id or 0, entry.body["inverse"]["paint"])
     named = {digest for paint in before.values() for digest in paint.values()}
-    known = read_readings(session, named)
+    known = read_paint_readings(session, named)
     wanted = {
         number: {view: known[digest] for view, digest in paint.items()}
         for number, paint in before.items()
     }
     run = entries[0].body["run"]
-    _give_readings(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
+    _save_reading_edits(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
 
 
-def _give_readings(
+def _save_reading_edits(
     session: Session,
     dataset_id: int,
     wanted: Mapping[int, Mapping[str, PaintReading]],
@@ -244,20 +250,27 @@ def _give_readings(
     """One entry for each group that changes; of a take-back for the first in any case."""
     ids = sorted(wanted)
 
-    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
+    def make_paint_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
         fitting = {
-            number: SetPaint(mark_outdated_beside_other_people(stored.group, wanted[number])).apply(
-                stored.group
-            )
+            number: SetPaint(
+                mark_paint_outdated_by_other_people(stored.group, wanted[number])
+            ).apply(stored.group)
             for number, stored in some.items()
         }
         for group in fitting.values():
-            insert_readings(session, dataset_id, group.paint.values())
+            insert_paint_readings(session, dataset_id, group.paint.values())
         return {number: SetPaint(group.paint) for number, group in fitting.items()}
 
     always_logged = ids[0] if ids and "takes_back" in body else None
     edit_groups(
-        session, dataset_id, PAINT, ids, edits, actor=actor, body=body, always_logged=always_logged
+        session,
+        dataset_id,
+        PAINT,
+        ids,
+        make_paint_edits,
+        actor=actor,
+        body=body,
+        always_logged=always_logged,
     )
 
 
@@ -271,12 +284,12 @@ def _make_tasks(
         clicks = replace(dataset.policy, calibration=of_lines)
         known = read_known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {
-        number: list(_group_tasks(item, dataset.policy.calibration, known))
+        number: list(_make_group_tasks(item, dataset.policy.calibration, known))
         for number, item in stored.items()
     }
 
 
-def _group_tasks(
+def _make_group_tasks(
     stored: StoredGroup, policy: CalibrationPolicy, known: Mapping[str, Any]
 ) -> Iterator[PaintTask]:
     group = stored.group
@@ -288,7 +301,7 @@ def _group_tasks(
             yield PaintTask(alone, policy, key, clicked, old)
 
 
-def _read_pictures(
+def _read_paint_of_pictures(
     store: Store,
     pool: WorkerPool,
     videos: VideoIndexer,
@@ -296,28 +309,30 @@ def _read_pictures(
 ) -> dict[int, dict[str, PaintReading]]:
     """What was read for each group, by view; views without a camera of their clicks are left out."""
 
-    def ask(task: PaintTask) -> PictureTask:
+    def submit_task(task: PaintTask) -> PictureTask:
         work = (read_view_paint, task, store.settings)
         media = task.view.media
-        return PictureTask(pool, *(work if media is None else videos.with_index(media, *work)))
+        return PictureTask(pool, *(work if media is None else videos.wrap_with_index(media, *work)))
 
-    futures = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
+    futures = {
+        number: [(task, submit_task(task)) for task in some] for number, some in tasks.items()
+    }
     return {
         number: {
             task.view.key: reading
             for task, reads in some
-            if (reading := _reading_of_task(task, reads)) is not None
+            if (reading := _wait_for_reading(task, reads)) is not None
         }
         for number, some in futures.items()
     }
 
 
-def _reading_of_task(task: PaintTask, reads: PictureTask) -> PaintReading | None:
+def _wait_for_reading(task: PaintTask, reads: PictureTask) -> PaintReading | None:
     try:
         reading: PaintReading | None = reads.result()
     except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
-        return task.reusable_reading or task.reading_without_frame
+        return task.reusable_reading or task.make_reading_without_frame
     return reading
 
 
@@ -328,11 +343,11 @@ def has_pictures(store: Store, dataset: str | int) -> bool:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        number = need_dataset(session, dataset)
-        return any(item.views > item.without_picture for item in match_paint(session, number))
+        number = require_dataset_id(session, dataset)
+        return any(item.views > item.without_picture for item in read_match_paint(session, number))
 
 
-def _count_outdated(
+def _count_outdated_readings(
     session: Session, dataset: DatasetHead, matches: Sequence[MatchPaint]
 ) -> dict[str, int] | None:
     """How many readings of each match do not fit any more; None where they are too many."""
@@ -343,12 +358,12 @@ def _count_outdated(
     for start in range(0, len(ids), _BATCH):
         some = read_groups(session, ids[start : start + _BATCH])
         for stored in some.values():
-            tasks = _group_tasks(stored, dataset.policy.calibration, {})
+            tasks = _make_group_tasks(stored, dataset.policy.calibration, {})
             old[stored.group.match] += sum(task.is_outdated for task in tasks)
     return old
 
 
-def _paint_state(item: MatchPaint, old: int | None) -> PaintState:
+def _make_paint_state(item: MatchPaint, old: int | None) -> PaintState:
     found = PaintState(
         match=item.match,
         groups=len(item.groups),
@@ -361,10 +376,10 @@ def _paint_state(item: MatchPaint, old: int | None) -> PaintState:
         paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),
         no_frame=item.reasons.get(NO_FRAME, 0),
     )
-    return replace(found, sentence=_state_sentence(found))
+    return replace(found, sentence=_describe_state(found))
 
 
-def _state_sentence(state: PaintState) -> str:
+def _describe_state(state: PaintState) -> str:
     left = max(state.views - state.without_picture, state.read)
     if not left:
         return f"none of {state.views} views has a picture" if state.views else "nothing to read"

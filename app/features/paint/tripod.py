@@ -9,12 +9,12 @@ from app.features.datasets.service import DatasetHead
 from app.features.groups.edit import SetPaint
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.paint.queries import PAINT, insert_readings, match_paint
+from app.features.paint.queries import PAINT, insert_paint_readings, read_match_paint
 from app.soccer.paint_evidence import PaintReading
-from app.solving.match_tripod import solve_readings_of_one_tripod
+from app.solving.match_tripod import solve_match_tripod
 
 
-def share_tripods(
+def solve_match_tripods(
     store: Store,
     dataset: DatasetHead,
     matches: Collection[str] | None,
@@ -33,19 +33,21 @@ def share_tripods(
         require_wanted: Called in each transaction that gives something, before it does.
     """
     with store.read() as session:
-        items = [item for item in match_paint(session, dataset.id) if item.match and item.painted]
+        items = [
+            item for item in read_match_paint(session, dataset.id) if item.match and item.painted
+        ]
     for item in items:
         if matches is not None and item.match not in matches:
             continue
         with store.read() as session:
             groups = {it.id: it.group for it in read_groups(session, item.painted).values()}
         before = {number: group.paint.get(group.views[0].key) for number, group in groups.items()}
-        after = solve_readings_of_one_tripod(groups, dataset.policy.calibration)
+        after = solve_match_tripod(groups, dataset.policy.calibration)
         changed = {number: read for number, read in after.items() if read != before[number]}
         if not changed:
             continue
 
-        def edits(
+        def make_paint_edits(
             some: Mapping[int, StoredGroup],
             before: Mapping[int, PaintReading | None] = before,
             changed: Mapping[int, PaintReading] = changed,
@@ -60,6 +62,6 @@ def share_tripods(
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
-            insert_readings(session, dataset.id, changed.values())
-            where = (session, dataset.id, PAINT, sorted(changed), edits)
+            insert_paint_readings(session, dataset.id, changed.values())
+            where = (session, dataset.id, PAINT, sorted(changed), make_paint_edits)
             edit_groups(*where, actor=actor, body={"run": run})

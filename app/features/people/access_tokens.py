@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.links import hash_token
@@ -128,7 +128,10 @@ class AccessTokens:
             InputError: Name, scopes or days cannot be used.
             ConflictError: They have one of that name that is still good, or too many.
         """
-        name, chosen = _checked_name(name), tuple(scope for scope in Scope if scope in scopes)
+        name, chosen = (
+            _validate_token_name(name),
+            tuple(scope for scope in Scope if scope in scopes),
+        )
         if not chosen:
             raise InputError("a token needs a scope", pointer="/scopes")
         if not 1 <= days <= MOST_DAYS:
@@ -141,17 +144,17 @@ class AccessTokens:
             "name": name,
             "start": text[: len(PREFIX) + SHOWN],
             "scopes": " ".join(chosen),
-            "created": text_of(at),
-            "expires": text_of(at + timedelta(days=days)),
+            "created": format_utc_time(at),
+            "expires": format_utc_time(at + timedelta(days=days)),
             "used": None,
         }
         with self._store.write() as session:
             person = find_person_by_id(session, login.person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError("the account was disabled meanwhile")
-            delete_expired_token(session, person.id, name, text_of(at))
+            delete_expired_token(session, person.id, name, format_utc_time(at))
             mine = list_access_tokens(session, person.id)
-            _require_free_name_and_count([row.name for row in mine], name)
+            _require_unused_name_and_limit([row.name for row in mine], name)
             token_id = insert_access_token(session, values)
             _log_token_event(session, person.name, person, "token made", values | {"id": token_id})
             made = next(row for row in list_access_tokens(session, person.id) if row.id == token_id)
@@ -165,18 +168,20 @@ class AccessTokens:
         """
         if not has_valid_checksum(text):
             raise NotLoggedInError(CUT, hint="Copy the complete token again.")
-        with self._store.read_one() as session:
-            row = find_access_token(session, hash_token(text), text_of(self._clock()), LEADING)
+        with self._store.read_for_one_statement() as session:
+            row = find_access_token(
+                session, hash_token(text), format_utc_time(self._clock()), LEADING
+            )
         if row is None:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
         roles = dataset_roles_from_rights(Role(row.role), rights_from_row(row))
         if row.dataset_id is not None:
             roles = roles.only(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
-        use = TokenUse(row.name, _scopes_of_row(row), fresh=row.used is None)
+        use = TokenUse(row.name, _parse_scopes(row), fresh=row.used is None)
         return Login(row.id, row.person_id, row.person, roles, seen, use)
 
-    def is_use_unlogged(self, login: Login) -> bool:
+    def should_log_use(self, login: Login) -> bool:
         """Whether it should be written down that a token is used."""
         fresh = login.token is not None and login.token.fresh
         return fresh or self._clock() - login.seen > NOTED_AFTER
@@ -184,9 +189,9 @@ class AccessTokens:
     def touch(self, login: Login) -> None:
         """Write down that a token is used."""
         with self._store.write(lasting=False) as session:
-            update_access_token_last_use(session, login.id, text_of(self._clock()))
+            update_access_token_last_use(session, login.id, format_utc_time(self._clock()))
 
-    def of_person(self, person_id: int | None) -> list[AccessToken]:
+    def list_of_person(self, person_id: int | None) -> list[AccessToken]:
         """The tokens of a person, or of everybody (None), the newest of each first."""
         with self._store.read() as session:
             return [self._token_from_row(row) for row in list_access_tokens(session, person_id)]
@@ -223,11 +228,11 @@ class AccessTokens:
     def _token_from_row(self, row: TokenRow) -> AccessToken:
         names = ("id", "person", "name", "start", "dataset", "created", "expires", "used")
         values = {name: getattr(row, name) for name in names}
-        expired = row.expires <= text_of(self._clock())
-        return AccessToken(**values, scopes=_scopes_of_row(row), expired=expired)
+        expired = row.expires <= format_utc_time(self._clock())
+        return AccessToken(**values, scopes=_parse_scopes(row), expired=expired)
 
 
-def _checked_name(text: str) -> str:
+def _validate_token_name(text: str) -> str:
     name = text.strip()
     if not _NAME.fullmatch(name):
         raise InputError(
@@ -236,7 +241,7 @@ def _checked_name(text: str) -> str:
     return name
 
 
-def _require_free_name_and_count(names: Sequence[str], name: str) -> None:
+def _require_unused_name_and_limit(names: Sequence[str], name: str) -> None:
     if name in names:
         raise ConflictError(
             f"you have a token {name} already", hint="Revoke it, or choose another name."
@@ -248,7 +253,7 @@ def _require_free_name_and_count(names: Sequence[str], name: str) -> None:
         )
 
 
-def _scopes_of_row(row: Any) -> tuple[Scope, ...]:
+def _parse_scopes(row: Any) -> tuple[Scope, ...]:
     return tuple(Scope(name) for name in row.scopes.split())
 
 

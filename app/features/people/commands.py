@@ -44,11 +44,11 @@ def add(
     json_: Json = False,
 ) -> None:
     """Make an account, and print or mail the link with which its person chooses a password."""
-    from app.features.people.invitations import invite_one
+    from app.features.people.invitations import invite_person
 
     wanted, post = _parse_role(role), _make_mailer()
     with open_store() as store:
-        _, row = invite_one(store, name, wanted, email, post, actor=get_current_actor())
+        _, row = invite_person(store, name, wanted, email, post, actor=get_current_actor())
     _print_link(row, json_)
 
 
@@ -65,9 +65,9 @@ def invite_many(
 ) -> None:
     """Make many accounts at once; mail or print each link. 1 if a row was refused."""
     from app.features.people.invitations import invite_many as invite
-    from app.features.people.invitations import read_list
+    from app.features.people.invitations import parse_invitation_list
 
-    rows, post = read_list(file.read()), _make_mailer()
+    rows, post = parse_invitation_list(file.read()), _make_mailer()
     with open_store() as store:
         report = invite(store, rows, post, actor=get_current_actor(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)
@@ -98,7 +98,7 @@ def list_(json_: Json = False) -> None:
     from app.features.people.service import list_people
 
     with open_store() as store:
-        found = [_person_values(person) for person in list_people(store)]
+        found = [_person_to_dict(person) for person in list_people(store)]
     if json_:
         print_json(found)
         return
@@ -171,7 +171,7 @@ def reset(
     json_: Json = False,
 ) -> None:
     """Print or mail a link with which somebody chooses another password; using it logs them out."""
-    from app.features.people.invitations import renew_one
+    from app.features.people.invitations import renew_invitation
     from app.features.people.second_factor import SecondFactors
     from app.features.people.service import find_person
 
@@ -180,7 +180,7 @@ def reset(
         found = find_person(store, name)
         if second_factor:
             SecondFactors(store).clear(found.id, actor=get_current_actor())
-        _, row = renew_one(store, found.id, email, post, actor=get_current_actor())
+        _, row = renew_invitation(store, found.id, email, post, actor=get_current_actor())
     _print_link(row, json_)
 
 
@@ -194,7 +194,7 @@ def unlink(name: Name, json_: Json = False) -> None:
         found = find_person(store, name)
         unlink_person(store, found.id, actor=get_current_actor())
         person = find_person(store, name)
-    print_values(_person_values(person), json_)
+    print_values(_person_to_dict(person), json_)
 
 
 def _give_role(name: str, dataset: str, role: Role | None, json_: bool) -> None:
@@ -241,7 +241,7 @@ def tokens(
         access_tokens = AccessTokens(store)
         person = None if name is None else find_person(store, name).id
         found = (
-            access_tokens.of_person(person)
+            access_tokens.list_of_person(person)
             if end is None
             else [access_tokens.end(end, person, actor=get_current_actor())]
         )
@@ -267,10 +267,10 @@ def _change_person(name: str, json_: bool, **change: Any) -> None:
     with open_store() as store:
         found = find_person(store, name)
         person = change_person(store, found.id, actor=get_current_actor(), **change)
-    print_values(_person_values(person), json_)
+    print_values(_person_to_dict(person), json_)
 
 
-def _person_values(person: Person) -> dict[str, Any]:
+def _person_to_dict(person: Person) -> dict[str, Any]:
     datasets = {one.dataset: str(one.role) for one in person.datasets}
     values = {
         "name": person.name,

@@ -20,14 +20,14 @@ import pyotp
 from cryptography.fernet import Fernet
 
 from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, get_installation_key
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.features.people.links import hash_token
 from app.features.people.login_queries import (
     find_blocking_attempt,
     insert_login_attempt,
-    store_pending,
-    take_pending,
+    store_pending_action,
+    take_pending_action,
 )
 from app.features.people.queries import (
     delete_recovery_code,
@@ -58,30 +58,30 @@ class DeviceTokens:
         """A new token for the browser of a person."""
         issued = str(int(self._clock().timestamp()))
         nonce = secrets.token_hex(_NONCE_BYTES)
-        return f"{issued}.{nonce}.{self._signature(name, issued, nonce)}"
+        return f"{issued}.{nonce}.{self._compute_signature(name, issued, nonce)}"
 
     def recognise(self, name: str, token: str) -> str | None:
         """What tells a device from others, if its token is one of this person; else None."""
         issued, _, rest = token.partition(".")
         nonce, _, signature = rest.partition(".")
         # As bytes: what is sent may hold letters that are none of ASCII.
-        known = self._signature(name, issued, nonce).encode()
+        known = self._compute_signature(name, issued, nonce).encode()
         if not hmac.compare_digest(known, signature.encode("utf-8", "replace")):
             return None
         is_old = self._clock().timestamp() - int(issued) > LASTS.total_seconds()
         return None if is_old else nonce
 
-    def cookie_of(self, name: str) -> str:
+    def make_cookie_suffix(self, name: str) -> str:
         """What ends the name of a person's cookie: several people may use one browser."""
-        return hashlib.sha256(_folded_name(name)).hexdigest()[:12]
+        return hashlib.sha256(_normalize_name(name)).hexdigest()[:12]
 
-    def _signature(self, name: str, issued: str, nonce: str) -> str:
+    def _compute_signature(self, name: str, issued: str, nonce: str) -> str:
         key = get_installation_key(self._store.settings, DEVICES)
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             person = find_person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
         parts = (
-            _folded_name(name),
+            _normalize_name(name),
             issued.encode("utf-8", "replace"),
             nonce.encode("utf-8", "replace"),
         )
@@ -89,7 +89,7 @@ class DeviceTokens:
         return hmac.new(key, text, hashlib.sha256).hexdigest()
 
 
-def _folded_name(name: str) -> bytes:
+def _normalize_name(name: str) -> bytes:
     return name.strip().lower().encode("utf-8", "replace")
 
 
@@ -110,7 +110,7 @@ class AttemptWindow:
         Who is refused writes nothing: a flood keeps nobody from writing.
         """
         at, name = self._clock(), hash_token(whose)
-        with self._store.read_one() as session:
+        with self._store.read_for_one_statement() as session:
             oldest = find_blocking_attempt(session, name, at - seconds, most)
         if oldest is None:
             with self._store.write(lasting=False) as session:
@@ -128,7 +128,7 @@ MOST = 10_000
 Clock = Callable[[], datetime]
 
 
-class PendingActions(Protocol):
+class PendingActionStore(Protocol):
     """What waits to be taken, for a short while."""
 
     def put(self, asker: str, value: bytes) -> None:
@@ -138,7 +138,7 @@ class PendingActions(Protocol):
         """What waits for somebody, and from then on does not; None where nothing does that is good."""
 
 
-class InMemoryPending:
+class InMemoryPendingActions:
     """What waits in the memory of this process: a restart forgets it.
 
     Args:
@@ -151,26 +151,26 @@ class InMemoryPending:
         self._open: dict[str, tuple[bytes, datetime]] = {}
 
     def put(self, asker: str, value: bytes) -> None:
-        """See ``PendingActions``."""
+        """See ``PendingActionStore``."""
         at = self._clock()
         with self._lock:
             self._open.pop(asker, None)
             # They lie in the order in which they end.
-            while self._open and (len(self._open) >= MOST or self._has_oldest_ended(at)):
+            while self._open and (len(self._open) >= MOST or self._has_oldest_expired(at)):
                 del self._open[next(iter(self._open))]
             self._open[asker] = value, at + self._lasts
 
     def take(self, asker: str) -> bytes | None:
-        """See ``PendingActions``."""
+        """See ``PendingActionStore``."""
         with self._lock:
             value, ends = self._open.pop(asker, (None, None))
         return value if ends is not None and self._clock() < ends else None
 
-    def _has_oldest_ended(self, at: datetime) -> bool:
+    def _has_oldest_expired(self, at: datetime) -> bool:
         return next(iter(self._open.values()))[1] <= at
 
 
-class StoredPending:
+class StoredPendingActions:
     """What waits in the database, for whichever process is asked next; encrypted with a key of the home.
 
     Args:
@@ -184,36 +184,42 @@ class StoredPending:
         self._store, self._clock, self._lasts, self._kind = store, clock, lasts, kind
 
     def put(self, asker: str, value: bytes) -> None:
-        """See ``PendingActions``."""
+        """See ``PendingActionStore``."""
         at = self._clock()
-        closed, ends = self._encryption_key().encrypt(value), text_of(at + self._lasts)
+        closed, ends = self._encryption_key().encrypt(value), format_utc_time(at + self._lasts)
         with self._store.write(lasting=False) as session:
-            store_pending(session, self._hashed_name(asker), closed, ends, text_of(at), MOST)
+            store_pending_action(
+                session, self._hash_name(asker), closed, ends, format_utc_time(at), MOST
+            )
 
     def take(self, asker: str) -> bytes | None:
-        """See ``PendingActions``."""
+        """See ``PendingActionStore``."""
         with self._store.write() as session:
-            closed = take_pending(session, self._hashed_name(asker), text_of(self._clock()))
+            closed = take_pending_action(
+                session, self._hash_name(asker), format_utc_time(self._clock())
+            )
         return None if closed is None else self._encryption_key().decrypt(closed)
 
-    def _hashed_name(self, asker: str) -> str:
+    def _hash_name(self, asker: str) -> str:
         return hash_token(f"{self._kind}/{asker}")
 
     def _encryption_key(self) -> Fernet:
         return Fernet(urlsafe_b64encode(get_installation_key(self._store.settings, BEGUN)))
 
 
-def make_pending_actions(store: Store, clock: Clock, lasts: timedelta, kind: str) -> PendingActions:
+def make_pending_actions(
+    store: Store, clock: Clock, lasts: timedelta, kind: str
+) -> PendingActionStore:
     """What waits, where every process finds it that may be asked for it."""
     if store.sharing.is_shared:
-        return StoredPending(store, clock, lasts, kind)
-    return InMemoryPending(clock, lasts)
+        return StoredPendingActions(store, clock, lasts, kind)
+    return InMemoryPendingActions(clock, lasts)
 
 
 class PasskeyChallenges:
     """Challenges of passkeys."""
 
-    def __init__(self, waiting: PendingActions):
+    def __init__(self, waiting: PendingActionStore):
         self._waiting = waiting
 
     def make(self, asker: str) -> bytes:

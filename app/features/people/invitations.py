@@ -15,8 +15,8 @@ from app.errors import InputError, ReviewError
 from app.features.people.links import PasswordLink
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role, normalize_user_name, require_no_token
-from app.features.people.service import Person, insert_invited, invite, renew_link
-from app.json_text import Moment, quoted
+from app.features.people.service import Person, insert_invited_person, invite, renew_link
+from app.json_text import Moment, quote_text
 from app.mail import MailMessage, MailServer, parse_mail_address
 
 MOST = 500
@@ -89,7 +89,7 @@ class LinkMailer:
             by: Who invites.
         """
         letters = [
-            _invitation_letter(self.url, row, link, address, by)
+            _compose_invitation_mail(self.url, row, link, address, by)
             for row, link, address in rows
             if address and self.url and self.server
         ]
@@ -105,7 +105,7 @@ class LinkMailer:
         return done
 
 
-def invite_one(
+def invite_person(
     store: Store, name: str, role: Role, email: str | None, post: LinkMailer, *, actor: str
 ) -> tuple[Person, Invitation]:
     """Make an account, and hand over the link with which its person chooses a password.
@@ -121,7 +121,7 @@ def invite_one(
     return person, post.send_links([(row, link, address)], actor)[0]
 
 
-def renew_one(
+def renew_invitation(
     store: Store, person_id: int, email: str | None, post: LinkMailer, *, actor: str
 ) -> tuple[Person, Invitation]:
     """Make another link for somebody, and hand it over as an invitation is.
@@ -166,17 +166,17 @@ def invite_many(
         seen: dict[str, int] = {}
         for one in wanted:
             try:
-                name, role, address = _checked_invitation(one, seen)
+                name, role, address = _validate_invitation(one, seen)
                 if find_person_by_name(session, name) is not None:
                     raise InputError(f"there is already a user {name}")
             except ReviewError as error:
-                refused.append(_refused_invitation(one, error.message))
+                refused.append(_make_refused_invitation(one, error.message))
                 continue
             seen[name] = one.row
             if dry_run:
                 made.append((Invitation(one.row, name, role, "possible"), None, address))
                 continue
-            _, link = insert_invited(session, name, role, actor=actor)
+            _, link = insert_invited_person(session, name, role, actor=actor)
             row = Invitation(one.row, name, role, "invited", expires=link.expires)
             made.append((row, link, address))
     done = [row for row, link, _ in made if link is None]
@@ -185,7 +185,7 @@ def invite_many(
     return sorted([*refused, *done, *post.send_links(links, actor)], key=lambda row: row.row)
 
 
-def read_list(text: str) -> list[InvitationRow]:
+def parse_invitation_list(text: str) -> list[InvitationRow]:
     """The rows of a list: ``name,role,email`` a line, with commas, semicolons or tabs between.
 
     A first line of names of columns says in which order they come. Empty lines, and those that begin
@@ -205,24 +205,26 @@ def read_list(text: str) -> list[InvitationRow]:
             continue
         if columns is None:
             header = [value.lower().replace("e-mail", "email") for value in values]
-            columns = _checked_header(header) if "name" in header else _COLUMNS
+            columns = _validate_header(header) if "name" in header else _COLUMNS
             if "name" in header:
                 continue
-        found.append(_invitation_row(reader.line_num, columns, values))
+        found.append(_parse_invitation_row(reader.line_num, columns, values))
     return found
 
 
-def _checked_header(names: Sequence[str]) -> Sequence[str]:
+def _validate_header(names: Sequence[str]) -> Sequence[str]:
     unknown = [name for name in names if name not in _COLUMNS]
     if unknown or len(set(names)) != len(names):
         raise InputError(
-            f"the columns of the list are {', '.join(map(quoted, names))}",
+            f"the columns of the list are {', '.join(map(quote_text, names))}",
             hint=f"Use {', '.join(_COLUMNS)}, each once.",
         )
     return names
 
 
-def _invitation_row(number: int, columns: Sequence[str], values: Sequence[str]) -> InvitationRow:
+def _parse_invitation_row(
+    number: int, columns: Sequence[str], values: Sequence[str]
+) -> InvitationRow:
     last = len(columns) - 1
     # Cells beyond the last column make its value one that is refused, and that the report shows.
     cells = [*values[:last], ",".join(value for value in values[last:] if value)]
@@ -232,7 +234,7 @@ def _invitation_row(number: int, columns: Sequence[str], values: Sequence[str]) 
     )
 
 
-def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
+def _validate_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
     name = normalize_user_name(one.name)
     if name in seen:
         raise InputError(f"{name} is already in row {seen[name]}")
@@ -240,16 +242,18 @@ def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, 
         role = Role(one.role.strip().lower())
     except ValueError:
         known = ", ".join(Role)
-        problem = f"{quoted(one.role)} is not a role" if one.role.strip() else "the role is missing"
+        problem = (
+            f"{quote_text(one.role)} is not a role" if one.role.strip() else "the role is missing"
+        )
         raise InputError(f"{problem}; the roles are {known}") from None
     return name, role, parse_mail_address(one.email) if one.email else None
 
 
-def _refused_invitation(one: InvitationRow, problem: str) -> Invitation:
+def _make_refused_invitation(one: InvitationRow, problem: str) -> Invitation:
     return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
 
 
-def _invitation_letter(
+def _compose_invitation_mail(
     url: str, row: Invitation, link: PasswordLink, address: str, by: str
 ) -> MailMessage:
     host = urlsplit(url).hostname

@@ -14,16 +14,16 @@ from typing import Any, TypeVar
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from app.db.session import Session, now, text_of
+from app.db.session import Session, format_utc_time, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
 from app.features.people.login_queries import delete_logins, find_person_identity
 from app.features.people.queries import (
     count_people_who_can_log_in,
+    delete_person_links,
     find_link,
     find_person_by_id,
     find_person_by_name,
-    forget_links,
     insert_link,
     insert_person,
     update_person,
@@ -71,13 +71,13 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
         )
     if password.casefold() == name.casefold():
         raise InputError("a password must differ from the name", pointer=pointer)
-    if _hash_in_turn(lambda: _is_easy_to_guess(password, name)):
+    if _run_hash_with_limit(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
             "this password is easy to guess: it is common, or repeats a few parts",
             hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
-    return _hash_in_turn(lambda: HASHER.hash(password))
+    return _run_hash_with_limit(lambda: HASHER.hash(password))
 
 
 def _is_easy_to_guess(password: str, name: str) -> bool:
@@ -89,19 +89,21 @@ def _is_easy_to_guess(password: str, name: str) -> bool:
     return bool(found["score"] < 2)
 
 
-def is_password(password: str, known: str | None) -> bool:
+def verify_password(password: str, known: str | None) -> bool:
     """Whether a password belongs to a hash; without one it takes as long, and is not."""
-    fits = _hash_in_turn(lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash()))
+    fits = _run_hash_with_limit(
+        lambda: HASHER.verify(password[:LONGEST], known or _make_placeholder_hash())
+    )
     return fits and known is not None and len(password) <= LONGEST
 
 
 @cache
-def _placeholder_hash() -> str:
+def _make_placeholder_hash() -> str:
     """A hash that no password is known of, which is asked where there is no account."""
     return HASHER.hash("a placeholder password, as long as others")
 
 
-def _hash_in_turn(work: Callable[[], T]) -> T:
+def _run_hash_with_limit(work: Callable[[], T]) -> T:
     if not _turns.acquire(timeout=PATIENCE):
         raise OverloadedError(
             "too many people are logging in at this moment", hint="Try again in a while."
@@ -148,14 +150,16 @@ def make_first_link(store: Store, *, actor: str) -> PasswordLink | None:
     with store.write() as session:
         if count_people_who_can_log_in(session, Role.ADMIN):
             return None
-        return insert_new(session, None, by=actor, at=datetime.now(UTC), lasts=FIRST_LASTS)
+        return insert_password_link(
+            session, None, by=actor, at=datetime.now(UTC), lasts=FIRST_LASTS
+        )
 
 
-def insert_new(
+def insert_password_link(
     session: Session, person_id: int | None, *, by: str, at: datetime, lasts: timedelta = LASTS
 ) -> PasswordLink:
     """Make a link for a person (None: for the first admin), in the caller's transaction."""
-    token, expires = make_random_token(), text_of(at + lasts)
+    token, expires = make_random_token(), format_utc_time(at + lasts)
     insert_link(session, hash_token(token), person_id, by=by, expires=expires)
     return PasswordLink(token, expires)
 
@@ -204,10 +208,10 @@ def consume_link(session: Session, token: str, name: str | None, *, password: st
     person_id, _ = _find_holder(session, token)
     if person_id is None:
         person_id = _insert_first_admin(session, normalize_user_name(name or ""))
-        forget_links(session, None)
+        delete_person_links(session, None)
     update_person(session, person_id, password=password)
     delete_logins(session, person_id)
-    forget_links(session, person_id)
+    delete_person_links(session, person_id)
     return person_id
 
 

@@ -77,7 +77,9 @@ def insert_login_attempt(session: Session, whose: str, at: float) -> None:
     session.execute(insert(AttemptModel), [{"whose": whose, "at": at}])
 
 
-def store_pending(session: Session, name: str, value: bytes, ends: str, at: str, most: int) -> None:
+def store_pending_action(
+    session: Session, name: str, value: bytes, ends: str, at: str, most: int
+) -> None:
     """Keep what somebody has begun, in the place of what they had; what has ended goes.
 
     Args:
@@ -101,7 +103,7 @@ def store_pending(session: Session, name: str, value: bytes, ends: str, at: str,
     session.execute(new.on_conflict_do_update(index_elements=[_BEGUN.c.name], set_=same))
 
 
-def take_pending(session: Session, name: str, at: str) -> bytes | None:
+def take_pending_action(session: Session, name: str, at: str) -> bytes | None:
     """What was begun under a name, which is gone then; None where nothing is that is good."""
     gone = delete(PendingActionModel).where(PendingActionModel.name == name)
     row = session.execute(
@@ -143,11 +145,11 @@ def find_login(
         idle_since: A session that was used last before this time has ended.
     """
     given = {"token_hash": token_hash, "at": at, "idle_since": idle_since}
-    return session.execute(_login_statement(tuple(leading)), given).one_or_none()
+    return session.execute(_build_login_statement(tuple(leading)), given).one_or_none()
 
 
 @cache
-def _login_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+def _build_login_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     """Made once: it takes longer to put together than to answer."""
     return select_with_rights(_FOUND, leading).where(
         LoginModel.token_hash == bindparam("token_hash"),
@@ -190,7 +192,7 @@ def delete_logins(
     session.execute(statement if but is None else statement.where(LoginModel.id != but))
 
 
-def delete_ended(session: Session, *, at: str, idle_since: str) -> None:
+def delete_expired_logins(session: Session, *, at: str, idle_since: str) -> None:
     """Forget the sessions that have ended by themselves."""
     session.execute(
         delete(LoginModel).where((LoginModel.expires <= at) | (LoginModel.seen <= idle_since))
@@ -275,7 +277,7 @@ def read_identity_labels(session: Session) -> dict[int, str]:
     return {row.person_id: row.shown for row in session.execute(statement)}
 
 
-def count_linked(session: Session, issuer: str, people: list[int]) -> int:
+def count_linked_people(session: Session, issuer: str, people: list[int]) -> int:
     """How many of some people have an account of a provider."""
     statement = select(IdentityModel.person_id).where(
         IdentityModel.issuer == issuer, IdentityModel.person_id.in_(people)

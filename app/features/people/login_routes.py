@@ -66,7 +66,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
 def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     return CreationOptions(options=team.passkeys.begin(me, body.password, team.site(request)))
 
 
@@ -95,7 +95,7 @@ def remove_passkey(
     passkey: Id, body: PasswordOnly, request: Request, team: AppTeam, me: Me
 ) -> None:
     """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     team.passkeys.remove(me, passkey, body.password)
 
 
@@ -111,7 +111,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
     team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     options = team.passkeys.ask(asker, team.site(request))
-    response.set_cookie(**team.cookies.passkey_values(asker))
+    response.set_cookie(**team.cookies.make_passkey_cookie(asker))
     return RequestOptions(options=options)
 
 
@@ -127,10 +127,10 @@ def log_in(
     """Log in with a passkey: no name, no password, and no code."""
     team.require_passwords()
     address = team.address(request)
-    team.count_try(request)
+    team.count_login_attempt(request)
     try:
         token = team.passkeys.log_in(
-            team.cookies.passkey_secret(request.scope),
+            team.cookies.read_passkey_secret(request.scope),
             body.credential.model_dump(),
             team.site(request),
             browser=request.headers.get("user-agent", ""),
@@ -140,7 +140,7 @@ def log_in(
     except NotLoggedInError:
         log.warning("a login with a passkey was refused", address=address)
         raise
-    response.set_cookie(**team.cookies.session_values(token))
+    response.set_cookie(**team.cookies.make_session_cookie(token))
     return make_session_document(team.logins.find(token), store)
 
 
@@ -164,7 +164,7 @@ def get_second_factor(team: AppTeam, me: Me) -> FactorState:
 @may(Action.ACCOUNT, to_enrol=True)
 def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     return team.factors.begin(me, said.password)
 
 
@@ -189,7 +189,7 @@ def confirm(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
 @may(Action.ACCOUNT, to_enrol=True)
 def remove_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     team.factors.remove(me, body.password)
 
 
@@ -228,7 +228,7 @@ tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=SecretR
 @paged()
 def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     """One's own tokens, those that have expired too."""
-    return AccessTokenList(items=team.tokens.of_person(me.person_id))
+    return AccessTokenList(items=team.tokens.list_of_person(me.person_id))
 
 
 @tokens_router.post(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import verify_and_use_code
@@ -15,11 +15,11 @@ from app.features.people.links import (
     LONGEST,
     hash_password,
     hash_token,
-    is_password,
     make_random_token,
+    verify_password,
 )
 from app.features.people.login_queries import (
-    delete_ended,
+    delete_expired_logins,
     delete_login,
     delete_logins,
     find_login,
@@ -29,10 +29,10 @@ from app.features.people.login_queries import (
 )
 from app.features.people.queries import (
     DatasetRights,
+    delete_person_links,
     find_person_by_id,
     find_person_by_name,
     find_rights,
-    forget_links,
     has_second_factor,
     rights_from_row,
     update_person,
@@ -46,7 +46,7 @@ from app.features.people.roles import (
     role_allows,
 )
 from app.features.people.visibility_queries import RestrictedReader, Visibility
-from app.soccer.actors import with_token
+from app.soccer.actors import make_token_actor
 
 LEADING = tuple(role for role in Role if role_allows(role, Action.LEAD))
 """Roles that lead a dataset."""
@@ -106,7 +106,7 @@ class Login:
     @property
     def actor(self) -> str:
         """What the log calls them: a person, or a person with the name of a token."""
-        return self.name if self.token is None else with_token(self.name, self.token.name)
+        return self.name if self.token is None else make_token_actor(self.name, self.token.name)
 
     @property
     def role(self) -> Role:
@@ -196,7 +196,7 @@ class LoginSessions:
             person = find_person_by_name(session, name)
             is_asked = person is not None and has_second_factor(session, person.id)
         able = person is not None and not person.disabled
-        if not is_password(password, person.password if person and able else None):
+        if not verify_password(password, person.password if person and able else None):
             raise NotLoggedInError(WRONG, hint="An admin can send you a link for a new password.")
         assert person is not None
         if is_asked and code is not None:
@@ -245,9 +245,9 @@ class LoginSessions:
         values = {
             "token_hash": hash_token(token),
             "person_id": person_id,
-            "created": text_of(at),
-            "seen": text_of(at),
-            "expires": text_of(at + LASTS),
+            "created": format_utc_time(at),
+            "seen": format_utc_time(at),
+            "expires": format_utc_time(at + LASTS),
             "browser": browser[:200],
             "address": address[:60],
             "way": way,
@@ -259,14 +259,16 @@ class LoginSessions:
             if person is None or person.disabled or person.password != password:
                 raise NotLoggedInError(WRONG)
             require(session)
-            delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
+            delete_expired_logins(
+                session, at=format_utc_time(at), idle_since=format_utc_time(at - IDLE)
+            )
             if before and (
                 old := find_login(
-                    session, hash_token(before), leading=LEADING, **self._expiry_limits(at)
+                    session, hash_token(before), leading=LEADING, **self._compute_expiry_limits(at)
                 )
             ):
                 delete_login(session, old.id, old.person_id)
-            for unassigned in list_sessions(session, person_id, **self._expiry_limits(at))[
+            for unassigned in list_sessions(session, person_id, **self._compute_expiry_limits(at))[
                 MOST - 1 :
             ]:
                 delete_login(session, unassigned.id, person_id)
@@ -283,8 +285,12 @@ class LoginSessions:
         Raises:
             BusyError: It had to be said ``at_once``, and cannot be without waiting.
         """
-        alive = self._expiry_limits(self._clock())
-        with self._store.read_without_waiting() if at_once else self._store.read_one() as session:
+        alive = self._compute_expiry_limits(self._clock())
+        with (
+            self._store.read_without_waiting()
+            if at_once
+            else self._store.read_for_one_statement() as session
+        ):
             row = find_login(session, hash_token(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
             return None
@@ -296,19 +302,21 @@ class LoginSessions:
             row.id, row.person_id, row.name, roles, seen, None, enrol, way=way, created=created
         )
 
-    def is_use_unlogged(self, login: Login) -> bool:
+    def should_log_use(self, login: Login) -> bool:
         """Whether it should be written down that a session is used."""
         return self._clock() - login.seen > NOTED_AFTER
 
     def touch(self, login: Login) -> None:
         """Write down that a session is used."""
         with self._store.write(lasting=False) as session:
-            update_login_last_use(session, login.id, text_of(self._clock()))
+            update_login_last_use(session, login.id, format_utc_time(self._clock()))
 
     def sessions(self, login: Login) -> list[OpenSession]:
         """Every session of a person, the one that was used last first."""
         with self._store.read() as session:
-            rows = list_sessions(session, login.person_id, **self._expiry_limits(self._clock()))
+            rows = list_sessions(
+                session, login.person_id, **self._compute_expiry_limits(self._clock())
+            )
         return [
             OpenSession(row.id, row.browser, row.address, row.created, row.seen, row.expires)
             for row in rows
@@ -343,25 +351,27 @@ class LoginSessions:
         """
         with self._store.read() as session:
             person = find_person_by_id(session, login.person_id)
-        if person is None or not is_password(old, person.password):
+        if person is None or not verify_password(old, person.password):
             raise InputError("this is not your current password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
         with self._store.write() as session:
-            found = list_sessions(session, login.person_id, **self._expiry_limits(self._clock()))
+            found = list_sessions(
+                session, login.person_id, **self._compute_expiry_limits(self._clock())
+            )
             mine = next((row for row in found if row.id == login.id), None)
             if mine is None:
                 raise NotLoggedInError("your session has ended")
             update_person(session, login.person_id, password=hashed)
             delete_logins(session, login.person_id)
-            forget_links(session, login.person_id)
+            delete_person_links(session, login.person_id)
             log_account_event(session, login.name, login.name, "password", login.role)
         way, vouched = LoginMethod(mine.way), mine.vouched
         return self.begin(
             login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
         )
 
-    def _expiry_limits(self, at: datetime) -> dict[str, str]:
-        return {"at": text_of(at), "idle_since": text_of(at - IDLE)}
+    def _compute_expiry_limits(self, at: datetime) -> dict[str, str]:
+        return {"at": format_utc_time(at), "idle_since": format_utc_time(at - IDLE)}
 
 
 def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRoles:
@@ -380,11 +390,11 @@ def dataset_roles_from_rights(everywhere: Role, rights: DatasetRights) -> Datase
     roles = DatasetRoles(everywhere, single)
     copies = {key: roles.find_role_in(of_id) for key, of_id in rights.copies.items()}
     return DatasetRoles(
-        everywhere, {**single, **copies}, blind=_blind_batches_by_dataset(roles, rights)
+        everywhere, {**single, **copies}, blind=_map_blind_batches_by_dataset(roles, rights)
     )
 
 
-def _blind_batches_by_dataset(
+def _map_blind_batches_by_dataset(
     roles: DatasetRoles, rights: DatasetRights
 ) -> dict[int, frozenset[int]]:
     """The batches in which somebody annotates blind, by dataset.

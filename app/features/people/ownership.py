@@ -71,7 +71,7 @@ class Ownership:
 
 
 def find_role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
-    """What somebody is where something belongs; ``none``: they do not see it.
+    """What somebody is where something belongs; ``make_empty_track``: they do not see it.
 
     Args:
         found: Where it belongs.
@@ -83,7 +83,7 @@ def find_role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
     if found.dataset is not None:
         return roles.find_role_in(found.dataset)
     mine = any(is_actor_of(owner, name) for owner in found.owners)
-    return roles.highest if mine else Role.NONE
+    return roles.highest_role if mine else Role.NONE
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def find_ownership(store: Store, named: NamedResource, visibility: Visibility) -
         visibility: Which datasets take part where a name alone does not say which of them is meant.
     """
     if named.kind is OwnedKind.UPLOAD:
-        return _ownership_of_upload(store, named.by)
+        return _find_upload_ownership(store, named.by)
     with store.read() as session:
         find = _FIND.get(named.kind)
         if find is not None:
@@ -135,20 +135,20 @@ def find_ownership(store: Store, named: NamedResource, visibility: Visibility) -
     return None if dataset is None else Ownership(dataset)
 
 
-def _ownership_of_dataset(
+def _find_dataset_ownership(
     session: Session, named: str | int, _sight: Visibility
 ) -> Ownership | None:
     row = find_dataset(session, named)
     return None if row is None else Ownership(int(row.id))
 
 
-def _ownership_of_job(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
+def _find_job_ownership(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
     number = _parse_id(named)
     row = None if number is None else find_job_owner(session, number)
     return None if row is None else Ownership(row.dataset_id, frozenset({row.actor}))
 
 
-def _ownership_of_version(
+def _find_version_ownership(
     session: Session, named: str | int, visibility: Visibility
 ) -> Ownership | None:
     """By id, name or hash, among the datasets that somebody sees."""
@@ -182,7 +182,7 @@ def find_versions(rows: Sequence[V], text: str) -> list[V]:
     return fitting
 
 
-def _ownership_of_upload(store: Store, named: str | int) -> Ownership | None:
+def _find_upload_ownership(store: Store, named: str | int) -> Ownership | None:
     try:
         found = get_upload(store.settings, str(named))
     except NotFoundError:
@@ -197,9 +197,9 @@ def _parse_id(named: str | int) -> int | None:
 
 
 _FIND: Mapping[OwnedKind, Callable[[Session, Any, Visibility], Ownership | None]] = {
-    OwnedKind.DATASET: _ownership_of_dataset,
-    OwnedKind.NEW_DATASET: _ownership_of_dataset,
-    OwnedKind.JOB: _ownership_of_job,
-    OwnedKind.EXPORT: _ownership_of_job,
-    OwnedKind.VERSION: _ownership_of_version,
+    OwnedKind.DATASET: _find_dataset_ownership,
+    OwnedKind.NEW_DATASET: _find_dataset_ownership,
+    OwnedKind.JOB: _find_job_ownership,
+    OwnedKind.EXPORT: _find_job_ownership,
+    OwnedKind.VERSION: _find_version_ownership,
 }

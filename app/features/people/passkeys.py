@@ -25,7 +25,7 @@ from webauthn.helpers.structs import (
     UserVerificationRequirement,
 )
 
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
@@ -44,7 +44,7 @@ from app.features.people.queries import count_recovery_codes, find_person_by_id,
 from app.features.people.roles import log_account_event
 from app.features.people.second_factor import (
     ISSUER,
-    end_factor,
+    handle_removed_factor,
     hash_recovery_codes,
     make_recovery_codes,
     require_password,
@@ -124,7 +124,7 @@ class Passkeys:
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
             rows = list_passkeys(session, login.person_id)
-        _require_few_passkeys(rows)
+        _require_passkey_limit(rows)
         options = generate_registration_options(
             rp_id=site.name,
             rp_name=ISSUER,
@@ -153,7 +153,7 @@ class Passkeys:
             ConflictError: There are too many, or one of that name, or it is known already.
         """
         made = self._verify_new_credential(login, credential, site)
-        name, at = name.strip(), text_of(self._clock())
+        name, at = name.strip(), format_utc_time(self._clock())
         if not name:
             raise InputError("a passkey needs a name", pointer="/name")
         values = {
@@ -166,7 +166,7 @@ class Passkeys:
         }
         with self._store.write() as session:
             rows = list_passkeys(session, login.person_id)
-            _require_few_passkeys(rows)
+            _require_passkey_limit(rows)
             if name in {row.name for row in rows}:
                 raise ConflictError(
                     f"you have a passkey {name} already", hint="Choose another name."
@@ -194,7 +194,7 @@ class Passkeys:
             name = delete_passkey(session, passkey_id, login.person_id)
             if name is None:
                 raise NotFoundError(f"you have no passkey {passkey_id}")
-            end_factor(session, login)
+            handle_removed_factor(session, login)
             log_account_event(
                 session, login.name, login.name, "no passkey", login.role, passkey=name
             )
@@ -238,16 +238,22 @@ class Passkeys:
         if row is None or person is None:
             raise NotLoggedInError(REFUSED, hint=AGAIN)
 
-        def require(session: Session) -> None:
+        def require_valid_signature(session: Session) -> None:
             # Read again: another login with it may have counted meanwhile, or it was taken away.
             found = find_passkey(session, row.credential)
             if found is None or found.person_id != row.person_id:
                 raise NotLoggedInError(REFUSED, hint=AGAIN)
-            count = _verified_sign_count(found, credential, challenge, site)
-            update_passkey_use(session, found.id, count, text_of(self._clock()))
+            count = _verify_sign_count(found, credential, challenge, site)
+            update_passkey_use(session, found.id, count, format_utc_time(self._clock()))
 
         return self._logins.begin(
-            row.person_id, person.password, browser, address, before, require, LoginMethod.PASSKEY
+            row.person_id,
+            person.password,
+            browser,
+            address,
+            before,
+            require_valid_signature,
+            LoginMethod.PASSKEY,
         )
 
     def _verify_new_credential(
@@ -271,7 +277,7 @@ class Passkeys:
             raise InputError(REFUSED, hint="Begin again.", pointer="/credential") from error
 
 
-def _verified_sign_count(
+def _verify_sign_count(
     row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite
 ) -> int:
     """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""
@@ -292,7 +298,7 @@ def _verified_sign_count(
         raise NotLoggedInError(REFUSED, hint=AGAIN) from error
 
 
-def _require_few_passkeys(rows: Any) -> None:
+def _require_passkey_limit(rows: Any) -> None:
     if len(rows) >= MOST:
         raise ConflictError(f"you have {MOST} passkeys", hint="Delete one of them first.")
 

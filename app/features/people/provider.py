@@ -56,7 +56,7 @@ class ProviderClient:
         Raises:
             ConflictError: The address is not the provider's, or there was no such answer.
         """
-        self.require_own(address)
+        self.require_allowed_address(address)
         sent = {"Accept": "application/json", "Accept-Encoding": "identity", **(headers or {})}
         try:
             status, content = asyncio.run(self._fetch(method, address, sent, body))
@@ -69,7 +69,7 @@ class ProviderClient:
             raise self._provider_failed_error()
         return status, found
 
-    def require_own(self, address: object) -> str:
+    def require_allowed_address(self, address: object) -> str:
         """An address as text.
 
         Raises:
@@ -93,7 +93,7 @@ class ProviderClient:
         async with (
             asyncio.timeout(SECONDS),
             httpx.AsyncClient(
-                timeout=SECONDS, follow_redirects=False, trust_env=False, verify=self._trusted
+                timeout=SECONDS, follow_redirects=False, trust_env=False, verify=self._ssl_context
             ) as client,
             client.stream(method, address, headers=headers, content=body) as answer,
         ):
@@ -110,7 +110,7 @@ class ProviderClient:
         return answer.status_code, bytes(content)
 
     @cached_property
-    def _trusted(self) -> ssl.SSLContext:
+    def _ssl_context(self) -> ssl.SSLContext:
         """Certificates of public authorities, or those of ``SSL_CERT_FILE``."""
         return httpx.create_ssl_context(trust_env=True)
 
@@ -125,7 +125,7 @@ ALGORITHMS = [
     *("RS256", "RS384", "RS512", "PS256", "PS384", "PS512"),
     *("ES256", "ES384", "ES512", "EdDSA", "Ed25519"),
 ]
-"""Signatures by a key that the provider alone has: neither ``none``, nor one by a secret (HS256)."""
+"""Signatures by a key that the provider alone has: neither ``make_empty_track``, nor one by a secret (HS256)."""
 KINDS = frozenset({"RSA", "EC", "OKP"})
 SHORTEST_RSA = 342
 """Letters of a modulus of 2048 bits in base64url."""
@@ -188,7 +188,7 @@ class Provider:
             ConflictError: The provider gave an invalid response.
         """
         there = self._read_discovery_document()
-        address, _ = self._client(request).create_authorization_url(
+        address, _ = self._make_oauth_client(request).create_authorization_url(
             there["authorization_endpoint"],
             state=request.state,
             nonce=request.nonce,
@@ -203,7 +203,7 @@ class Provider:
             NotLoggedInError: The code, or what it is good for, is refused.
             ConflictError: The provider gave an invalid response.
         """
-        return self._verified_claims(self._exchange_code_for_token(request, code), request)
+        return self._verify_claims(self._exchange_code_for_token(request, code), request)
 
     def examine(self) -> str:
         """A sentence on where it is, having asked it anew.
@@ -226,7 +226,7 @@ class Provider:
         known = there.get("token_endpoint_auth_methods_supported") or _HIDDEN[:1]
         way = next((one for one in _HIDDEN if one in known), _HIDDEN[0])
         address, headers, body = (
-            self._client(request)
+            self._make_oauth_client(request)
             .client_auth(way)
             .prepare("POST", there["token_endpoint"], dict(_FORM), body)
         )
@@ -237,13 +237,13 @@ class Provider:
             raise self._refused_login_error()
         return token
 
-    def _verified_claims(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
+    def _verify_claims(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
         """The claims of an ID token that is good."""
         try:
             try:
-                found = jwt.decode(token, self._cached_keys(), algorithms=ALGORITHMS)
+                found = jwt.decode(token, self._get_cached_keys(), algorithms=ALGORITHMS)
             except InvalidKeyIdError:
-                found = jwt.decode(token, self._refetched_keys(), algorithms=ALGORITHMS)
+                found = jwt.decode(token, self._refetch_keys(), algorithms=ALGORITHMS)
             claims = CodeIDToken(
                 found.claims,
                 found.header,
@@ -266,7 +266,7 @@ class Provider:
             raise self._refused_login_error() from error
         return dict(claims)
 
-    def _client(self, request: LoginRequest) -> OAuth2Client:
+    def _make_oauth_client(self, request: LoginRequest) -> OAuth2Client:
         return OAuth2Client(
             None,
             client_id=self._rules.client_id,
@@ -290,19 +290,19 @@ class Provider:
                     "is not the provider in TOUCHLINE_SSO_ISSUER: it reports another issuer"
                 )
             for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
-                self._answers.require_own(found.get(name))
+                self._answers.require_allowed_address(found.get(name))
             kept = self._description = _CachedResponse(found, self._clock())
         described: Mapping[str, Any] = kept.value
         return described
 
-    def _cached_keys(self) -> jwk.KeySet:
+    def _get_cached_keys(self) -> jwk.KeySet:
         kept = self._keys
         if kept is None or self._clock() - kept.at > KEPT:
             return self._fetch_keys()
         known: jwk.KeySet = kept.value
         return known
 
-    def _refetched_keys(self) -> jwk.KeySet:
+    def _refetch_keys(self) -> jwk.KeySet:
         """Its keys, asked for again where it may have changed them since."""
         kept = self._keys
         if kept is not None and self._clock() - kept.at < AGAIN:

@@ -24,7 +24,7 @@ from sqlalchemy import (
     update,
 )
 
-from app.db.dialects.dialect import pairs_of
+from app.db.dialects.dialect import json_pairs_of
 from app.db.session import Session, now
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel
@@ -65,7 +65,7 @@ _SEEN = (
 )
 
 
-def all_people(session: Session) -> Sequence[PersonRow]:
+def list_people_rows(session: Session) -> Sequence[PersonRow]:
     """Every person by name, with when they were ``seen`` last in a session that still is."""
     statement = _PEOPLE.add_columns(_SEEN.label("seen")).order_by(PersonModel.name)
     return session.rows(PersonRow, statement)
@@ -120,7 +120,7 @@ def insert_link(
     session: Session, token_hash: str, person_id: int | None, *, by: str, expires: str
 ) -> None:
     """Insert a link; those that the same person (or nobody) had before are no longer valid."""
-    forget_links(session, person_id)
+    delete_person_links(session, person_id)
     values = {"token_hash": token_hash, "person_id": person_id, "created": now()}
     session.execute(insert(OneTimeLinkModel), {**values, "created_by": by, "expires": expires})
 
@@ -133,7 +133,7 @@ def find_link(session: Session, token_hash: str, at: str) -> OneTimeLinkModel | 
     return session.row(OneTimeLinkModel, statement)
 
 
-def forget_links(session: Session, person_id: int | None) -> None:
+def delete_person_links(session: Session, person_id: int | None) -> None:
     """End every link of a person, or those of nobody."""
     theirs = OneTimeLinkModel.person_id
     whose = theirs.is_(None) if person_id is None else theirs == person_id
@@ -195,7 +195,7 @@ def find_rights(session: Session, person_id: int, leading: Collection[str]) -> D
 
 def _roles_column() -> ColumnElement[Any]:
     mine = DatasetRoleModel.person_id == PersonModel.id
-    pairs = pairs_of(DatasetRoleModel.dataset_id, DatasetRoleModel.role)
+    pairs = json_pairs_of(DatasetRoleModel.dataset_id, DatasetRoleModel.role)
     return _scalar_subquery(select(pairs).where(mine))
 
 
@@ -209,7 +209,7 @@ def _copies_column(leading: Collection[str]) -> ColumnElement[Any]:
     seen = or_(
         table.person == PersonModel.name, table.of_id.in_(led.correlate(PersonModel)), everywhere
     )
-    return _scalar_subquery(select(pairs_of(table.dataset_id, table.of_id)).where(seen))
+    return _scalar_subquery(select(json_pairs_of(table.dataset_id, table.of_id)).where(seen))
 
 
 def _blind_batches_column() -> ColumnElement[Any]:
@@ -221,34 +221,34 @@ def _blind_batches_column() -> ColumnElement[Any]:
         BatchPersonModel,
     )
     here, mine = annotation.batch_id == batch.id, annotation.person == PersonModel.name
-    gold = batch.gold_every.is_not(None) | _exists_correlated(here, annotation.kind == GOLD)
+    gold = batch.gold_every.is_not(None) | _build_correlated_exists(here, annotation.kind == GOLD)
     copies = batch.gold_every.is_not(None) | ((batch.verdicts > 1) & (batch.blind | gold))
     named = (part.batch_id == batch.id, part.person_id == PersonModel.id)
-    annotators = _exists_correlated(part.batch_id == batch.id, part.part == "annotator")
-    annotates = _exists_correlated(*named, part.part == "annotator") | (
-        _exists_correlated(*named) & ~annotators
+    annotators = _build_correlated_exists(part.batch_id == batch.id, part.part == "annotator")
+    annotates = _build_correlated_exists(*named, part.part == "annotator") | (
+        _build_correlated_exists(*named) & ~annotators
     )
     own_count = select(func.count()).where(
         here, annotation.group_id == group.group_id, annotation.kind == INDEPENDENT
     )
-    free = _exists_correlated(
+    free = _build_correlated_exists(
         group.batch_id == batch.id,
         group.settled.is_(None),
         group.submitted.is_(None),
-        ~_exists_correlated(here, mine, annotation.group_id == group.group_id),
+        ~_build_correlated_exists(here, mine, annotation.group_id == group.group_id),
         own_count.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
     )
-    begun = _exists_correlated(
+    begun = _build_correlated_exists(
         here, mine, annotation.submitted.is_(None), annotation.settled.is_(None)
     )
     waits = case((free | begun, 1), else_=0)
-    found = select(pairs_of(batch.id, batch.dataset_id, waits))
+    found = select(json_pairs_of(batch.id, batch.dataset_id, waits))
     return _scalar_subquery(
-        found.where(batch.state == OPEN, copies, annotates | _exists_correlated(here, mine))
+        found.where(batch.state == OPEN, copies, annotates | _build_correlated_exists(here, mine))
     )
 
 
-def _exists_correlated(*where: ColumnElement[bool]) -> Exists:
+def _build_correlated_exists(*where: ColumnElement[bool]) -> Exists:
     return exists().where(*where).correlate(BatchModel, BatchGroupModel, PersonModel)
 
 

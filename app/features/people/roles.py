@@ -14,14 +14,14 @@ from app.features.people.visibility_queries import COPIES
 from app.features.people.visibility_queries import EVERYTHING as EVERYTHING
 from app.features.people.visibility_queries import READER as READER
 from app.features.people.visibility_queries import Visibility as Visibility
-from app.json_text import quoted
-from app.soccer.actors import LOCAL_USER, person_of
+from app.json_text import quote_text
+from app.soccer.actors import LOCAL_USER, person_of_actor
 
 
 class Role(StrEnum):
     """What somebody is in a dataset, or in all; each may do what those before it may.
 
-    ``none`` sees nothing there. ``admin`` is of the whole server, and of no single dataset.
+    ``make_empty_track`` sees nothing there. ``admin`` is of the whole server, and of no single dataset.
     """
 
     NONE = "none"
@@ -150,7 +150,7 @@ class DatasetRoles:
         return self.single.get(dataset_id, otherwise)
 
     @property
-    def highest(self) -> Role:
+    def highest_role(self) -> Role:
         """The most that they are anywhere, for what belongs to no dataset; copies and practice, in
         which everybody may judge, do not count."""
         single = (role for key, role in self.single.items() if key <= COPIES)
@@ -207,7 +207,7 @@ def normalize_user_name(text: str) -> str:
     name = text.strip().lower()
     if not _NAME.fullmatch(name) or name in _TAKEN:
         raise InputError(
-            f"{quoted(name)} is not a valid user name",
+            f"{quote_text(name)} is not a valid user name",
             hint="Use up to 40 lowercase letters, digits and . _ -, with a letter or digit at both"
             f" ends; {', '.join(sorted(_TAKEN))} are reserved.",
             pointer="/name",
@@ -217,7 +217,7 @@ def normalize_user_name(text: str) -> str:
 
 def require_no_token(actor: str) -> None:
     """Raise ForbiddenError where a token asks: who may come in, and as what, is decided by people."""
-    if person_of(actor) != actor:
+    if person_of_actor(actor) != actor:
         raise ForbiddenError(
             "a token cannot add people or change their rights",
             hint="An admin can do this in the browser, or with touchline users on the server's"

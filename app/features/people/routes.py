@@ -12,8 +12,8 @@ from app.features.people.invitations import (
     InvitationRow,
     LinkMailer,
     invite_many,
-    invite_one,
-    renew_one,
+    invite_person,
+    renew_invitation,
 )
 from app.features.people.login_schemas import AccessTokenList
 from app.features.people.schemas import (
@@ -81,7 +81,7 @@ def invite_user(
     cannot be sent, it is shown with the reason.
     """
     post = _make_mailer(team, request)
-    person, row = invite_one(store, new.name, new.role, new.email, post, actor=me.actor)
+    person, row = invite_person(store, new.name, new.role, new.email, post, actor=me.actor)
     return _user_with_link(person, row)
 
 
@@ -160,7 +160,7 @@ def renew_link(
     """
     email = None if new is None else new.email
     return _user_with_link(
-        *renew_one(store, user, email, _make_mailer(team, request), actor=me.actor)
+        *renew_invitation(store, user, email, _make_mailer(team, request), actor=me.actor)
     )
 
 
@@ -187,7 +187,7 @@ def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
 def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
     """The tokens with which somebody's scripts ask."""
     person = people.get_person(store, user)
-    return AccessTokenList(items=team.tokens.of_person(person.id))
+    return AccessTokenList(items=team.tokens.list_of_person(person.id))
 
 
 @users_router.delete(

@@ -21,7 +21,7 @@ from app.features.people.devices import (
     normalize_code,
     verify_and_use_totp,
 )
-from app.features.people.links import hash_token, is_password
+from app.features.people.links import hash_token, verify_password
 from app.features.people.login_queries import delete_logins, delete_passkeys
 from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import (
@@ -154,7 +154,7 @@ class SecondFactors:
         require_password(self._store, login, password, self._clock())
         with self._store.write() as session:
             if delete_second_factor(session, login.person_id):
-                end_factor(session, login)
+                handle_removed_factor(session, login)
                 log_account_event(session, login.name, login.name, "no second factor", login.role)
 
     def clear(self, person_id: int, *, actor: str) -> None:
@@ -207,7 +207,7 @@ def hash_recovery_codes(codes: list[str]) -> list[str]:
     return [hash_token(normalize_code(one)) for one in codes]
 
 
-def end_factor(session: Session, login: Login) -> None:
+def handle_removed_factor(session: Session, login: Login) -> None:
     """What follows when one of somebody's second factors was taken away.
 
     Raises:
@@ -238,5 +238,5 @@ def require_password(store: Store, login: Login, password: str | None, at: datet
         )
     with store.read() as session:
         person = find_person_by_id(session, login.person_id)
-    if person is None or not is_password(password, person.password):
+    if person is None or not verify_password(password, person.password):
         raise InputError("the password is wrong", pointer="/password")

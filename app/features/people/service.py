@@ -12,7 +12,7 @@ from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.features.datasets.queries import find_dataset, read_dataset_names
 from app.features.independent_annotations.queries import list_copy_dataset_ids
-from app.features.people.links import PasswordLink, insert_new
+from app.features.people.links import PasswordLink, insert_password_link
 from app.features.people.login_queries import (
     count_access_tokens,
     delete_access_tokens,
@@ -21,14 +21,14 @@ from app.features.people.login_queries import (
 )
 from app.features.people.logins import read_roles
 from app.features.people.queries import (
-    all_people,
     count_people,
     count_people_who_can_log_in,
+    delete_person_links,
     find_person_by_id,
     find_person_by_name,
-    forget_links,
     insert_person,
     list_dataset_roles,
+    list_people_rows,
     list_people_with_second_factor,
     list_people_with_valid_links,
     read_members,
@@ -44,7 +44,7 @@ from app.features.people.roles import (
 )
 from app.features.people.visibility_queries import COPIES
 from app.json_text import Moment
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ def list_people(store: Store) -> list[Person]:
         tokens, factors = count_access_tokens(session), list_people_with_second_factor(session)
         ways = read_identity_labels(session)
         people = [
-            _person_from_row(row, waiting, tokens, factors, ways) for row in all_people(session)
+            _person_from_row(row, waiting, tokens, factors, ways)
+            for row in list_people_rows(session)
         ]
     return [replace(one, datasets=tuple(single.get(one.id, ()))) for one in people]
 
@@ -137,17 +138,17 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
                 f"there is already a user {name}",
                 hint="To make a new link for this user, reset their password.",
             )
-        person, link = insert_invited(session, name, role, actor=actor)
+        person, link = insert_invited_person(session, name, role, actor=actor)
         return _read_person(session, person), link
 
 
-def insert_invited(
+def insert_invited_person(
     session: Session, name: str, role: Role, *, actor: str
 ) -> tuple[int, PasswordLink]:
     """Make the account of a checked name that nobody has, in the caller's transaction; id and link."""
     person = insert_person(session, name, role, by=actor)
     log_account_event(session, actor, name, "invited", role)
-    return person, insert_new(session, person, by=actor, at=datetime.now(UTC))
+    return person, insert_password_link(session, person, by=actor, at=datetime.now(UTC))
 
 
 def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, PasswordLink]:
@@ -160,7 +161,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Pas
     """
     with store.write() as session:
         person = _read_person(session, person_id)
-        if person_of(actor) != actor:
+        if person_of_actor(actor) != actor:
             raise ForbiddenError(
                 "a token cannot set a password", hint="An admin makes the link in the browser."
             )
@@ -173,7 +174,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Pas
                 f"the account of {person.name} is disabled", hint="Enable the account first."
             )
         log_account_event(session, actor, person.name, "link", person.role)
-        link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
+        link = insert_password_link(session, person_id, by=actor, at=datetime.now(UTC))
         return _read_person(session, person_id), link
 
 
@@ -217,7 +218,7 @@ def change_person(
         if off:
             delete_logins(session, person_id)
             delete_access_tokens(session, person_id)
-            forget_links(session, person_id)
+            delete_person_links(session, person_id)
         return _read_person(session, person_id)
 
 
@@ -360,7 +361,7 @@ def give_role(
         person = find_person_by_id(session, person_id)
         if person is None:
             raise NotFoundError.person(person_id)
-        if person.name == person_of(actor):
+        if person.name == person_of_actor(actor):
             raise ForbiddenError(
                 "you cannot change your own role", hint="An admin, or another lead, can."
             )

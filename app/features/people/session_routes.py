@@ -107,7 +107,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             allows=ALLOWS,
         )
     bearer = read_bearer_token(request.scope)
-    login = team.login(request) if bearer is None else team.login_with(bearer, request)
+    login = team.login(request) if bearer is None else team.find_login_by_token(bearer, request)
     found = make_session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
@@ -142,7 +142,7 @@ def _begin_session(
     code: str | None = None,
 ) -> SessionDocument:
     address = team.address(request)
-    team.count_try(request, name)
+    team.count_login_attempt(request, name)
     try:
         token = team.logins.log_in(
             name,
@@ -157,11 +157,11 @@ def _begin_session(
         # Without the name: people type passwords into the wrong field.
         log.warning("a login was refused", address=address)
         raise
-    response.set_cookie(**team.cookies.session_values(token))
+    response.set_cookie(**team.cookies.make_session_cookie(token))
     login = team.logins.find(token)
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
-    response.set_cookie(**team.cookies.known_device_values(login.name))
+    response.set_cookie(**team.cookies.make_known_device_cookie(login.name))
     return make_session_document(login, store)
 
 
@@ -175,7 +175,7 @@ def log_out(
     login = team.login(request)
     if login is not None:
         team.logins.end(login, login.id)
-    response.set_cookie(**team.cookies.session_values(None))
+    response.set_cookie(**team.cookies.make_session_cookie(None))
     return make_session_document(None, store)
 
 
@@ -196,9 +196,9 @@ def change_password(
 ) -> SessionDocument:
     """Give oneself another password; every session ends, and this browser gets a new one."""
     team.require_passwords()
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
-    response.set_cookie(**team.cookies.session_values(token))
+    response.set_cookie(**team.cookies.make_session_cookie(token))
     return make_session_document(me, store)
 
 
@@ -239,7 +239,7 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
 @open_to_all
 def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
     """Whom a link is for; 404 when it is not good any more."""
-    team.count_try(request)
+    team.count_login_attempt(request)
     return LinkHolder(**vars(links.find_link_holder(store, asked.token)))
 
 
@@ -257,7 +257,7 @@ def use_link(
     `/code`: log in with the new password and a code.
     """
     team.require_passwords()
-    team.count_try(request)
+    team.count_login_attempt(request)
     name = links.set_password_by_link(store, chosen.token, chosen.password, chosen.name)
     return _begin_session(team, store, request, response, name, chosen.password)
 
@@ -275,9 +275,9 @@ def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam
     team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     address = sign_on.begin(
-        asker, redirect=team.landing(request), to=body.to, link=body.link, name=body.name
+        asker, redirect=team.make_landing_url(request), to=body.to, link=body.link, name=body.name
     )
-    response.set_cookie(**team.cookies.sign_on_values(asker))
+    response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
     return SignOnStarted(address=address)
 
 
@@ -297,10 +297,10 @@ def finish(
     provider says, as the operator wants it, that it has asked for one.
     """
     sign_on, address = team.require_sign_on(), team.address(request)
-    team.count_try(request)
+    team.count_login_attempt(request)
     try:
         entered = sign_on.finish(
-            team.cookies.sign_on_secret(request.scope),
+            team.cookies.read_sign_on_secret(request.scope),
             body.state,
             body.code,
             factor=body.factor,
@@ -314,10 +314,10 @@ def finish(
     except AccessError as error:
         log.warning("a single sign-on was refused", address=address, reason=error.message)
         raise
-    response.set_cookie(**team.cookies.sign_on_values(None))
+    response.set_cookie(**team.cookies.make_sign_on_cookie(None))
     if entered.token is None:
         return SignOnEnd(session=make_session_document(team.login(request), store), to=entered.to)
-    response.set_cookie(**team.cookies.session_values(entered.token))
+    response.set_cookie(**team.cookies.make_session_cookie(entered.token))
     return SignOnEnd(
         session=make_session_document(team.logins.find(entered.token), store), to=entered.to
     )
@@ -348,10 +348,10 @@ def begin_link(
 ) -> SignOnStarted:
     """Where to go to link an account of the provider with one's own; takes the password."""
     sign_on = team.require_sign_on()
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     asker = secrets.token_urlsafe()
-    address = sign_on.begin_link(asker, me, body.password, redirect=team.landing(request))
-    response.set_cookie(**team.cookies.sign_on_values(asker))
+    address = sign_on.begin_link(asker, me, body.password, redirect=team.make_landing_url(request))
+    response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
     return SignOnStarted(address=address)
 
 
@@ -364,7 +364,7 @@ def begin_link(
 @may(Action.ACCOUNT)
 def remove(body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
-    team.count_try(request, me.name)
+    team.count_login_attempt(request, me.name)
     unlink_identity(store, me, body.password, datetime.now(UTC))
 
 

@@ -15,7 +15,7 @@ from datetime import UTC, datetime, timedelta
 from hmac import compare_digest
 from typing import Any
 
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
 from app.features.people.devices import make_pending_actions, verify_and_use_code
@@ -195,14 +195,14 @@ class SignOn:
             raise NotLoggedInError("the response comes from another provider", hint="Begin again.")
         if begun.session is not None:
             return self._link_account(begun, code, login)
-        claims = begun.claims or self._admitted_claims(begun, code)
+        claims = begun.claims or self._fetch_admitted_claims(begun, code)
         person_id, password = self._find_or_make_person(begun, claims)
         vouched = self.rules.has_trusted_factor(claims)
         if factor is not None and not vouched:
             # In a transaction of its own, which another that writes would wait for.
-            on_code(self._person_name(person_id))
+            on_code(self._read_person_name(person_id))
 
-        def require(session: Session) -> None:
+        def require_linked_account(session: Session) -> None:
             # Read again: the account may have been taken away from them since.
             if not _has_identity(session, self.rules, claims, person_id):
                 raise NotLoggedInError(
@@ -211,7 +211,7 @@ class SignOn:
             if not vouched and has_second_factor(session, person_id):
                 self._require_second_factor(session, person_id, factor)
             update_identity_use(
-                session, person_id, make_identity_label(claims), text_of(self._clock())
+                session, person_id, make_identity_label(claims), format_utc_time(self._clock())
             )
 
         try:
@@ -221,7 +221,7 @@ class SignOn:
                 browser,
                 address,
                 before,
-                require,
+                require_linked_account,
                 LoginMethod.SIGN_ON,
                 vouched=vouched,
             )
@@ -243,7 +243,7 @@ class SignOn:
         )
         return address
 
-    def _admitted_claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
+    def _fetch_admitted_claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
         claims = self._provider.claims(begun.asked, code)
         self.rules.require_admitted(claims)
         return claims
@@ -295,7 +295,7 @@ class SignOn:
                 self._unknown_account_sentence(), hint=self._unknown_account_hint()
             )
         try:
-            name = normalize_user_name(self.rules.name_for(claims))
+            name = normalize_user_name(self.rules.make_user_name(claims))
         except InputError:
             raise NotLoggedInError(
                 f"{self.rules.label} sent a user name for you that Touchline does not allow",
@@ -321,7 +321,7 @@ class SignOn:
                 "the session that wanted to link an account has ended", hint="Begin again."
             )
         try:
-            claims = self._admitted_claims(begun, code)
+            claims = self._fetch_admitted_claims(begun, code)
         except NotLoggedInError as error:
             raise InputError(error.message, hint=error.hint) from error
         with self._store.write() as session:
@@ -336,12 +336,14 @@ class SignOn:
         shown, person = make_identity_label(claims), find_person_by_id(session, person_id)
         assert person is not None
         values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
-        put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
+        put_identity(
+            session, {**values, "person_id": person_id, "created": format_utc_time(self._clock())}
+        )
         log_account_event(
             session, person.name, person.name, "single sign-on linked", person.role, account=shown
         )
 
-    def _person_name(self, person_id: int) -> str:
+    def _read_person_name(self, person_id: int) -> str:
         with self._store.read() as session:
             person = find_person_by_id(session, person_id)
         assert person is not None

@@ -12,16 +12,20 @@ from urllib.parse import urlsplit
 from app.config import Settings
 from app.db.session import Session
 from app.db.store import Store
-from app.durable import read_private
+from app.durable import read_private_file
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.login_queries import (
-    count_linked,
+    count_linked_people,
     delete_identity,
     delete_logins,
     find_person_identity,
 )
 from app.features.people.logins import Login, LoginMethod
-from app.features.people.queries import all_people, count_people_who_can_log_in, find_person_by_id
+from app.features.people.queries import (
+    count_people_who_can_log_in,
+    find_person_by_id,
+    list_people_rows,
+)
 from app.features.people.roles import Role, log_account_event, require_no_token
 from app.features.people.second_factor import require_password
 from app.json_text import Moment
@@ -69,26 +73,28 @@ class SignOnRules:
         if (
             self.domains
             and ALL not in self.domains
-            and _verified_email_domain(claims) not in self.domains
+            and _find_verified_email_domain(claims) not in self.domains
         ):
             raise NotLoggedInError(
                 f"{self.label} did not confirm an e-mail address of yours that may log in here",
                 hint="Use your work account, and make sure that its address is verified.",
             )
-        if self.group_claim and self.groups.isdisjoint(_claim_texts(claims.get(self.group_claim))):
+        if self.group_claim and self.groups.isdisjoint(
+            _claim_to_texts(claims.get(self.group_claim))
+        ):
             raise NotLoggedInError(
                 f"you are in none of the groups of {self.label} that may log in here",
                 hint="The operator of this server knows which groups are allowed.",
             )
 
-    def name_for(self, claims: Mapping[str, Any]) -> str:
+    def make_user_name(self, claims: Mapping[str, Any]) -> str:
         """What somebody new would be called here: small letters, digits, dots and dashes."""
         claimed = str(claims.get(self.name_claim) or "").strip().lower().partition("@")[0]
         return re.sub(r"[^a-z0-9._-]+", "-", claimed)[:40].strip("._-")
 
     def has_trusted_factor(self, claims: Mapping[str, Any]) -> bool:
         """Whether the provider says that it has asked for a second factor, as the operator wants it."""
-        methods = {*_claim_texts(claims.get("amr")), *_claim_texts(claims.get("acr"))}
+        methods = {*_claim_to_texts(claims.get("amr")), *_claim_to_texts(claims.get("acr"))}
         return not self.trusted.isdisjoint(methods)
 
 
@@ -128,7 +134,7 @@ def read_rules(settings: Settings) -> SignOnRules | None:
     issuer, client = settings.sso_issuer or "", settings.sso_client_id or ""
     if not (issuer and client and secret):
         absent = [
-            _variable_name(name)
+            _make_variable_name(name)
             for name, value in (
                 ("issuer", issuer),
                 ("client_id", client),
@@ -150,13 +156,13 @@ def read_rules(settings: Settings) -> SignOnRules | None:
         client,
         secret,
         settings.sso_label.strip(),
-        _allowed_hosts([issuer, *settings.sso_hosts]),
+        _collect_allowed_hosts([issuer, *settings.sso_hosts]),
         settings.sso_scope,
         settings.sso_name_claim,
         frozenset(one.strip().lower().lstrip("@") for one in settings.sso_domains),
         settings.sso_group_claim,
         frozenset(settings.sso_groups),
-        _role_of_new_people(settings),
+        _parse_role_of_new_people(settings),
         settings.sso_only,
         frozenset(settings.sso_second_factor),
     )
@@ -177,7 +183,7 @@ def _require_complete_settings(settings: Settings) -> None:
         )
 
 
-def _role_of_new_people(settings: Settings) -> Role | None:
+def _parse_role_of_new_people(settings: Settings) -> Role | None:
     if not settings.sso_new_role:
         return None
     known = [role.value for role in Role if role is not Role.ADMIN]
@@ -186,7 +192,7 @@ def _role_of_new_people(settings: Settings) -> Role | None:
     return Role(settings.sso_new_role)
 
 
-def _allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
+def _collect_allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
     try:
         found = [(urlsplit(one), parse_origin(one)) for one in addresses]
     except ValueError as error:
@@ -207,23 +213,23 @@ def _read_client_secret(settings: Settings) -> str:
             "the client's secret is given twice: by TOUCHLINE_SSO_CLIENT_SECRET and by"
             " TOUCHLINE_SSO_CLIENT_SECRET_FILE"
         )
-    return read_private(path, _variable_name("client_secret_file"))
+    return read_private_file(path, _make_variable_name("client_secret_file"))
 
 
-def _verified_email_domain(claims: Mapping[str, Any]) -> str | None:
+def _find_verified_email_domain(claims: Mapping[str, Any]) -> str | None:
     """Of the e-mail address that the provider has verified; None: of none."""
     if claims.get("email_verified") not in (True, "true"):
         return None
     return str(claims.get("email") or "").rpartition("@")[2].lower() or None
 
 
-def _claim_texts(claim: object) -> list[str]:
+def _claim_to_texts(claim: object) -> list[str]:
     if isinstance(claim, str):
         return [claim]
     return [one for one in claim if isinstance(one, str)] if isinstance(claim, list) else []
 
 
-def _variable_name(name: str) -> str:
+def _make_variable_name(name: str) -> str:
     return f"TOUCHLINE_{_PREFIX}{name}".upper()
 
 
@@ -247,14 +253,14 @@ class Identity:
 
 
 @dataclass(frozen=True)
-class OwnWays:
+class OwnLoginWays:
     """How somebody can come in: by a password, and by an account of the provider."""
 
     password: bool
     identity: Identity | None
 
 
-def read_login_ways(store: Store, person_id: int) -> OwnWays:
+def read_login_ways(store: Store, person_id: int) -> OwnLoginWays:
     """How a person can come in."""
     with store.read() as session:
         person, row = (
@@ -262,7 +268,7 @@ def read_login_ways(store: Store, person_id: int) -> OwnWays:
             find_person_identity(session, person_id),
         )
     found = None if row is None else Identity(row.issuer, row.shown, row.created, row.used)
-    return OwnWays(person is not None and person.password is not None, found)
+    return OwnLoginWays(person is not None and person.password is not None, found)
 
 
 def require_no_identity(session: Session, person_id: int, rules: SignOnRules) -> None:
@@ -327,6 +333,8 @@ def count_linked_admins(store: Store, rules: SignOnRules) -> int:
     """How many admins can come by the provider."""
     with store.read() as session:
         admins = [
-            one.id for one in all_people(session) if one.role == Role.ADMIN and not one.disabled
+            one.id
+            for one in list_people_rows(session)
+            if one.role == Role.ADMIN and not one.disabled
         ]
-        return count_linked(session, rules.issuer, admins)
+        return count_linked_people(session, rules.issuer, admins)

@@ -65,7 +65,7 @@ READER: ContextVar[RestrictedReader | None] = ContextVar("reader", default=None)
 """Who asks; None: an admin, the server itself or a command, from whom nothing is hidden."""
 
 
-def is_blind(dataset_id: int) -> bool:
+def has_hidden_groups(dataset_id: int) -> bool:
     """Whether groups of a dataset are hidden from whoever asks."""
     reader = READER.get()
     return reader is not None and dataset_id in reader.batches

@@ -15,7 +15,7 @@ from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
 from app.soccer.annotation import Lines
-from app.soccer.codec import digest, lines_from_json, picture_from_json
+from app.soccer.codec import digest_json, lines_from_json, picture_from_json
 from app.soccer.finding import PITCH_SIZE
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -60,7 +60,7 @@ class MatchPitch:
     pitches: tuple[Pitch, ...]
 
 
-def match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
+def read_match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
     """Every match of a dataset, by name; groups without a match are one, without a name."""
     model = GroupModel
     statement = (
@@ -95,11 +95,11 @@ def list_groups_of_match(session: Session, dataset_id: int, match: str) -> list[
 
 def digest_lines_of_matches(session: Session, dataset_id: int) -> dict[str, str]:
     """Digest of the lines of each match's cameras."""
-    rows = session.execute(_cameras_statement(StationModel.digest, dataset_id=dataset_id))
+    rows = session.execute(_select_cameras_with_lines(StationModel.digest, dataset_id=dataset_id))
     digests: dict[str, list[str]] = {}
     for match, value in rows:
         digests.setdefault(match, []).append(value)
-    return {match: digest(sorted(values)) for match, values in digests.items()}
+    return {match: digest_json(sorted(values)) for match, values in digests.items()}
 
 
 def read_lines_of_match(
@@ -113,22 +113,24 @@ def read_lines_of_match(
         StationModel.height,
         StationModel.picture,
     )
-    statement = _cameras_statement(*columns, dataset_id=dataset_id).where(GroupModel.match == match)
+    statement = _select_cameras_with_lines(*columns, dataset_id=dataset_id).where(
+        GroupModel.match == match
+    )
     rows = session.execute(statement.order_by(StationModel.id)).all()
-    seen = (_lines_as_taken(row) for row in rows)
+    seen = (_restore_original_lines(row) for row in rows)
     return [item for item in seen if item is not None]
 
 
-def _lines_as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
+def _restore_original_lines(row: Any) -> tuple[Lines, ImageSize] | None:
     """What a camera's lines are without what was done to its picture; None where nobody knows that."""
     lines, size = lines_from_json(parse_json_column(row.lines)), ImageSize(row.width, row.height)
     picture = None if row.picture is None else picture_from_json(parse_json_column(row.picture))
     if picture is None:
         return lines, size
-    return (picture.lines_as_taken(lines, size), size) if picture.is_known else None
+    return (picture.lines_in_original_picture(lines, size), size) if picture.is_known else None
 
 
-def _cameras_statement(*columns: Any, dataset_id: int) -> Any:
+def _select_cameras_with_lines(*columns: Any, dataset_id: int) -> Any:
     """Each match's cameras that have lines, once."""
     return (
         select(GroupModel.match, *columns)
@@ -139,14 +141,14 @@ def _cameras_statement(*columns: Any, dataset_id: int) -> Any:
     )
 
 
-def read_estimates(session: Session, dataset_id: int) -> dict[str, Any]:
+def read_pitch_estimates(session: Session, dataset_id: int) -> dict[str, Any]:
     """The rows of what was estimated, by match."""
     model = PitchEstimateModel
     rows = session.execute(select(*model.__table__.columns).where(model.dataset_id == dataset_id))
     return {row.match: row for row in rows}
 
 
-def save_estimate(session: Session, dataset_id: int, match: str, **values: Any) -> None:
+def save_pitch_estimate(session: Session, dataset_id: int, match: str, **values: Any) -> None:
     """Put an estimate in the place of the one before."""
     statement = insert_or_replace(PitchEstimateModel)
     session.execute(statement, [{"dataset_id": dataset_id, "match": match, **values}])
@@ -159,7 +161,9 @@ def read_edited_pitches(
 
     Groups without a match have none in common: nobody knows whether others come from that pitch.
     """
-    newest = _newest_entries_statement(dataset_id).where(GroupModel.match.in_(set(matches) - {""}))
+    newest = _select_newest_pitch_entries(dataset_id).where(
+        GroupModel.match.in_(set(matches) - {""})
+    )
     statement = (
         select(GroupModel.match, GroupModel.pitch_length, GroupModel.pitch_width)
         .join(LogModel, LogModel.group_id == GroupModel.id)
@@ -181,17 +185,17 @@ def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogE
     """
     entries = {
         entry.group_id: entry
-        for entry in read_log(session, LogModel.id.in_(_newest_entries_statement(dataset_id)))
+        for entry in read_log(session, LogModel.id.in_(_select_newest_pitch_entries(dataset_id)))
     }
     model = GroupModel
     rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
     changes = {row.match: entries[row.id] for row in rows}
-    if "" in changes and not _concerns_all_without_match(session, dataset_id, changes[""]):
+    if "" in changes and not _changes_all_groups_without_match(session, dataset_id, changes[""]):
         del changes[""]
     return changes
 
 
-def _concerns_all_without_match(session: Session, dataset_id: int, newest: LogEntry) -> bool:
+def _changes_all_groups_without_match(session: Session, dataset_id: int, newest: LogEntry) -> bool:
     """Whether all groups without a match were given another size with an entry, and had one."""
     groups = set(list_groups_of_match(session, dataset_id, ""))
     nameless = select(GroupModel.id).where(
@@ -206,7 +210,7 @@ def _concerns_all_without_match(session: Session, dataset_id: int, newest: LogEn
     return groups <= set(same)
 
 
-def _newest_entries_statement(dataset_id: int) -> Any:
+def _select_newest_pitch_entries(dataset_id: int) -> Any:
     """Ids of the newest entry about the pitch of each match."""
     return (
         select(func.max(LogModel.id))

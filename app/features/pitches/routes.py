@@ -12,17 +12,17 @@ from app.features.groups.schemas import PitchSize
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import (
     JobDocument,
+    describe_job_response_for_openapi,
     make_job_response,
     make_location_header,
-    openapi_of_job_response,
 )
 from app.features.pitches.service import DatasetPitches, read_pitches
-from app.features.solve.jobs import PitchJob, request_pitches, request_solve
+from app.features.solve.jobs import PitchJob, request_pitch_change, request_solve_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Arc, Pitch, Segment, opposite_marking
@@ -124,7 +124,7 @@ class PitchChange(BaseModel):
 
 
 @pitch_router.get("/pitch", operation_id="getPitch", responses=responses())
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_pitch(
     length: Annotated[float, Query(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])] = 105.0,
     width: Annotated[float, Query(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])] = 68.0,
@@ -149,7 +149,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     return PitchesDocument.model_validate(state)
 
 
-@pitches_router.post("", operation_id="estimatePitches", **openapi_of_job_response(404))
+@pitches_router.post("", operation_id="estimatePitches", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -159,14 +159,16 @@ def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) 
     """
     found = get_dataset_head(services.store, dataset)
     title = f"Estimate the pitches of {found.name}"
-    return request_solve(services.jobs, services.store, found.id, actor=actor, title=title)
+    return request_solve_job(services.jobs, services.store, found.id, actor=actor, title=title)
 
 
-def _sized_response(sized: PitchJob) -> Response:
+def _make_pitch_job_response(sized: PitchJob) -> Response:
     pitches = PitchesDocument.model_validate(sized.state)
     job = JobDocument.model_validate(sized.job)
     job.result = {"pitches": pitches.model_dump(mode="json")}
-    return document(job, 202, {**_etag_headers(sized.state), **make_location_header(sized.job)})
+    return make_document_response(
+        job, 202, {**_etag_headers(sized.state), **make_location_header(sized.job)}
+    )
 
 
 @pitches_router.patch(
@@ -177,7 +179,7 @@ def _sized_response(sized: PitchJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(_sized_response)
+@respond_with(_make_pitch_job_response)
 def set_pitch(
     dataset: DatasetPath,
     change: PitchChange,
@@ -195,7 +197,7 @@ def set_pitch(
     with add_current_state_to_conflicts(
         lambda: PitchesDocument.model_validate(read_pitches(store, dataset))
     ):
-        return request_pitches(
+        return request_pitch_change(
             services.jobs,
             store,
             present.dataset_id,

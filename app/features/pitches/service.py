@@ -16,7 +16,7 @@ from app.db.log import LogEntry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import GeometryError, InputError
-from app.features.datasets.service import need_match, read_dataset_head
+from app.features.datasets.service import filter_by_existing_match, read_dataset_head
 from app.features.groups.edit import SetPitch
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import edit_groups
@@ -27,17 +27,17 @@ from app.features.pitches.queries import (
     digest_lines_of_matches,
     find_last_pitch_changes,
     list_groups_of_match,
-    match_pitches,
-    read_estimates,
     read_lines_of_match,
+    read_match_pitches,
+    read_pitch_estimates,
     replace_pitch_findings,
-    save_estimate,
+    save_pitch_estimate,
 )
 from app.features.queue.refresh_queries import refresh_queue
 from app.progress import ReportProgress
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy, digested_calibration
+from app.soccer.policy import CalibrationPolicy, calibration_values_to_digest
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
 from app.workers.executors import run_tasks
@@ -97,7 +97,7 @@ class DatasetPitches:
     def etag(self) -> str:
         """Quoted, for ETag and If-Match: of the sizes in use."""
         sizes = [[item.match, asdict(item.pitch), item.mixed, item.groups] for item in self.items]
-        return f'"{digest([self.dataset_id, sizes])[:16]}"'
+        return f'"{digest_json([self.dataset_id, sizes])[:16]}"'
 
     @property
     def proposals(self) -> tuple[PitchState, ...]:
@@ -142,13 +142,13 @@ def estimate_pitches(
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         policy = found.policy.calibration
-        stale = _stale_matches_with_inputs(session, found.id, policy)
+        stale = _list_stale_matches(session, found.id, policy)
     tasks = (_make_task(store, found.id, match, inputs, policy) for match, inputs in stale)
     for done, (match, values) in enumerate(
-        run_tasks(_estimate_match, tasks, executor, stop), start=1
+        run_tasks(_run_pitch_task, tasks, executor, stop), start=1
     ):
         with store.write() as session:
-            save_estimate(session, found.id, match, **values)
+            save_pitch_estimate(session, found.id, match, **values)
         if progress is not None:
             progress(done, len(stale))
     with store.write() as session:
@@ -161,8 +161,7 @@ def list_matches_to_estimate(store: Store, dataset: str | int) -> list[str]:
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         return [
-            match
-            for match, _ in _stale_matches_with_inputs(session, found.id, found.policy.calibration)
+            match for match, _ in _list_stale_matches(session, found.id, found.policy.calibration)
         ]
 
 
@@ -193,7 +192,7 @@ def change_pitches(
     if if_match is not None:
         require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')
     for match, pitch in wanted.items():
-        need_match(state.items, match, state.dataset)
+        filter_by_existing_match(state.items, match, state.dataset)
         ids = list_groups_of_match(session, state.dataset_id, match)
         set_pitch_of_groups(session, state.dataset_id, ids, pitch, actor)
     # What the lines show is not asked again: it does not depend on the size in use.
@@ -218,7 +217,7 @@ def choose_requested_sizes(
         NotFoundError: There is no such match.
         InputError: The size is none, or there was none before.
     """
-    chosen = need_match(found.items, match, found.dataset)
+    chosen = filter_by_existing_match(found.items, match, found.dataset)
     if size is None:
         return {item.match: item.proposed for item in chosen if accept and item.proposed}
     return {item.match: _requested_size(item, size) for item in chosen}
@@ -281,8 +280,8 @@ def _read_pitches(
         shown = _current_estimates(session, found.id, found.policy.calibration)
     changes = find_last_pitch_changes(session, found.id)
     items = tuple(
-        _pitch_state(item, shown.get(item.match, (None, None)), changes.get(item.match))
-        for item in match_pitches(session, found.id)
+        _make_pitch_state(item, shown.get(item.match, (None, None)), changes.get(item.match))
+        for item in read_match_pitches(session, found.id)
         if item.match or item.match in shown
     )
     return DatasetPitches(found.id, found.name, items)
@@ -292,9 +291,9 @@ def _current_estimates(
     session: Session, dataset_id: int, policy: CalibrationPolicy
 ) -> dict[str, _Shown]:
     """What was estimated of the lines as they are now; the other matches are not computed."""
-    stale = {match for match, _ in _stale_matches_with_inputs(session, dataset_id, policy)}
+    stale = {match for match, _ in _list_stale_matches(session, dataset_id, policy)}
     shown: dict[str, _Shown] = dict.fromkeys(stale, (None, None))
-    for match, row in read_estimates(session, dataset_id).items():
+    for match, row in read_pitch_estimates(session, dataset_id).items():
         if match in stale:
             continue
         sizes = (row.length, row.width, row.length_sigma, row.width_sigma)
@@ -303,11 +302,11 @@ def _current_estimates(
     return shown
 
 
-def _stale_matches_with_inputs(
+def _list_stale_matches(
     session: Session, dataset_id: int, policy: CalibrationPolicy
 ) -> list[tuple[str, str]]:
     """Matches whose lines are others than when they were estimated, and what keys them now."""
-    present = read_estimates(session, dataset_id)
+    present = read_pitch_estimates(session, dataset_id)
     return [
         (match, inputs)
         for match, value in digest_lines_of_matches(session, dataset_id).items()
@@ -316,7 +315,7 @@ def _stale_matches_with_inputs(
     ]
 
 
-def _pitch_state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchState:
+def _make_pitch_state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchState:
     estimate, problem = shown
     previous = None
     if changed is not None:
@@ -349,7 +348,7 @@ def _inputs_digest(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
     # Where the camera stands has no part in it, nor has paint: every frame's lines say it.
     own = replace(policy, share_position=False, source="lines")
-    return digest([SOLVER_VERSION, digested_calibration(own), lines])
+    return digest_json([SOLVER_VERSION, calibration_values_to_digest(own), lines])
 
 
 def _make_task(
@@ -360,7 +359,7 @@ def _make_task(
     return _PitchTask(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
 
 
-def _estimate_match(task: _PitchTask) -> tuple[str, dict[str, Any]]:
+def _run_pitch_task(task: _PitchTask) -> tuple[str, dict[str, Any]]:
     """Values of the estimate's row; runs in a worker."""
     nothing = PitchEstimate(None, None, None, None, 0)
     problem = None

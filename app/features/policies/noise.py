@@ -16,7 +16,7 @@ from app.db.log import find_newest_entry_id
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.datasets.service import need_dataset, read_dataset_head, save_policy
+from app.features.datasets.service import read_dataset_head, require_dataset_id, save_policy
 from app.features.groups.group_edits import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy_dataset
@@ -24,14 +24,14 @@ from app.features.match_estimates.queries import (
     Factors,
     NoiseFactor,
     find_noise_factor,
-    read_factors,
+    read_noise_factors,
 )
 from app.features.policies.service import (
     CUSTOM,
     PolicyState,
     apply_policy,
-    policy_with,
     read_policy,
+    replace_thresholds,
 )
 from app.features.solutions.queries import find_newest_solution_id, list_solved_groups
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
@@ -152,7 +152,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         [(miss, own) for some, own in misses for miss in some], noise.ball, state.policy
     )
     with store.read() as session:
-        used = read_factors(session, state.dataset_id)
+        used = read_noise_factors(session, state.dataset_id)
     advice = _make_advice(noise, state.policy)
     return Noise(
         dataset_id=state.dataset_id,
@@ -167,7 +167,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         line_estimate=noise.lines,
         follows=state.policy.noise == ESTIMATED,
         advice=advice,
-        notices=tuple(_notice_sentences(advice, state.policy)),
+        notices=tuple(_describe_notices(advice, state.policy)),
     )
 
 
@@ -176,7 +176,7 @@ def choose_noise_sample(ids: Sequence[int]) -> Sequence[int]:
     return ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
 
 
-def is_followed(store: Store, dataset: str | int) -> bool:
+def is_noise_estimated(store: Store, dataset: str | int) -> bool:
     """Whether solving a dataset estimates its noise.
 
     Somebody's own copies have the numbers of what they are of.
@@ -186,7 +186,7 @@ def is_followed(store: Store, dataset: str | int) -> bool:
         return found.policy.noise == ESTIMATED and not is_copy_dataset(session, found.id)
 
 
-def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
+def update_estimated_noise(store: Store, dataset: str | int, actor: str) -> bool:
     """Let the policy of a dataset, whose noise is ``estimated``, have what the dataset shows now.
 
     A change too small to matter is none: the groups would all be solved again.
@@ -200,7 +200,9 @@ def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
     if not any(item.moved for item in advice):
         return False
     values = {item.name: item.estimate for item in advice}
-    policy = policy_with(state.policy, {"noise": ESTIMATED, **values}, name=state.policy.name)
+    policy = replace_thresholds(
+        state.policy, {"noise": ESTIMATED, **values}, name=state.policy.name
+    )
     with store.write() as session:
         # Where somebody chose another one meanwhile, its own solve looks again.
         if read_dataset_head(session, state.dataset_id).policy == state.policy:
@@ -229,23 +231,23 @@ def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str)
         StaleRevisionError: The policy is another by now.
     """
     if noise.values and state.policy.noise == ESTIMATED:
-        policy = policy_with(state.policy, {"noise": ESTIMATED, **noise.values})
+        policy = replace_thresholds(state.policy, {"noise": ESTIMATED, **noise.values})
         save_policy(session, noise.dataset_id, policy, actor)
     elif noise.values:
         name = CUSTOM if state.policy.name in POLICIES else state.policy.name
-        policy = policy_with(state.policy, noise.values, name=name)
+        policy = replace_thresholds(state.policy, noise.values, name=name)
         apply_policy(session, noise.dataset_id, policy, if_match=state.etag, actor=actor)
     if noise.is_new:
         apply_noise_factors(session, noise.dataset_id, noise.factors, actor)
 
 
-def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
+def reset_noise_factors(session: Session, dataset: str | int, *, actor: str) -> int:
     """Take all balls to be as noisy as their dataset's, in a write session; how many groups change.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
-    return apply_noise_factors(session, need_dataset(session, dataset), (), actor)
+    return apply_noise_factors(session, require_dataset_id(session, dataset), (), actor)
 
 
 def _solved_group_ids(store: Store, dataset_id: int) -> list[int]:
@@ -266,7 +268,7 @@ def _groups_with_ball_actors(
         yield from ((state, placed.get(state.id, {})) for state in states)
 
 
-def _noise_sources(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[BallSource]]:
+def _find_ball_sources(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[BallSource]]:
     """The static camera of each view, and who placed its ball, by the view's key."""
     found: dict[str, list[BallSource]] = {}
     for view in state.group.views:
@@ -318,7 +320,7 @@ def _estimate_noise(
     for state, placed in _groups_with_ball_actors(store, choose_noise_sample(ids)):
         if state.solution is not None:
             seen.append(NoiseGroup.of(state.group, state.solution, state.policy))
-            sources.append(_noise_sources(state, placed))
+            sources.append(_find_ball_sources(state, placed))
     return len(seen), sources, estimate_noise(seen, policy)
 
 
@@ -356,7 +358,7 @@ def _threshold_advice(name: str, found: tuple[float, float, float], policy: Poli
     return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
 
-def _notice_sentences(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
+def _describe_notices(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
     if not advice:
         yield (
             "Too few views agree on a ball to estimate the noise of its annotation: the sigma of the "
@@ -390,7 +392,7 @@ SIZE = 64
 """Datasets whose last answer is kept; the one that was not asked for the longest goes first."""
 
 
-class NoiseStore:
+class NoiseCache:
     """The last answer for each dataset, computed anew when log, solutions or policy differ."""
 
     def __init__(self, store: Store):

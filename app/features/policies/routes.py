@@ -15,16 +15,16 @@ from app.features.policies.schemas import (
 from app.features.policies.service import (
     CUSTOM,
     policy_from_yaml,
-    policy_with,
     read_policy,
+    replace_thresholds,
     unknown_policy_error,
 )
-from app.features.solve.jobs import PolicyJob, request_policy
+from app.features.solve.jobs import PolicyJob, request_policy_change
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.documents import document, respond_with
+from app.http.documents import make_document_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
@@ -42,7 +42,7 @@ CHANGED: Responses = {
 
 
 @router.get("/policies", operation_id="listPolicies", responses=responses())
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_policies() -> PolicyCatalogue:
     """The policies that come with the software, and what can be set in one."""
@@ -61,14 +61,16 @@ def list_policies() -> PolicyCatalogue:
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """What judges the dataset, and what judged it before."""
     policy = PolicyStateDocument.of(read_policy(store, dataset))
-    response.headers.update(_tagged_response(policy))
+    response.headers.update(_make_etag_headers(policy))
     return policy
 
 
-def _judged_response(judged: PolicyJob) -> Response:
+def _make_policy_job_response(judged: PolicyJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
-    return document(job, 202, {**_tagged_response(policy), **make_location_header(judged.job)})
+    return make_document_response(
+        job, 202, {**_make_etag_headers(policy), **make_location_header(judged.job)}
+    )
 
 
 @router.put(
@@ -79,7 +81,7 @@ def _judged_response(judged: PolicyJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(_judged_response)
+@respond_with(_make_policy_job_response)
 def put_policy(
     dataset: DatasetPath,
     change: PolicyChange,
@@ -94,16 +96,16 @@ def put_policy(
     """
     store = services.store
     present = read_policy(store, dataset)
-    policy = policy_of_request(change, present.policy)
+    policy = build_requested_policy(change, present.policy)
     with add_current_state_to_conflicts(
         lambda: PolicyStateDocument.of(read_policy(store, dataset))
     ):
-        return request_policy(
+        return request_policy_change(
             services.jobs, store, present.dataset_id, policy, if_match=if_match, actor=actor
         )
 
 
-def policy_of_request(change: PolicyChange, present: Policy) -> Policy:
+def build_requested_policy(change: PolicyChange, present: Policy) -> Policy:
     """The policy that a request asks for.
 
     Raises:
@@ -126,8 +128,8 @@ def policy_of_request(change: PolicyChange, present: Policy) -> Policy:
         raise unknown_policy_error(change.name or "", "it brings no values", pointer="/name")
     # A shipped policy with another threshold is no longer the one of that name.
     name = change.name or (CUSTOM if present.name in POLICIES else present.name)
-    return policy_with(present, change.values or {}, name=name, pointer="/values")
+    return replace_thresholds(present, change.values or {}, name=name, pointer="/values")
 
 
-def _tagged_response(policy: PolicyStateDocument) -> dict[str, str]:
+def _make_etag_headers(policy: PolicyStateDocument) -> dict[str, str]:
     return {"ETag": policy.etag, "Cache-Control": "private, no-cache"}

@@ -18,7 +18,7 @@ from app.errors import InputError
 from app.features.datasets.service import read_dataset_head, save_policy
 from app.features.groups.state import require_etag
 from app.features.policies.queries import PolicyVersion, read_policy_history
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.soccer.group import Group
 from app.soccer.policy import (
     CALIBRATION,
@@ -32,8 +32,8 @@ from app.soccer.policy import (
     TOUCHLINE,
     Policy,
     Threshold,
-    is_shipped,
-    with_sigmas,
+    copy_click_sigmas,
+    is_builtin_policy,
 )
 
 LEAST_SHARE = 0.5
@@ -63,7 +63,9 @@ class PolicyState:
     @property
     def etag(self) -> str:
         """Quoted, for ETag and If-Match."""
-        return f'"{digest([self.dataset_id, self.version, self.policy.name, self.policy.hash])}"'
+        return (
+            f'"{digest_json([self.dataset_id, self.version, self.policy.name, self.policy.hash])}"'
+        )
 
 
 def read_policy(store: Store, dataset: str | int) -> PolicyState:
@@ -108,7 +110,7 @@ def apply_policy(
         require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
     if policy.noise == state.policy.noise == ESTIMATED:
         # What was estimated is the dataset's: it stays until the next solve.
-        policy = with_sigmas(policy, state.policy)
+        policy = copy_click_sigmas(policy, state.policy)
     if policy == state.policy:
         return state
     save_policy(session, state.dataset_id, policy, actor)
@@ -151,7 +153,7 @@ def policy_from_yaml(text: str) -> Policy:
     if not isinstance(value, dict):
         raise InputError("a policy in YAML consists of lines `name: value`")
     name = value.pop("name", CUSTOM)
-    return policy_with(POLICIES.get(str(name), PAPER), value, name=name)
+    return replace_thresholds(POLICIES.get(str(name), PAPER), value, name=name)
 
 
 def unknown_policy_error(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
@@ -189,7 +191,7 @@ def policy_to_values(policy: Policy) -> dict[str, Json]:
     return values
 
 
-def policy_with(
+def replace_thresholds(
     policy: Policy, values: Mapping[str, Any], *, name: object = None, pointer: str = ""
 ) -> Policy:
     """A policy with other thresholds and, where one is given, another name.
@@ -207,19 +209,19 @@ def policy_with(
     for key, value in flat.items():
         flat[key] = _check_threshold(_BY_NAME[key], value, pointer)
     if "noise" not in flat and any(
-        flat.get(key, there) != there for key, there in _noise_by_name(policy)
+        flat.get(key, there) != there for key, there in _list_noise_thresholds(policy)
     ):
         # Who says a number means it: no estimate takes its place.
         flat["noise"] = FIXED
     inner = {key.partition(".")[2]: flat.pop(key) for key in list(flat) if "." in key}
     calibration = replace(policy.calibration, **inner)
-    chosen = policy.name if name is None else _checked_name(name)
+    chosen = policy.name if name is None else _validate_policy_name(name)
     changed = replace(policy, **{**flat, CALIBRATION: calibration, "name": chosen})
-    _require_honest(changed)
+    _require_unchanged_shipped_policy(changed)
     return changed
 
 
-def _noise_by_name(policy: Policy) -> Iterator[tuple[str, float | None]]:
+def _list_noise_thresholds(policy: Policy) -> Iterator[tuple[str, float | None]]:
     """The noise of a policy by name."""
     for name in (*SIGMAS, *(f"{CALIBRATION}.{name}" for name in LINE_SIGMAS)):
         yield name, _BY_NAME[name].value(policy)
@@ -272,7 +274,7 @@ def _check_threshold(
     return found
 
 
-def _checked_name(name: object) -> str:
+def _validate_policy_name(name: object) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
             "the name of a policy may have up to 80 letters, digits, spaces and . _ + -",
@@ -281,9 +283,9 @@ def _checked_name(name: object) -> str:
     return name
 
 
-def _require_honest(policy: Policy) -> None:
+def _require_unchanged_shipped_policy(policy: Policy) -> None:
     """Whoever reads the name of a shipped policy in an export must be able to rely on it."""
-    if policy.name in POLICIES and not is_shipped(policy):
+    if policy.name in POLICIES and not is_builtin_policy(policy):
         raise InputError(
             f'"{policy.name}" is the name of a policy with other thresholds',
             hint="Choose another name for your policy.",
@@ -313,10 +315,10 @@ class _PlainLoader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """The next node; an alias could make a small text a huge value."""
         if self.check_event(yaml.AliasEvent):
-            raise self._refused("references are not allowed")
+            raise self._make_error("references are not allowed")
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise self._refused("it is nested too deeply")
+            raise self._make_error("it is nested too deeply")
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
         return node
@@ -335,6 +337,6 @@ class _PlainLoader(yaml.SafeLoader):
             seen.add(key.value)
         return super().construct_mapping(node, deep)
 
-    def _refused(self, problem: str) -> yaml.MarkedYAMLError:
+    def _make_error(self, problem: str) -> yaml.MarkedYAMLError:
         mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
         return yaml.MarkedYAMLError(problem=problem, problem_mark=mark)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from app.durable import keep_private
+from app.durable import set_private_umask
 from app.sample import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
 from app.terminal.options import Json, Workers, get_current_actor, read_settings
 from app.terminal.server import open_store
@@ -51,7 +51,7 @@ def sample(
         print_values(vars(report), json_)
         return
     if out is None:
-        keep_private()
+        set_private_umask()
     settings = read_settings()
     folder, pool = out or settings.home / SAMPLE, partial(open_executor, settings, workers)
     with open_store(settings) as store, show_progress("Making the sample") as progress:
@@ -97,7 +97,7 @@ def practice(
     """Make eight practice groups with known answers, as the dataset practice; done once."""
     from app.features.practice.service import make_practice_dataset
 
-    keep_private()
+    set_private_umask()
     settings = read_settings()
     with open_store(settings) as store, show_progress("Making the practice groups") as progress:
         made = make_practice_dataset(

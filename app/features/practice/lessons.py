@@ -71,7 +71,7 @@ LESSONS = (
 )
 
 
-def make_practice() -> list[Scene]:
+def make_practice_scenes() -> list[Scene]:
     """The scenes of all lessons, in their order."""
     stage = make_practice_stage()
     return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
@@ -97,7 +97,7 @@ def write_practice(out: Path, progress: ReportProgress | None = None) -> None:
         out: Folder, made when missing.
         progress: Called after each frame.
     """
-    scenes = make_practice()
+    scenes = make_practice_scenes()
     out.mkdir(parents=True, exist_ok=True)
     write_soccernet_v3(out, [scene.group for scene in scenes])
     _write_frames(out / scenes[0].fixture.folder / ARCHIVE, scenes, progress)
@@ -127,7 +127,7 @@ def _write_frames(archive: Path, scenes: list[Scene], progress: ReportProgress |
 
 
 @dataclass(frozen=True)
-class LessonWords:
+class LessonTemplates:
     """The texts of one lesson; ``{view}`` stands for the letter of the view with the fault.
 
     Attributes:
@@ -144,7 +144,7 @@ class LessonWords:
 
 
 WORDS = {
-    "clean": LessonWords(
+    "clean": LessonTemplates(
         question="Read the card with the result and compare it with the pictures. Would you let this group "
         "into the dataset?",
         hint="Look at the blue lines on the white paint and at the ball in the small pictures "
@@ -153,14 +153,14 @@ WORDS = {
         "on one ball.",
         best="Press A to accept it.",
     ),
-    "wrong_label": LessonWords(
+    "wrong_label": LessonTemplates(
         question="The field lines of one view do not fit. Find out why before you decide.",
         hint="Compare the names: click a red line to read its marking. Is that "
         "the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
         best="Press Enter: it gives the line its right name, as the card says. Then press A.",
     ),
-    "swapped_sides": LessonWords(
+    "swapped_sides": LessonTemplates(
         question="Each view fits its own lines. Do they show the ball at the same place of the "
         "pitch?",
         hint="Look at the small pitch below: on which side does each camera stand, and which goal "
@@ -168,7 +168,7 @@ WORDS = {
         fault="In view {view} left and right are exchanged in every label.",
         best="Press Enter: it swaps left and right in view {view}. Then press A.",
     ),
-    "bad_point": LessonWords(
+    "bad_point": LessonTemplates(
         question="One click of an annotator went astray. Find it.",
         hint="Follow the error lines: they lead from the line to each annotated point, and one is "
         "much longer than the others.",
@@ -176,14 +176,14 @@ WORDS = {
         best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "
         "point onto the paint). Then press A.",
     ),
-    "missing_ball": LessonWords(
+    "missing_ball": LessonTemplates(
         question="The views are calibrated, and still there is no 3D ball. What is missing?",
         hint="Look at the small ball pictures below: does every view have a ball? Where the rays "
         "of the other views cross the picture is where to search.",
         fault="Nobody marked the ball in view {view}, although it can be seen.",
         best="Press Enter, click the ball on the dotted line in view {view}, then press A.",
     ),
-    "undrawn_line": LessonWords(
+    "undrawn_line": LessonTemplates(
         question="This group fails because of its field lines, but no annotated line looks wrong. "
         "What else counts?",
         hint=(
@@ -194,7 +194,7 @@ WORDS = {
         best="Press Enter: it leads to the line with its name chosen. Click two points on the "
         "paint and press Escape. When the card says that the group passes, press A.",
     ),
-    "not_synchronous": LessonWords(
+    "not_synchronous": LessonTemplates(
         question="Every view is calibrated and has a ball, and yet they do not meet in one point. "
         "Look at the players.",
         hint="Compare how the players stand around the ball in each view. Is it the same moment?",
@@ -202,7 +202,7 @@ WORDS = {
         best="No edit can fix that. Press X, then Enter for “Not the same instant”; where two other "
         "views agree you may leave view {view} out with Shift X instead, and accept the rest.",
     ),
-    "tiny_baseline": LessonWords(
+    "tiny_baseline": LessonTemplates(
         question="Everything fits, and still the group cannot be used. Where do the cameras stand?",
         hint="Look at the small pitch below: how far are the cameras from each other? Two views "
         "from one place say nothing about depth.",
@@ -253,7 +253,7 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
     """
     words = _LessonTexts(truth, group)
     if verdict.state == "unreviewed" or verdict.stale:
-        return _first_feedback(truth, group, words)
+        return _judge_unreviewed(truth, group, words)
     if verdict.state == "deferred":
         return words.say(ALMOST, "You deferred this group. That is fine when you are not sure.")
     if verdict.state == "accepted":
@@ -261,14 +261,14 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
     return _judge_rejected(truth, verdict.reason, words)
 
 
-def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
+def _judge_unreviewed(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     kind = find_lesson_kind(truth)
     if kind == CLEAN:
         return Feedback(OPEN)
-    if _is_corrected(truth, group):
+    if _is_fault_corrected(truth, group):
         return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
-    if _views_turned(truth, group):
-        letter = make_view_letter(_view_index(group, _views_turned(truth, group)[0]))
+    if _list_mislabelled_views(truth, group):
+        letter = make_view_letter(_view_index(group, _list_mislabelled_views(truth, group)[0]))
         return Feedback(
             OPEN,
             f"Look again: view {letter} was labelled correctly, and now its sides are swapped. "
@@ -280,12 +280,12 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
 def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     kind = find_lesson_kind(truth)
     if kind == CLEAN:
-        if _is_sound(truth, group):
+        if _is_annotation_correct(truth, group):
             return words.say(RIGHT, "")
         return words.say(WRONG, "The group was correct before your edit.")
-    if kind not in _REASONS and _is_corrected(truth, group):
+    if kind not in _REASONS and _is_fault_corrected(truth, group):
         return words.say(RIGHT, "You fixed it.")
-    if kind != "tiny_baseline" and _is_left_out(truth, group):
+    if kind != "tiny_baseline" and _is_faulty_view_excluded(truth, group):
         if kind == "not_synchronous":
             return words.say(RIGHT, "You left that view out, and the others agree.")
         return words.say(
@@ -352,9 +352,9 @@ def _view_index(group: Group, view: str) -> int:
     return [item.key for item in group.views].index(view)
 
 
-def _is_corrected(truth: SceneTruth, group: Group) -> bool:
+def _is_fault_corrected(truth: SceneTruth, group: Group) -> bool:
     """Whether the fault is gone and nothing else was spoilt."""
-    if find_lesson_kind(truth) in _REASONS or not _is_sound(truth, group):
+    if find_lesson_kind(truth) in _REASONS or not _is_annotation_correct(truth, group):
         return False
     view = group.view(truth.faults[0].view)
     if view is None or not view.included:
@@ -367,22 +367,22 @@ def _is_corrected(truth: SceneTruth, group: Group) -> bool:
     return True
 
 
-def _is_left_out(truth: SceneTruth, group: Group) -> bool:
+def _is_faulty_view_excluded(truth: SceneTruth, group: Group) -> bool:
     """Whether the view with the fault is left out and two sound ones remain."""
     faulty = {fault.view for fault in truth.faults}
     used = [view for view in group.views if view.included]
     with_ball = [view for view in used if view.ball is not None]
     gone = not any(view.key in faulty for view in used)
-    return gone and len(with_ball) >= 2 and _is_sound(truth, group)
+    return gone and len(with_ball) >= 2 and _is_annotation_correct(truth, group)
 
 
-def _is_sound(truth: SceneTruth, group: Group) -> bool:
+def _is_annotation_correct(truth: SceneTruth, group: Group) -> bool:
     """Whether all that is annotated in the views in use is where it was in truth."""
     for view in group.views:
         known = truth.view(view.key)
         if not view.included or known is None:
             continue
-        if list_misplaced_lines(known, view, group) or _is_ball_off(known, view):
+        if list_misplaced_lines(known, view, group) or _is_ball_misplaced(known, view):
             return False
     return True
 
@@ -402,7 +402,7 @@ def list_misplaced_lines(truth: ViewTruth, view: View, group: Group) -> tuple[st
     return tuple(off)
 
 
-def _views_turned(truth: SceneTruth, group: Group) -> list[str]:
+def _list_mislabelled_views(truth: SceneTruth, group: Group) -> list[str]:
     """Views without a fault of their own in which nearly no line is where it is named."""
     faulty = {fault.view for fault in truth.faults}
     turned = []
@@ -415,7 +415,7 @@ def _views_turned(truth: SceneTruth, group: Group) -> list[str]:
     return turned
 
 
-def _is_ball_off(truth: ViewTruth, view: View) -> bool:
+def _is_ball_misplaced(truth: ViewTruth, view: View) -> bool:
     if view.ball is None or view.ball.center is None:
         return False
     away = np.hypot(*np.subtract(view.ball.center, truth.ball_box.center))

@@ -25,16 +25,20 @@ from app.features.practice.recording_lessons import (
     FilmTruth,
     RecordingLesson,
     judge_cameras,
-    judge_link,
+    judge_replay_link,
+    judge_replay_side,
     judge_shots,
-    judge_side,
 )
-from app.features.recordings.camera_tracking import Tracked, save_cameras, track_now
-from app.features.recordings.cameras import cameras_at
-from app.features.recordings.index import Send, in_worker, index_now
+from app.features.recordings.camera_tracking import (
+    TrackedStretch,
+    save_cameras,
+    track_stretch_in_worker,
+)
+from app.features.recordings.cameras import read_cameras_of_frames
+from app.features.recordings.index import Send, index_recording_in_worker, run_in_worker
 from app.features.recordings.links import list_links
 from app.features.recordings.service import Recording, add_recording, list_recordings
-from app.features.recordings.shots import Shot, get_shots, put_shots
+from app.features.recordings.shots import Shot, get_shots, replace_shots
 from app.progress import ReportProgress, make_partial_progress
 from app.sample import SEED
 from app.soccer.policy import TOUCHLINE
@@ -75,7 +79,7 @@ def make_recording_practice_name(person: str | None) -> str:
     return DATASET if person is None else f"{DATASET} {person}"
 
 
-def recording_practice_work(store: Store, progress: JobProgress) -> Json:
+def run_recording_practice_job(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result names the dataset and the recording."""
     asked = progress.job.request
     with leave_work_to_next_server(progress):
@@ -109,20 +113,20 @@ def make_recording_practice(
     settings, name = store.settings, make_recording_practice_name(person)
     film = settings.home / FILM
     with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
-        require_own_recording(store, person)
+        require_practice_name_free(store, person)
         there = _find_recording(store, person)
         if there is not None and not again and _read_truth(settings) and there.problem is None:
             return {"dataset": name, "recording": there.id, "made": False}
         if _read_truth(settings) is None or not film.is_file():
             film.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             drawing = make_partial_progress(progress, "Drawing the film.")
-            in_worker(film, draw_film, PARTS, progress=drawing, stop=stop)
+            run_in_worker(film, draw_film, PARTS, progress=drawing, stop=stop)
         if there is not None:
             delete_dataset(store, name, confirm=name, actor=actor)
-        _open_dataset(store, person, actor)
+        _create_dataset_if_missing(store, person, actor)
         recording = add_recording(store, name, film.absolute(), actor=actor)
         reading = make_partial_progress(progress, "Finding its shots.")
-        recording = index_now(store, recording.id, progress=reading, stop=stop)
+        recording = index_recording_in_worker(store, recording.id, progress=reading, stop=stop)
         truth = _read_truth(settings)
         assert truth is not None
         _plant_faults(store, recording, truth, progress, actor, stop)
@@ -133,14 +137,14 @@ def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
     """Draw the practice film, in a worker process."""
     from app.sample.recording import ShotPlan, write_recording
 
-    def tell(done: int, total: int | None = None, sentence: str = "") -> None:
+    def send_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         send((done, total, sentence))
 
     write_recording(
         path,
         seed=SEED + 1,
         parts=[ShotPlan(*part) for part in parts],
-        progress=tell,
+        progress=send_progress,
     )
 
 
@@ -156,7 +160,7 @@ def _plant_faults(
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
     for shot, what in ((live, "the live shot"), (replay, "the replay")):
         telling = make_partial_progress(progress, f"Following the camera of {what}.")
-        track_now(
+        track_stretch_in_worker(
             store, recording.id, shot.first, shot.last, actor=actor, progress=telling, stop=stop
         )
     begin, end = (live.first + round(share * (live.last - live.first)) for share in LOST)
@@ -175,19 +179,19 @@ def _plant_faults(
         if begin <= frame.number <= end
         else frame
         for _, frame in sorted(
-            cameras_at(store, recording, range(live.first, live.last + 1)).items()
+            read_cameras_of_frames(store, recording, range(live.first, live.last + 1)).items()
         )
     ]
-    save_cameras(store, recording, (live.first, live.last), Tracked(frames, ()), [], actor)
+    save_cameras(store, recording, (live.first, live.last), TrackedStretch(frames, ()), [], actor)
     first, second, *rest = truth.shots
     planted = [
         Shot(first.first, second.last, first.kind, first.entered_by),
         *(replace(shot, kind="main") if shot == replay else shot for shot in rest),
     ]
-    put_shots(store, recording.id, planted, None, actor=actor)
+    replace_shots(store, recording.id, planted, None, actor=actor)
 
 
-def _open_dataset(store: Store, person: str | None, actor: str) -> None:
+def _create_dataset_if_missing(store: Store, person: str | None, actor: str) -> None:
     """Make the practice dataset, empty, where it is missing; a person leads in their own."""
     with store.write() as session:
         name = make_recording_practice_name(person)
@@ -210,12 +214,12 @@ def read_recording_practice(
         return RecordingPractice(name, None, ())
     if not visibility.sees(recording.dataset_id):
         return RecordingPractice(name, None, ())
-    frames = cameras_at(store, recording, range(recording.frames or 0))
+    frames = read_cameras_of_frames(store, recording, range(recording.frames or 0))
     lessons = (
         judge_shots(truth, get_shots(store, recording.id).items),
         judge_cameras(truth, frames),
-        judge_side(truth, frames),
-        judge_link(truth, list_links(store, recording.id)),
+        judge_replay_side(truth, frames),
+        judge_replay_link(truth, list_links(store, recording.id)),
     )
     return RecordingPractice(name, recording.id, lessons)
 
@@ -224,19 +228,19 @@ def _find_recording(store: Store, person: str | None) -> Recording | None:
     """The practice recording of a person, if it is there."""
     with store.read() as session:
         row = find_dataset(session, make_recording_practice_name(person))
-    if row is None or _is_ordinary(row, person):
+    if row is None or _is_unrelated_dataset(row, person):
         return None
     found = list_recordings(store, int(row.id))
     film = str((store.settings.home / FILM).absolute())
     return next((one for one in found if str(one.path) == film), None)
 
 
-def _is_ordinary(row: Any, person: str | None) -> bool:
+def _is_unrelated_dataset(row: Any, person: str | None) -> bool:
     """Whether a dataset with the name of a person's practice is not theirs: that one is hidden."""
     return person is not None and row.id <= COPIES
 
 
-def require_own_recording(store: Store, person: str | None) -> None:
+def require_practice_name_free(store: Store, person: str | None) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
     name = make_recording_practice_name(person)
     with store.read() as session:
@@ -245,7 +249,7 @@ def require_own_recording(store: Store, person: str | None) -> None:
     if row is None:
         return
     is_empty = not groups and not list_recordings(store, int(row.id))
-    if _is_ordinary(row, person) or not (is_empty or _find_recording(store, person)):
+    if _is_unrelated_dataset(row, person) or not (is_empty or _find_recording(store, person)):
         raise ConflictError(
             f'you already have a dataset called "{name}"',
             hint="The practice needs that name. Rename or delete your dataset first.",
@@ -256,11 +260,11 @@ def _read_truth(settings: Settings) -> FilmTruth | None:
     """What is true of the film; None where it is not drawn."""
     file = (settings.home / FILM).with_suffix(".json")
     try:
-        return _read_file(file, file.stat().st_mtime_ns)
+        return _read_truth_file(file, file.stat().st_mtime_ns)
     except FileNotFoundError:
         return None
 
 
 @lru_cache(maxsize=4)
-def _read_file(file: Path, _changed: int) -> FilmTruth:
+def _read_truth_file(file: Path, _changed: int) -> FilmTruth:
     return FilmTruth.of(json.loads(file.read_text(encoding="utf-8")))

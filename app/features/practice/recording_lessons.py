@@ -100,7 +100,7 @@ class FilmTruth:
 
 def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
     """How many shots are where they are in truth, and of their kind."""
-    wrong = [one for one in truth.shots if not any(_is_same(one, other) for other in shots)]
+    wrong = [one for one in truth.shots if not any(_is_same_shot(one, other) for other in shots)]
     right = len(truth.shots) - len(wrong)
     told = f"{right} of {plural(len(truth.shots), 'shot')} are right."
     if wrong:
@@ -125,7 +125,7 @@ def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
     )
 
 
-def _is_same(one: Shot, other: Shot) -> bool:
+def _is_same_shot(one: Shot, other: Shot) -> bool:
     ends = max(abs(one.first - other.first), abs(one.last - other.last))
     return ends <= NEAR_FRAMES and one.kind == other.kind
 
@@ -164,7 +164,7 @@ def judge_cameras(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Record
     )
 
 
-def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> RecordingLesson:
+def judge_replay_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> RecordingLesson:
     """Whether the cameras of the replay stand on the side where they are in truth."""
     shot = truth.shots[truth.replay]
     numbers = range(shot.first, shot.last + 1)
@@ -173,9 +173,10 @@ def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Recording
         for number in numbers
         if (frame := frames.get(number)) is not None and frame.camera is not None
     }
-    away = [_apart_m(truth.cameras[number], camera) for number, camera in found.items()]
+    away = [_camera_distance_m(truth.cameras[number], camera) for number, camera in found.items()]
     turned = [
-        _apart_m(truth.cameras[number], turn_camera(camera)) for number, camera in found.items()
+        _camera_distance_m(truth.cameras[number], turn_camera(camera))
+        for number, camera in found.items()
     ]
     is_right = bool(away) and float(np.median(away)) < float(np.median(turned))
     if not away:
@@ -202,7 +203,7 @@ def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Recording
     )
 
 
-def judge_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
+def judge_replay_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
     """How far the times of the replay are from the truth."""
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
     mine = [one for one in links if _overlaps_shot(one.replay.frames, replay)]
@@ -249,7 +250,7 @@ def _overlaps_shot(frames: range, shot: Shot) -> bool:
     return both > (shot.last - shot.first + 1) / 2
 
 
-def _apart_m(one: Camera, other: Camera) -> float:
+def _camera_distance_m(one: Camera, other: Camera) -> float:
     return float(np.linalg.norm(one.position - other.position))
 
 
@@ -257,7 +258,7 @@ def median_grass_error_px(truth: Camera, found: Camera, size: ImageSize) -> floa
     """Median distance of the visible grass from where a camera puts it, pixels; infinite where it puts none in view."""
     xs, ys = np.linspace(0, size.width - 1, 9), np.linspace(0, size.height - 1, 7)
     pixels: FloatArray = np.stack(np.meshgrid(xs, ys), -1).reshape(-1, 2)
-    ground = truth.on_ground(pixels)
+    ground = truth.project_to_ground(pixels)
     inside = np.isfinite(ground).all(axis=1) & (np.abs(ground) < (52.5, 34.0)).all(axis=1)
     if not inside.any():
         return float("inf")

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Request
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.practice.recording import RecordingPractice, read_recording_practice
 from app.features.practice.recording_lessons import LessonName, RecordingLesson
 from app.features.practice.service import (
@@ -22,7 +22,7 @@ from app.features.practice.service import (
 from app.http.access import get_current_login
 from app.http.deps import Actor, AppServices, Id, Sees
 from app.http.documents import Document, respond_with
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
 
@@ -100,13 +100,13 @@ class RecordingPracticeDocument(Document):
     lessons: list[RecordingLessonDocument]
 
 
-async def _practice_person(request: Request) -> str | None:
+async def _find_practice_person(request: Request) -> str | None:
     """Whose practice it is; None where nobody logs in."""
     login = get_current_login(request.scope)
     return None if login is None else login.name
 
 
-Person = Annotated[str | None, Depends(_practice_person)]
+Person = Annotated[str | None, Depends(_find_practice_person)]
 
 
 @router.get(
@@ -115,7 +115,7 @@ Person = Annotated[str | None, Depends(_practice_person)]
     response_model=PracticeDocument,
     responses=responses(),
 )
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_practice(services: AppServices, visibility: Sees, person: Person) -> Practice:
     """Every lesson and what has come of it; none until the practice is made.
 
@@ -127,9 +127,9 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
 @router.post(
     "/practice",
     operation_id="startPractice",
-    **openapi_of_job_response(409, 413, 415, 503),
+    **describe_job_response_for_openapi(409, 413, 415, 503),
 )
-@may(Action.ANNOTATE, where=Where.OWN)
+@may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
@@ -157,7 +157,7 @@ def start_practice(
     response_model=RecordingPracticeDocument,
     responses=responses(),
 )
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_recording_practice(
     services: AppServices, visibility: Sees, person: Person
 ) -> RecordingPractice:
@@ -168,9 +168,9 @@ def get_recording_practice(
 @router.post(
     "/practice/recording",
     operation_id="startRecordingPractice",
-    **openapi_of_job_response(409, 413, 415, 503),
+    **describe_job_response_for_openapi(409, 413, 415, 503),
 )
-@may(Action.ANNOTATE, where=Where.OWN)
+@may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_recording_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
@@ -201,4 +201,4 @@ def start_recording_practice(
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
-    return read_lesson(services.settings, load(services.store, group))
+    return read_lesson(services.settings, load_group_state(services.store, group))

@@ -32,7 +32,7 @@ from app.features.practice.lessons import (
     judge_lesson,
     write_practice,
 )
-from app.features.practice.recording import recording_practice_work, require_own_recording
+from app.features.practice.recording import require_practice_name_free, run_recording_practice_job
 from app.features.solutions.service import solve_dataset
 from app.formats.soccernet_v3 import ARCHIVE
 from app.progress import ReportProgress, make_partial_progress
@@ -102,15 +102,15 @@ def request_practice(
         ConflictError: There is a dataset of that name that is not the practice.
     """
     if recording:
-        require_own_recording(store, person)
+        require_practice_name_free(store, person)
         title = "Begin the practice on a recording again" if again else "Make a practice recording"
     else:
-        _require_own(store, settings, person)
+        _require_practice_name_free(store, settings, person)
         title = "Begin the practice again" if again else "Make the practice groups"
     return jobs.submit(
         KIND,
         title,
-        partial(practice_work, store),
+        partial(run_practice_job, store),
         actor=actor,
         request={"again": again, "person": person, "recording": recording},
         once=not recording,
@@ -120,14 +120,14 @@ def request_practice(
 def resume_practice(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
-    jobs.register_resume(KIND, partial(practice_work, store))
+    jobs.register_resume(KIND, partial(run_practice_job, store))
 
 
-def practice_work(store: Store, progress: JobProgress) -> Json:
+def run_practice_job(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result names the dataset and its first group."""
     asked = progress.job.request or {}
     if asked.get("recording"):
-        return recording_practice_work(store, progress)
+        return run_recording_practice_job(store, progress)
     return run_job_in_worker(
         store,
         "practice",
@@ -171,9 +171,9 @@ def make_practice_dataset(
     """
     with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
         name = make_practice_name(person)
-        _require_own(store, settings, person)
+        _require_practice_name_free(store, settings, person)
         ids = _group_ids(store, name)
-        if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
+        if len(ids) == len(LESSONS) and not again and _are_lesson_files_complete(settings):
             return {"dataset": name, "groups": len(ids), "first": ids[0], "made": False}
         ids = _make_lessons(store, settings, progress, again and bool(ids), actor, person)
     return {"dataset": name, "groups": len(ids), "first": ids[0], "made": True}
@@ -189,13 +189,13 @@ def _make_lessons(
 ) -> list[int]:
     """Ids of the lessons, once they are drawn, imported and solved."""
     folder, name = settings.home / DATASET, make_practice_name(person)
-    if not _is_drawn(settings):
+    if not _are_lesson_files_complete(settings):
         write_practice(folder, make_partial_progress(progress, "Drawing the pictures."))
     if again:
         afresh = PAPER if person is None else None
         delete_dataset(store, name, confirm=name, actor=actor, afresh=afresh)
     if person is not None:
-        _open_dataset(store, person, actor)
+        _create_dataset_if_missing(store, person, actor)
     progress(0, 1, "Reading the groups.")
     source = ImportSource("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, name, source, settings, None, actor=actor)
@@ -203,7 +203,7 @@ def _make_lessons(
     return _group_ids(store, name)
 
 
-def _open_dataset(store: Store, person: str, actor: str) -> None:
+def _create_dataset_if_missing(store: Store, person: str, actor: str) -> None:
     """Make a person's practice dataset, empty, where it is missing: they judge in it."""
     with store.write() as session:
         row = find_person_by_name(session, person)
@@ -223,7 +223,7 @@ def read_practice(
     with store.read() as session:
         row = find_dataset(session, name)
         # An ordinary dataset that is called so is nobody's practice.
-        if row is not None and (not visibility.sees(row.id) or _is_ordinary(row, person)):
+        if row is not None and (not visibility.sees(row.id) or _is_unrelated_dataset(row, person)):
             return Practice(name, ())
         states = read_states(session, _group_ids(store, name))
     lessons = [
@@ -270,19 +270,19 @@ def _group_ids(store: Store, name: str) -> list[int]:
         return [group.id for group in list_known_groups(session, row.id)]
 
 
-def _is_ordinary(row: Any, person: str | None) -> bool:
+def _is_unrelated_dataset(row: Any, person: str | None) -> bool:
     """Whether a dataset with the name of a person's practice is not theirs: that one is hidden."""
     return person is not None and row.id <= COPIES
 
 
-def _require_own(store: Store, settings: Settings, person: str | None) -> None:
+def _require_practice_name_free(store: Store, settings: Settings, person: str | None) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
     name = make_practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         if row is None:
             return
-        if _is_ordinary(row, person):
+        if _is_unrelated_dataset(row, person):
             raise ConflictError(
                 f'"{name}" is the name of an ordinary dataset',
                 hint="Your practice needs that name. Ask an admin to rename or delete the dataset.",
@@ -296,7 +296,7 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
         )
 
 
-def _is_drawn(settings: Settings) -> bool:
+def _are_lesson_files_complete(settings: Settings) -> bool:
     """Whether labels, truth and frames of all lessons are there."""
     truths = _read_truths(settings)
     if truths is None or len(truths) != len(LESSONS):
@@ -309,13 +309,13 @@ def _read_truths(settings: Settings) -> dict[str, SceneTruth] | None:
     """The truth of every lesson by the key of its group, in order; None where none is written."""
     file = settings.home / DATASET / TRUTH
     try:
-        return _read_file(file, file.stat().st_mtime_ns)
+        return _read_truth_file(file, file.stat().st_mtime_ns)
     except FileNotFoundError:
         return None
 
 
 @lru_cache(maxsize=4)
-def _read_file(file: Path, _changed: int) -> dict[str, SceneTruth]:
+def _read_truth_file(file: Path, _changed: int) -> dict[str, SceneTruth]:
     return read_truth(file)
 
 

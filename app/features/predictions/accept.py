@@ -10,15 +10,15 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from app.db.log import LogEntry, group_entries, iterate_single_edits
+from app.db.log import LogEntry, iterate_single_edits, list_group_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import find_box_problem
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.edit import SetBalls, need_view, set_ball
+from app.features.groups.edit import SetBalls, require_view, set_ball
 from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.view_queries import (
     StoredView,
     find_dataset_of_group,
@@ -160,14 +160,14 @@ def accept_predicted_balls(
     views = 0
     changed: set[int] = set()
     done: AcceptReport | None = None
-    groups = list(_by_group(plan.changes))
+    groups = list(_group_by_group_id(plan.changes))
     for number, (group_id, items) in enumerate(groups):
         if progress is not None:
             progress(number, plan.groups, "Accepting predictions.")
         for item in items:
             if item is groups[-1][1][-1]:
                 done = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
-            why = _accept_edit(store, item, plan.predictions.name, request, actor, done)
+            why = _submit_accept_edit(store, item, plan.predictions.name, request, actor, done)
             if why is None:
                 views += 1
                 changed.add(group_id)
@@ -214,19 +214,19 @@ def accept_box(
             # Whoever saw an older state is told so first.
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
-        if problem := _box_problem(box, view):
+        if problem := _find_box_problem(box, view):
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
     edit = set_ball(view.key, annotation_from_prediction(box, name))
     if not replace:
-        _require_free(load(store, view.group_id), edit, if_match)
-    return submit(store, view.group_id, edit, if_match=if_match, actor=actor)
+        _require_no_other_ball(load_group_state(store, view.group_id), edit, if_match)
+    return submit_edit(store, view.group_id, edit, if_match=if_match, actor=actor)
 
 
-def _require_free(state: GroupState, edit: SetBalls, if_match: str) -> None:
+def _require_no_other_ball(state: GroupState, edit: SetBalls, if_match: str) -> None:
     """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
-    balls = need_view(state.group, edit.view).balls
+    balls = require_view(state.group, edit.view).balls
     if (
         not balls
         or balls == edit.balls
@@ -258,7 +258,7 @@ def _judge_box(
     why = None
     if best.score < request.min_score:
         why = "below_score"
-    elif _box_problem(best, row) is not None:
+    elif _find_box_problem(best, row) is not None:
         why = "not_a_ball"
     elif balls == [annotation_from_prediction(best, name)]:
         why = "the_same"
@@ -267,20 +267,20 @@ def _judge_box(
     return AcceptedView(row.id, row.key, row.group_id, row.group, best, why)
 
 
-def _box_problem(box: PredictedBox, view: StoredView) -> str | None:
+def _find_box_problem(box: PredictedBox, view: StoredView) -> str | None:
     """Why a box cannot be a ball in its view."""
     place = Box(box.x, box.y, box.width, box.height)
     return find_box_problem(place, ImageSize(view.width, view.height))
 
 
-def _by_group(items: Sequence[AcceptedView]) -> Iterator[tuple[int, list[AcceptedView]]]:
+def _group_by_group_id(items: Sequence[AcceptedView]) -> Iterator[tuple[int, list[AcceptedView]]]:
     groups: dict[int, list[AcceptedView]] = {}
     for item in items:
         groups.setdefault(item.group_id, []).append(item)
     yield from groups.items()
 
 
-def _accept_edit(
+def _submit_accept_edit(
     store: Store,
     item: AcceptedView,
     name: str,
@@ -293,20 +293,27 @@ def _accept_edit(
     The request is answered with the report, which only the last edit has.
     """
 
-    def then(session: Session, _state: GroupState) -> None:
+    def respond_with_report(session: Session, _state: GroupState) -> None:
         if report is not None:
             session.respond(report)
 
     edit = set_ball(item.view, annotation_from_prediction(item.box, name))
     for _ in range(TRIES):
         try:
-            state = load(store, item.group_id)
+            state = load_group_state(store, item.group_id)
         except NotFoundError:
             break
-        if not _still_fits(state, item, request):
+        if not _is_view_still_acceptable(state, item, request):
             break
         try:
-            submit(store, item.group_id, edit, if_match=state.etag, actor=actor, then=then)
+            submit_edit(
+                store,
+                item.group_id,
+                edit,
+                if_match=state.etag,
+                actor=actor,
+                then=respond_with_report,
+            )
         except StaleRevisionError:
             continue
         except InputError:
@@ -315,7 +322,9 @@ def _accept_edit(
     return "changed_meanwhile"
 
 
-def _still_fits(state: GroupState, item: AcceptedView, request: AcceptRequest) -> bool:
+def _is_view_still_acceptable(
+    state: GroupState, item: AcceptedView, request: AcceptRequest
+) -> bool:
     view: View | None = state.group.view(item.view)
     return view is not None and (request.replace or not view.balls)
 
@@ -353,7 +362,7 @@ class GroupPredictions:
     accepted: tuple[AcceptedBall, ...]
 
 
-def group_predictions(store: Store, group_id: int) -> GroupPredictions:
+def read_group_predictions(store: Store, group_id: int) -> GroupPredictions:
     """What was predicted for a group, and what was accepted of it.
 
     Raises:
@@ -365,7 +374,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
             raise NotFoundError.group(group_id)
         boxes = _pair_with_sets(session, read_group_boxes(session, group_id))
         taken = list(_list_accepted_balls(session, group_id))
-        entries = group_entries(session, group_id) if taken else []
+        entries = list_group_entries(session, group_id) if taken else []
         count = count_prediction_sets(session, dataset)
     return GroupPredictions(
         count, boxes, tuple(_make_accepted_ball(row, ball, boxes, entries) for row, ball in taken)

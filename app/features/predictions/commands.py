@@ -278,17 +278,17 @@ def _detect_in_recording(
     from app.features.recordings.frame_boxes import (
         detect_in_frames,
         find_recording,
-        read_boxes_of_file,
+        import_boxes_from_file,
     )
 
     dataset, recording, frames = place
-    numbers = None if frames is None else _frames_of(frames)
+    numbers = None if frames is None else _parse_frame_range(frames)
     with open_store() as store, show_progress("Detecting") as progress:
         found, by = find_recording(store, dataset, recording), get_current_actor()
         if isinstance(source, Path):
             if numbers is not None:
                 raise typer.BadParameter("--frames are those that a --model looks at")
-            kept = read_boxes_of_file(store, found, source, name, min_score=min_score, actor=by)
+            kept = import_boxes_from_file(store, found, source, name, min_score=min_score, actor=by)
         else:
             kept = detect_in_frames(
                 store,
@@ -313,7 +313,7 @@ def _detect_in_recording(
         )
 
 
-def _frames_of(text: str) -> range:
+def _parse_frame_range(text: str) -> range:
     """Frames of an option: ``100-400``, both included, or one number."""
     first, _, last = text.partition("-")
     try:
@@ -347,22 +347,22 @@ def _print_problems(report: Mapping[str, Any]) -> None:
         print_error(f"  and {rest} more problems")
 
 
-def _size_option(panel: str, text: str, *names: str) -> Any:
+def _make_size_option(panel: str, text: str, *names: str) -> Any:
     """An option that is the size of images."""
     return typer.Option(*names, parser=parse_size, metavar="WxH", rich_help_panel=panel, help=text)
 
 
 PixelSize = Annotated[
     ImageSize | None,
-    _size_option(BALLS, "Size of the images that boxes in pixels refer to.", "--size"),
+    _make_size_option(BALLS, "Size of the images that boxes in pixels refer to.", "--size"),
 ]
 CamerasSize = Annotated[
     ImageSize | None,
-    _size_option(CAMERAS, "Size of the images of these cameras."),
+    _make_size_option(CAMERAS, "Size of the images of these cameras."),
 ]
 CarefulSize = Annotated[
     ImageSize | None,
-    _size_option(CAREFUL, "As --size, of the reference boxes."),
+    _make_size_option(CAREFUL, "As --size, of the reference boxes."),
 ]
 
 
@@ -406,18 +406,18 @@ def evaluate(
     )
     request.check()
     server = get_current_server()
-    run = _evaluate_here if server is None else partial(_evaluate_at, server)
+    run = _evaluate_locally if server is None else partial(_evaluate_on_server, server)
     with show_progress("Evaluating") as progress:
         values, sets = run(dataset, request, out, progress)
     if json_:
-        print_json({**values, "sets": [_set_values(item) for item in sets]})
+        print_json({**values, "sets": [_make_set_values(item) for item in sets]})
         return
     for item in sets:
         print_set(item)
     _print_evaluation(values)
 
 
-def _evaluate_here(
+def _evaluate_locally(
     dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
@@ -433,14 +433,14 @@ def _evaluate_here(
     return evaluation_to_values(done.evaluation), [vars(item) for item in done.sets]
 
 
-def _evaluate_at(
+def _evaluate_on_server(
     server: ServerPlace,
     dataset: str,
     request: SourcesRequest,
     out: Path | None,
     progress: ReportProgress,
 ) -> tuple[_Values, list[_Values]]:
-    """As ``_evaluate_here``, by a server."""
+    """As ``_evaluate_locally``, by a server."""
     from app.terminal import remote
 
     with connect_to_server(server) as client:
@@ -451,9 +451,9 @@ def _evaluate_at(
 
 
 def _print_evaluation(values: _Values) -> None:
-    from app.features.predictions.evaluation import read_tables
+    from app.features.predictions.evaluation import parse_tables
 
-    for table in read_tables(values["tables"]):
+    for table in parse_tables(values["tables"]):
         say("")
         _print_table(table)
     pins = values["pins"]
@@ -485,7 +485,7 @@ def _format_number(cell: Cell) -> str:
     return f"{cell.value:.3g}{spread} (n {counts})"
 
 
-def _set_values(found: _Values) -> _Values:
+def _make_set_values(found: _Values) -> _Values:
     """What is printed of a set, with what could not be read of it."""
     return {
         "id": found["id"],

@@ -23,21 +23,21 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
-from app.features.datasets.service import read_dataset_head, require_name
+from app.features.datasets.service import read_dataset_head, require_valid_name
 from app.features.groups.view_queries import StoredView, list_dataset_views
 from app.features.predictions.queries import PredictionSet
 from app.features.predictions.service import (
     LISTED,
     read_frame_names,
-    require_free,
+    require_unused_set_name,
     save_predictions,
 )
 from app.features.queue.query import parse_query
-from app.formats.ball_names import is_ball
+from app.formats.ball_names import is_ball_name
 from app.geometry.arrays import FloatArray
 from app.media.files import decode_frame
 from app.progress import ReportProgress
-from app.soccer.frames import Box, ImageSize, box_from_corner
+from app.soccer.frames import Box, ImageSize, box_from_corner_origin
 
 GRAY = 114
 """What Ultralytics fills the border with."""
@@ -102,7 +102,7 @@ def decode_output(
     Raises:
         InputError: The output has another shape, or not that many classes.
     """
-    corners, scores = _candidate_boxes(np.asarray(output, dtype=float), category)
+    corners, scores = _decode_candidate_boxes(np.asarray(output, dtype=float), category)
     order = np.argsort(-scores, kind="stable")
     order = order[scores[order] >= min_score][:MAX_CANDIDATES]
     kept = suppress_overlapping(corners[order], SUPPRESS_IOU, most)
@@ -144,11 +144,11 @@ def find_ball_category(names: Sequence[str]) -> int | None:
     """
     if len(names) == 1:
         return 0
-    balls = [place for place, name in enumerate(names) if is_ball(name)]
+    balls = [place for place, name in enumerate(names) if is_ball_name(name)]
     return balls[0] if len(balls) == 1 else None
 
 
-def _candidate_boxes(output: FloatArray, category: int) -> tuple[FloatArray, FloatArray]:
+def _decode_candidate_boxes(output: FloatArray, category: int) -> tuple[FloatArray, FloatArray]:
     if output.ndim != 3 or output.shape[0] != 1:
         raise InputError(
             f"the model's output has the shape {output.shape}, not (1, 4 + classes, N)"
@@ -222,7 +222,7 @@ class OnnxModel:
         return OnnxModel(
             path=path,
             digest=hashlib.sha256(path.read_bytes()).hexdigest(),
-            input=_input_size(path, first.shape, meta.get("imgsz", ""), side),
+            input=_find_input_size(path, first.shape, meta.get("imgsz", ""), side),
             names=names,
             category=chosen or 0,
             _session=session,
@@ -237,7 +237,7 @@ class OnnxModel:
             (output, *_) = self._session.run(None, {self._input_name: box.prepare(picture)})
         except Exception as error:
             raise InputError(
-                f"the model {self.path.name} failed on a picture ({_first_line(error)})"
+                f"the model {self.path.name} failed on a picture ({_extract_first_error_line(error)})"
             ) from error
         return decode_output(np.asarray(output), box, self.category, min_score, most)
 
@@ -261,12 +261,12 @@ def _open_model(path: Path, threads: int) -> Any:
         return onnxruntime.InferenceSession(str(path), options, ["CPUExecutionProvider"])
     except Exception as error:
         raise InputError(
-            f"{path.name} is not an ONNX model that can be run ({_first_line(error)})",
+            f"{path.name} is not an ONNX model that can be run ({_extract_first_error_line(error)})",
             hint="docs/detector.md has the command that exports one.",
         ) from error
 
 
-def _first_line(error: Exception) -> str:
+def _extract_first_error_line(error: Exception) -> str:
     """The first line of what the runtime says, without its address in the source."""
     return str(error).strip().splitlines()[0].split(" : ")[-1][:200]
 
@@ -286,7 +286,7 @@ def _parse_class_names(text: str) -> tuple[str, ...]:
     return tuple(str(value.get(place, "")) for place in range(len(value)))
 
 
-def _input_size(path: Path, shape: list[Any], text: str, side: int | None) -> ImageSize:
+def _find_input_size(path: Path, shape: list[Any], text: str, side: int | None) -> ImageSize:
     """Height and width of the input: the model's, else what it says, else the caller's."""
     if len(shape) != 4:
         raise InputError(
@@ -344,10 +344,10 @@ def run_detector(
             could be read.
         ConflictError: There is a set of that name.
     """
-    require_name(request.name, "a set of predictions", digits=True)
+    require_valid_name(request.name, "a set of predictions", digits=True)
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        require_free(session, found.id, request.name)
+        require_unused_set_name(session, found.id, request.name)
         rows = _read_views(session, found.id, request)
     detections: dict[int, list[Detection]] = {}
     problems: list[dict[str, Any]] = []
@@ -359,9 +359,9 @@ def run_detector(
         except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
             problems.append(_make_problem(row, error.message))
             continue
-        detections[row.id] = _in_annotated(row, picture, model, request)
+        detections[row.id] = _detect_in_annotated_pixels(row, picture, model, request)
     if not detections:
-        raise _nothing_seen(rows, problems)
+        raise _no_readable_frame_error(rows, problems)
     return save_predictions(
         store,
         found.id,
@@ -394,7 +394,7 @@ def _read_frame(row: StoredView, settings: Settings) -> Any:
     return decode_frame(row.media, row.flipped, settings)[:, :, ::-1]
 
 
-def _in_annotated(
+def _detect_in_annotated_pixels(
     row: StoredView, picture: Any, model: OnnxModel, request: DetectRequest
 ) -> list[Detection]:
     """Detections in pixels of the annotated size, which need not be the frame's own."""
@@ -403,7 +403,7 @@ def _in_annotated(
     return [
         Detection(
             # YOLO counts from the corner of the first pixel.
-            box_from_corner(
+            box_from_corner_origin(
                 Box(item.box.x * x, item.box.y * y, item.box.width * x, item.box.height * y)
             ),
             item.score,
@@ -416,7 +416,7 @@ def _make_problem(row: StoredView, problem: str) -> dict[str, Any]:
     return {"file": row.group, "record": row.key, "field": None, "problem": problem}
 
 
-def _nothing_seen(rows: list[StoredView], problems: list[dict[str, Any]]) -> InputError:
+def _no_readable_frame_error(rows: list[StoredView], problems: list[dict[str, Any]]) -> InputError:
     if not rows:
         return InputError(
             "there is no view to search: the query matches none, or all that match already have a ball",

@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.evaluation.comparison import (
     FIELDS,
-    Difference,
+    CellDifference,
     FrameComparison,
     compare_frames,
     compare_tables,
@@ -30,7 +30,7 @@ from app.evaluation.result import (
     figure_to_png,
     table_to_csv,
 )
-from app.evaluation.track_scores import TrueTrack, evaluate_tracks
+from app.evaluation.track_scores import GroundTruthTrack, evaluate_tracks
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.predictions import queries as frame_rows
@@ -47,13 +47,13 @@ from app.features.predictions.queries import (
 from app.features.predictions.queries import StoredEvaluation as StoredEvaluation
 from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.features.tracks.codec import track_from_json
-from app.features.tracks.service import accepted_tracks
-from app.features.versions.frozen_queries import read_frozen, read_json
+from app.features.tracks.service import collect_accepted_tracks
+from app.features.versions.frozen_queries import decode_frozen_json, read_frozen
 from app.features.versions.service import Version
 from app.formats.safe_path import resolve_inside
-from app.formats.tracks_writer import folder_name
-from app.json_text import json_text, quoted
-from app.soccer.codec import digest
+from app.formats.tracks_writer import make_track_folder_name
+from app.json_text import json_text, quote_text
+from app.soccer.codec import digest_json
 from app.soccer.solution import SOLVER_VERSION
 
 MAX_PAGE = 500
@@ -105,7 +105,7 @@ class RunComparison:
     second: StoredEvaluation
     same_truth: bool
     differs: tuple[str, ...]
-    numbers: list[Difference]
+    numbers: list[CellDifference]
     frames: FrameComparison
 
 
@@ -141,12 +141,12 @@ def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
         session.respond(None)
 
 
-def run_tables(evaluation: StoredEvaluation) -> list[Table]:
+def parse_run_tables(evaluation: StoredEvaluation) -> list[Table]:
     """The tables of a run as values."""
-    return read_tables(evaluation.tables)
+    return parse_tables(evaluation.tables)
 
 
-def read_tables(values: Iterable[Json]) -> list[Table]:
+def parse_tables(values: Iterable[Json]) -> list[Table]:
     """Tables from JSON."""
     return [from_json(Table, value) for value in values]
 
@@ -179,8 +179,8 @@ def list_frames(
     """
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} frames", pointer="/limit")
-    where = _frame_conditions(query)
-    sort = _checked_field(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
+    where = _build_frame_conditions(query)
+    sort = _validate_field(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
     descending = query.sort.endswith("-desc")
     with store.read() as session:
         read_evaluation(session, evaluation_id)
@@ -210,7 +210,7 @@ def compare_runs(
     """
     if field not in FIELDS:
         raise InputError(
-            f"frames cannot be compared by {quoted(field)}; use one of {', '.join(FIELDS)}",
+            f"frames cannot be compared by {quote_text(field)}; use one of {', '.join(FIELDS)}",
             pointer="/field",
         )
     with store.read() as session:
@@ -227,7 +227,7 @@ def compare_runs(
         second,
         set(differs) <= {"software_version"},
         differs,
-        compare_tables(run_tables(first), run_tables(second)),
+        compare_tables(parse_run_tables(first), parse_run_tables(second)),
         compare_frames(frames[0], frames[1], field),
     )
 
@@ -240,19 +240,19 @@ def read_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation:
     return found
 
 
-def _frame_conditions(query: FrameQuery) -> list[FrameCondition]:
-    where = [] if query.match is None else [frame_rows.is_of_match(query.match)]
+def _build_frame_conditions(query: FrameQuery) -> list[FrameCondition]:
+    where = [] if query.match is None else [frame_rows.match_condition(query.match)]
     if query.field is not None:
-        field = _checked_field(query.field, "/field")
+        field = _validate_field(query.field, "/field")
         where.append(
-            frame_rows.is_missing(field)
+            frame_rows.missing_condition(field)
             if query.missing
-            else frame_rows.is_between(field, query.low, query.high)
+            else frame_rows.between_condition(field, query.low, query.high)
         )
     return where
 
 
-def _checked_field(field: str, pointer: str) -> str:
+def _validate_field(field: str, pointer: str) -> str:
     """A field of frames; raises InputError where they have none of that name."""
     if field not in NUMBERS:
         known = ", ".join(NUMBERS)
@@ -268,22 +268,22 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
     Raises:
         InputError: The folder cannot be written.
     """
-    tables = {f"{table.name}.csv": table for table in run_tables(evaluation)}
+    tables = {f"{table.name}.csv": table for table in parse_run_tables(evaluation)}
     # Its three files come one after the other.
     figure = lru_cache(maxsize=1)(partial(get_figure, store, evaluation.id))
 
-    def fetch(kind: str, name: str, file: Path) -> None:
+    def write_figure_file(kind: str, name: str, file: Path) -> None:
         if kind == "tables":
             file.write_text(table_to_csv(tables[name]), encoding="utf-8")
             return
         title, _, ending = name.rpartition(".")
-        file.write_bytes(_figure_content(figure(title), ending))
+        file.write_bytes(_render_figure(figure(title), ending))
 
     frames = (vars(frame) for frame in _read_frames(store, evaluation.id))
-    write_parts(out, evaluation_to_values(evaluation), frames, fetch)
+    write_evaluation_parts(out, evaluation_to_values(evaluation), frames, write_figure_file)
 
 
-def write_parts(
+def write_evaluation_parts(
     out: Path, values: Mapping[str, Any], frames: Iterable[Mapping[str, Any]], fetch: Fetch
 ) -> None:
     """Write an evaluation, wherever its parts come from, into a folder.
@@ -314,7 +314,7 @@ def write_parts(
         raise InputError(f"the evaluation cannot be written to {out} ({error.strerror})") from error
 
 
-def _figure_content(figure: Figure, ending: str) -> bytes:
+def _render_figure(figure: Figure, ending: str) -> bytes:
     """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
     if ending == "png":
         return figure_to_png(figure)
@@ -335,7 +335,7 @@ def _read_frames(store: Store, evaluation_id: int) -> Iterator[FrameResult]:
         place = page.next
 
 
-def track_evaluation(
+def evaluate_stored_tracks(
     session: Session, dataset: DatasetHead, version: Version | None, predictions: PredictionSet
 ) -> tuple[Evaluation, dict[str, Json]]:
     """What came of it, and what pins the truth.
@@ -350,11 +350,11 @@ def track_evaluation(
         InputError: There is no true track, or nothing that is predicted is of an instant of one.
     """
     if version is None:
-        values = accepted_tracks(session, dataset)
-        pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest(values), "accepted")
+        values = collect_accepted_tracks(session, dataset)
+        pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest_json(values), "accepted")
     else:
         bodies = read_frozen(session, version.dataset_id, version.tracks.values())
-        values = {key: read_json(bodies[name]) for key, name in version.tracks.items()}
+        values = {key: decode_frozen_json(bodies[name]) for key, name in version.tracks.items()}
         pins = make_truth_pins(
             version.policy, version.solver_version, version.hash, version.groups, version
         )
@@ -365,15 +365,15 @@ def track_evaluation(
             hint="Make and accept its tracks, then freeze a version.",
             pointer="/version",
         )
-    truth = [_true_track(key, value) for key, value in sorted(values.items())]
+    truth = [_parse_true_track(key, value) for key, value in sorted(values.items())]
     return evaluate_tracks(truth, read_predicted_tracks(session, predictions.id)), pins
 
 
-def _true_track(key: str, value: Json) -> TrueTrack:
+def _parse_true_track(key: str, value: Json) -> GroundTruthTrack:
     track = track_from_json(value["track"])
-    return TrueTrack(
+    return GroundTruthTrack(
         key,
-        folder_name(key),
+        make_track_folder_name(key),
         track.frames,
         track.times,
         track.position,

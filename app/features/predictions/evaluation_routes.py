@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from app.errors import NotFoundError
-from app.evaluation.comparison import FIELDS, Difference, FrameOfTwoRuns
+from app.evaluation.comparison import FIELDS, CellDifference, FrameOfTwoRuns
 from app.evaluation.result import (
     FIGURES,
     NUMBERS,
@@ -24,16 +24,22 @@ from app.evaluation.result import (
     table_to_csv,
 )
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.predictions import evaluation as review
-from app.features.predictions.evaluation import RunComparison, read_tables
+from app.features.predictions.evaluation import RunComparison, parse_tables
 from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
 from app.features.predictions.jobs import request_evaluation
 from app.features.versions.routes import VersionId
 from app.features.versions.service import find_version_id
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, document, make_empty_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    make_document_response,
+    make_empty_response,
+    respond_with,
+)
 from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
@@ -100,7 +106,7 @@ class EvaluationBody(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _something(self) -> EvaluationBody:
+    def _require_predictions_or_boxes(self) -> EvaluationBody:
         if self.predictions is None and self.careful is None:
             raise ValueError("give predictions, reference boxes, or both")
         return self
@@ -110,8 +116,8 @@ class EvaluationBody(BaseModel):
         return EvaluationRequest(**{**self.model_dump(), "version": version})
 
 
-def _headline_numbers(tables: list[Any]) -> dict[str, Cell | None]:
-    found = {table.name: table for table in read_tables(tables)}
+def _select_headline_numbers(tables: list[Any]) -> dict[str, Cell | None]:
+    found = {table.name: table for table in parse_tables(tables)}
     return {
         column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
     }
@@ -129,7 +135,7 @@ class EvaluationRow(Document):
     careful: int | None = Field(validation_alias="careful_set_id")
     version: int | None = Field(validation_alias="version_id")
     counts: dict[str, int]
-    headline: Annotated[dict[str, Cell], BeforeValidator(_headline_numbers)] = Field(
+    headline: Annotated[dict[str, Cell], BeforeValidator(_select_headline_numbers)] = Field(
         validation_alias="tables",
         description="ap_50, mae_m, mae_percent, p_2m and f1 (of events), those that the run has.",
     )
@@ -157,7 +163,7 @@ class FrameList(ListDocument[FrameResult]):
     total: int
 
 
-class DifferenceDocument(Document, shows=Difference):
+class DifferenceDocument(Document, shows=CellDifference):
     """One number of both runs; `change` is the second minus the first."""
 
     first: Cell | None
@@ -208,7 +214,7 @@ class ComparisonDocument(Document):
         )
 
 
-def _file_responses(description: str, document: type[object], *others: str) -> Responses:
+def _make_file_responses(description: str, document: type[object], *others: str) -> Responses:
     """What a route answers that gives a document as JSON, and as files of other types."""
     content: dict[str, object] = {}
     for kind in others:
@@ -217,10 +223,10 @@ def _file_responses(description: str, document: type[object], *others: str) -> R
     return {200: {"description": description, "model": document, "content": content}}
 
 
-FIGURE_FILES = _file_responses(
+FIGURE_FILES = _make_file_responses(
     "The figure: its values as JSON or CSV, or drawn as PNG.", Figure, CSV_FILE, PNG_FILE
 )
-TABLE_FILES = _file_responses(
+TABLE_FILES = _make_file_responses(
     "The table: as JSON, or as CSV with intervals and denominators.", Table, CSV_FILE
 )
 
@@ -239,7 +245,7 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
 @router.post(
     "/datasets/{dataset}/evaluations",
     operation_id="startEvaluation",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(
     Action.LEAD,
@@ -303,7 +309,7 @@ def get_figure(
     found = review.get_figure(store, evaluation, str(figure))
     name = f"touchline-{evaluation}-{figure}.{ending}"
     if ending == "json":
-        return document(found)
+        return make_document_response(found)
     if ending == "csv":
         return _csv_response(figure_to_csv(found), name)
     shown = {"Content-Disposition": make_content_disposition(name, "inline")}
@@ -322,7 +328,8 @@ def get_table(
 ) -> Response:
     """One table of an evaluation; 404 where the evaluation has no such table."""
     tables = {
-        item.name: item for item in review.run_tables(review.get_evaluation(store, evaluation))
+        item.name: item
+        for item in review.parse_run_tables(review.get_evaluation(store, evaluation))
     }
     found = tables.get(str(table))
     if found is None:
@@ -330,7 +337,7 @@ def get_table(
             f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
         )
     if ending == "json":
-        return document(found)
+        return make_document_response(found)
     return _csv_response(table_to_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 

@@ -15,7 +15,7 @@ from app.evaluation.frame import Detection, Frame
 from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.view_queries import StoredView, list_dataset_views
-from app.features.predictions.evaluation import read_evaluation, track_evaluation
+from app.features.predictions.evaluation import evaluate_stored_tracks, read_evaluation
 from app.features.predictions.frames import (
     LIVE_RULES,
     EvaluationTruth,
@@ -34,7 +34,7 @@ from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, find_predictions, read_set
 from app.features.solutions.codec import to_json
 from app.features.versions.service import Version, find_version, read_version
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.progress import ReportProgress
 from app.soccer.ball_boxes import BOX_KINDS
 from app.soccer.frames import Box
@@ -53,7 +53,7 @@ def read_reference_boxes(session: Session, careful: PredictionSet) -> dict[int, 
     several = {view for view, boxes in found.items() if len(boxes) > 1}
     if several:
         rows = list_dataset_views(session, careful.dataset_id)
-        names = [_frame_name(row) for row in rows if row.id in several]
+        names = [_make_frame_name(row) for row in rows if row.id in several]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(
             f'frames of the reference boxes "{careful.name}" have more than one box: '
@@ -64,7 +64,7 @@ def read_reference_boxes(session: Session, careful: PredictionSet) -> dict[int, 
     return {view: Box(box.x, box.y, box.width, box.height) for view, (box,) in found.items()}
 
 
-def _frame_name(row: StoredView) -> str:
+def _make_frame_name(row: StoredView) -> str:
     """A view as files of predictions call it."""
     if row.shared:
         return f"{row.key}/{row.group}"
@@ -150,7 +150,7 @@ class EvaluationRequest:
             raise InputError("there are no predictions to evaluate", pointer="/predictions")
         if self.boxes not in BOX_KINDS:
             raise InputError(
-                f"boxes must be one of {', '.join(BOX_KINDS)}, not {quoted(self.boxes)}",
+                f"boxes must be one of {', '.join(BOX_KINDS)}, not {quote_text(self.boxes)}",
                 pointer="/boxes",
             )
         if not 0 <= self.min_score <= 1:
@@ -171,7 +171,7 @@ def check_groups(groups: str, version: int | str | None) -> None:
     """
     if version is not None and groups != EvaluationRequest.groups:
         raise InputError(
-            f"groups {quoted(groups)} cannot be combined with a version, which has its own groups",
+            f"groups {quote_text(groups)} cannot be combined with a version, which has its own groups",
             hint="Leave out the groups or the version.",
             pointer="/groups",
         )
@@ -198,15 +198,15 @@ def run_evaluation(
         if progress is not None:
             progress(0, None, "Reading frames.")
         sets = {
-            name: _own_set(session, found, identity, name)
+            name: _require_own_set(session, found, identity, name)
             for name in ("predictions", "careful")
             if (identity := getattr(request, name)) is not None
         }
         if (tracks := _find_track_set(request, sets)) is not None:
             version = None
             if request.version is not None:
-                version = _own_version(session, found, request.version)
-            result, pins = track_evaluation(session, found, version, tracks)
+                version = _require_own_version(session, found, request.version)
+            result, pins = evaluate_stored_tracks(session, found, version, tracks)
             options, more = EvaluationOptions(), {}
         else:
             truth = _read_truth(session, found, request)
@@ -214,7 +214,7 @@ def run_evaluation(
             pins = truth.pins
     if tracks is None:
         if not truth.frames:
-            raise _no_frames(found, request)
+            raise _no_frames_error(found, request)
         _require_common_frames(truth, inputs, sets)
         options = EvaluationOptions(
             boxes=request.boxes,
@@ -239,7 +239,7 @@ def run_evaluation(
         "prediction_set_id": request.predictions,
         "careful_set_id": request.careful,
         "version_id": request.version,
-        "pins": {**pins, **_pinned_options(request, options, sets)},
+        "pins": {**pins, **_make_pinned_options(request, options, sets)},
         "counts": {**result.counts, **more},
         "tables": [to_json(table) for table in result.tables],
     }
@@ -254,12 +254,12 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
         sets = {}
         for name in ("predictions", "careful"):
             if (identity := getattr(request, name)) is not None:
-                own = sets[name] = _own_set(session, found, identity, name)
+                own = sets[name] = _require_own_set(session, found, identity, name)
                 if name == "careful":
                     read_reference_boxes(session, own)
         _find_track_set(request, sets)
         if request.version is not None:
-            _own_version(session, found, request.version)
+            _require_own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
             raise unknown_rule_error(request.groups)
 
@@ -292,18 +292,20 @@ def _read_truth(
 ) -> EvaluationTruth:
     if request.version is None:
         return read_live_truth(session, dataset, request.groups, request.split)
-    version = _own_version(session, dataset, request.version)
+    version = _require_own_version(session, dataset, request.version)
     return read_version_truth(session, version, request.split)
 
 
-def _own_version(session: Session, dataset: DatasetHead, version_id: int) -> Version:
+def _require_own_version(session: Session, dataset: DatasetHead, version_id: int) -> Version:
     version = read_version(session, version_id)
     if version.dataset_id != dataset.id:
         raise NotFoundError(f"dataset {dataset.name} has no version {version_id}")
     return version
 
 
-def _own_set(session: Session, dataset: DatasetHead, set_id: int, pointer: str) -> PredictionSet:
+def _require_own_set(
+    session: Session, dataset: DatasetHead, set_id: int, pointer: str
+) -> PredictionSet:
     found = read_set(session, set_id)
     if found.dataset_id != dataset.id:
         raise InputError(
@@ -328,7 +330,7 @@ def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Evaluat
     return EvaluationInputs(detections, boxes, cameras)
 
 
-def _pinned_options(
+def _make_pinned_options(
     request: EvaluationRequest, options: EvaluationOptions, sets: Mapping[str, PredictionSet]
 ) -> dict[str, Json]:
     """What was asked for, beside what the truth pins."""
@@ -342,7 +344,7 @@ def _pinned_options(
     }
 
 
-def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
+def _no_frames_error(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     of = f' in the split "{request.split}"' if request.split else ""
     hint = "A group is evaluated when the policy passes it and it is not rejected."
     if request.groups == "accepted":

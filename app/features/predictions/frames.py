@@ -17,10 +17,10 @@ from app.features.versions.membership import read_candidates, require_solved
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
 from app.formats.manifest import read_software_version
-from app.json_text import quoted
+from app.json_text import quote_text
 from app.soccer.ball_boxes import collect_ball_boxes, has_ball_3d
 from app.soccer.choices import LiveRule
-from app.soccer.codec import digest, policy_to_json
+from app.soccer.codec import digest_json, policy_to_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
@@ -56,7 +56,9 @@ def read_version_truth(session: Session, version: Version, split: str | None) ->
             session, version.dataset_id, [item.group.key for item in frozen]
         )
         for item in frozen:
-            for frame in _frozen_frames(item, ids.get(item.group.key, (0, {})), len(frames)):
+            for frame in _iterate_frozen_frames(
+                item, ids.get(item.group.key, (0, {})), len(frames)
+            ):
                 if split is None or frame.split == split:
                     frames.append(frame)
                     gone += frame.id < 0
@@ -91,14 +93,16 @@ def read_live_truth(
                 )
             frames += [
                 frame
-                for frame in group_frames(state.group, state.solution, state.id, state.view_ids)
+                for frame in iterate_group_frames(
+                    state.group, state.solution, state.id, state.view_ids
+                )
                 if split is None or frame.split == split
             ]
-    pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest(sorted(hashes)), rule)
+    pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest_json(sorted(hashes)), rule)
     return EvaluationTruth(tuple(frames), dataset.policy, 0, pins)
 
 
-def group_frames(
+def iterate_group_frames(
     group: Group,
     solution: Solution,
     group_id: int,
@@ -132,7 +136,7 @@ def group_frames(
         )
 
 
-def _frozen_frames(
+def _iterate_frozen_frames(
     item: FrozenGroup, present: tuple[int, Mapping[str, int]], count: int
 ) -> Iterator[Frame]:
     """Views that the dataset no longer has get ids below zero, each its own."""
@@ -142,7 +146,7 @@ def _frozen_frames(
         for place, view in enumerate(item.group.views)
     }
     splits = {view.key: item.row.split for view in item.group.views} | dict(item.row.splits or {})
-    yield from group_frames(item.group, item.solution, group_id, ids, splits)
+    yield from iterate_group_frames(item.group, item.solution, group_id, ids, splits)
 
 
 def make_truth_pins(
@@ -173,4 +177,4 @@ def make_truth_pins(
 def unknown_rule_error(rule: str) -> InputError:
     """The error where somebody wants groups by a rule that is none of ``LIVE_RULES``."""
     known = ", ".join(LIVE_RULES)
-    return InputError(f"groups must be one of {known}, not {quoted(rule)}", pointer="/groups")
+    return InputError(f"groups must be one of {known}, not {quote_text(rule)}", pointer="/groups")

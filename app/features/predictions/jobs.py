@@ -44,7 +44,7 @@ def request_evaluation(
     return jobs.submit(
         EVALUATE,
         f"Evaluate {request.name or 'predictions'} on {found.name}",
-        partial(evaluation_work, store),
+        partial(run_evaluation_job, store),
         dataset_id=found.id,
         actor=actor,
         request=asdict(request),
@@ -64,7 +64,7 @@ def request_accept(
     return jobs.submit(
         ACCEPT,
         f"Accept {len(plan.changes)} predictions of {plan.predictions.name}",
-        partial(accept_work, store),
+        partial(run_accept_job, store),
         dataset_id=found.id,
         actor=actor,
         request={"accept": asdict(request)},
@@ -75,30 +75,30 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
     """Let evaluations that an earlier server was at go on, and another process accept predictions
     than the one that was asked."""
 
-    def evaluating(progress: JobProgress) -> Json:
+    def resume_evaluation(progress: JobProgress) -> Json:
         # The server may have stopped between the result and the record of its job.
-        done = _evaluated_since(store, progress.job)
-        return evaluation_work(store, progress) if done is None else make_evaluation_result(done)
+        done = _find_evaluation_of_job(store, progress.job)
+        return run_evaluation_job(store, progress) if done is None else make_evaluation_result(done)
 
-    jobs.register_resume(EVALUATE, evaluating)
-    jobs.register_work(ACCEPT, partial(accept_work, store))
+    jobs.register_resume(EVALUATE, resume_evaluation)
+    jobs.register_work(ACCEPT, partial(run_accept_job, store))
 
 
-def evaluation_work(store: Store, progress: JobProgress) -> Json:
+def run_evaluation_job(store: Store, progress: JobProgress) -> Json:
     """The work of evaluating; its result names the evaluation."""
     request = EvaluationRequest(**progress.job.request)
-    return _in_worker(store, "evaluating", "the evaluation", _run_evaluation, request, progress)
+    return _run_in_worker(store, "evaluating", "the evaluation", _run_evaluation, request, progress)
 
 
-def accept_work(store: Store, progress: JobProgress) -> Json:
+def run_accept_job(store: Store, progress: JobProgress) -> Json:
     """The work of accepting; its result counts what changed."""
     values = progress.job.request["accept"]
     views = None if values["views"] is None else tuple(values["views"])
     request = AcceptRequest(**{**values, "views": views})
-    return _in_worker(store, "accepting", "the acceptance", _run_accept, request, progress)
+    return _run_in_worker(store, "accepting", "the acceptance", _run_accept, request, progress)
 
 
-def _in_worker(
+def _run_in_worker(
     store: Store,
     kind: str,
     what: str,
@@ -123,7 +123,7 @@ def _run_evaluation(
 def _run_accept(
     store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: ReportProgress
 ) -> Json:
-    return accept_result(
+    return make_accept_result(
         accept_predicted_balls(store, dataset_id, request, actor=actor, progress=progress)
     )
 
@@ -133,12 +133,12 @@ def make_evaluation_result(found: StoredEvaluation) -> dict[str, Any]:
     return {"evaluation": found.id, "name": found.name, "counts": found.counts}
 
 
-def accept_result(report: AcceptReport) -> dict[str, Any]:
+def make_accept_result(report: AcceptReport) -> dict[str, Any]:
     """What the job of an acceptance leaves."""
     return {"changed": report.views, "groups": report.groups, "refused": dict(report.refused)}
 
 
-def _evaluated_since(store: Store, job: Job) -> StoredEvaluation | None:
+def _find_evaluation_of_job(store: Store, job: Job) -> StoredEvaluation | None:
     request = EvaluationRequest(**job.request)
     wanted = (request.predictions, request.careful, request.version, request.split, request.boxes)
     for item in list_evaluations(store, job.dataset_id or 0):

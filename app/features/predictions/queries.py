@@ -31,7 +31,7 @@ from app.features.predictions.tables import (
 )
 from app.geometry.camera import Camera
 from app.json_text import canonical_json_text
-from app.soccer.codec import camera_from_json, camera_to_json, digest
+from app.soccer.codec import camera_from_json, camera_to_json, digest_json
 
 _BATCH = 5000
 
@@ -116,7 +116,7 @@ def digest_predictions(
     # Sets without tracks keep the digest that they had before there were any.
     if tracks:
         parts.append([[name, track.to_json()] for name, track in sorted(tracks.items())])
-    return digest(parts)
+    return digest_json(parts)
 
 
 def insert_prediction_set(
@@ -329,14 +329,14 @@ def _evaluation_from_row(row: Any) -> StoredEvaluation:
     return StoredEvaluation(**{**values, "figures": tuple(decompress_json(row.figures))})
 
 
-def is_of_match(match: str) -> FrameCondition:
+def match_condition(match: str) -> FrameCondition:
     """The frame is of a match."""
     return EvaluationFrameModel.match == match
 
 
-def is_between(column: str, low: float | None, high: float | None) -> FrameCondition:
+def between_condition(column: str, low: float | None, high: float | None) -> FrameCondition:
     """The frame has a number, and it lies in [low, high)."""
-    value = _frame_column(column)
+    value = _get_frame_column(column)
     where: list[FrameCondition] = [value.is_not(None)]
     if low is not None:
         where.append(value >= low)
@@ -345,9 +345,9 @@ def is_between(column: str, low: float | None, high: float | None) -> FrameCondi
     return and_(*where)
 
 
-def is_missing(column: str) -> FrameCondition:
+def missing_condition(column: str) -> FrameCondition:
     """The frame has a ball and no such number."""
-    return and_(_frame_column(column).is_(None), EvaluationFrameModel.ball.is_(True))
+    return and_(_get_frame_column(column).is_(None), EvaluationFrameModel.ball.is_(True))
 
 
 def count_frame_rows(
@@ -376,7 +376,7 @@ def read_frame_rows(
     model = EvaluationFrameModel
     order: list[ColumnElement[Any]] = []
     if sort is not None:
-        value = _frame_column(sort)
+        value = _get_frame_column(sort)
         order = [value.is_(None), value.desc() if descending else value.asc()]
     columns = [item for item in model.__table__.columns if item.name not in _KEEPING]
     statement = (
@@ -390,6 +390,6 @@ def read_frame_rows(
         yield dict(row._mapping)
 
 
-def _frame_column(name: str) -> InstrumentedAttribute[Any]:
+def _get_frame_column(name: str) -> InstrumentedAttribute[Any]:
     column: InstrumentedAttribute[Any] = getattr(EvaluationFrameModel, name)
     return column

@@ -8,16 +8,16 @@ from pathlib import Path
 
 from app.config import Settings
 from app.errors import DatasetFormatError, InputError, TooLargeError
-from app.evaluation.frame import FrameNames
+from app.evaluation.frame import FrameNameIndex
 from app.evaluation.prediction_files import (
     AUTO,
-    ReadPredictedCameras,
+    LoadedPredictedCameras,
     read_predicted_cameras,
     read_predictions,
 )
-from app.evaluation.prediction_run import ReadPredictions
+from app.evaluation.prediction_run import LoadedPredictions
 from app.features.imports.upload_queries import upload_path
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.soccer.frames import ImageSize
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
@@ -117,20 +117,25 @@ def resolve_uploaded_files(
         NotFoundError: An upload is not there, or has expired.
     """
 
-    def place(upload: str | None) -> Path | None:
+    def find_upload_path(upload: str | None) -> Path | None:
         return None if upload is None else upload_path(settings, upload)
 
-    return replace(how, path=place(path), images=place(images), cameras=place(cameras))
+    return replace(
+        how,
+        path=find_upload_path(path),
+        images=find_upload_path(images),
+        cameras=find_upload_path(cameras),
+    )
 
 
-Found = tuple[ReadPredictions, ReadPredictedCameras]
-Read = Callable[[PredictionFiles, FrameNames, Limits], Found]
+Found = tuple[LoadedPredictions, LoadedPredictedCameras]
+Read = Callable[[PredictionFiles, FrameNameIndex, ImportLimits], Found]
 """Reads files, wherever that happens."""
 
 
-def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
+def read_files(files: PredictionFiles, names: FrameNameIndex, limits: ImportLimits) -> Found:
     """Boxes and cameras of files, by the frames of a dataset."""
-    boxes, cameras = ReadPredictions(), ReadPredictedCameras()
+    boxes, cameras = LoadedPredictions(), LoadedPredictedCameras()
     if files.path is not None:
         boxes = read_predictions(
             files.path,
@@ -154,7 +159,9 @@ def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Fou
     return boxes, cameras
 
 
-def _without_folder(error: DatasetFormatError, files: PredictionFiles) -> DatasetFormatError:
+def _remove_folder_from_error(
+    error: DatasetFormatError, files: PredictionFiles
+) -> DatasetFormatError:
     """The same without the server's folders, which concern nobody who uploaded a file."""
     shown = error.path
     for path in (files.path, files.images, files.cameras):
@@ -171,7 +178,7 @@ class PredictionReader:
         counts = COUNTS["predictions"]
         self._pool = WorkerPool(worker_limits, 1, WAITING, "sets of predictions", counts)
 
-    def read(self, files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
+    def read(self, files: PredictionFiles, names: FrameNameIndex, limits: ImportLimits) -> Found:
         """``read_files``, within limits.
 
         Raises:
@@ -188,7 +195,7 @@ class PredictionReader:
         try:
             found: Found = task.future.result()
         except DatasetFormatError as error:
-            raise _without_folder(error, files) from error
+            raise _remove_folder_from_error(error, files) from error
         return found
 
     def close(self) -> None:

@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.config import Settings
-from app.features.groups.routes import CHANGED, CONFLICTS, load_document_of_view
-from app.features.groups.schemas import GroupDocument, group_response
+from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
+from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.groups.submit import find_view
 from app.features.jobs.queries import Job
@@ -18,8 +18,8 @@ from app.features.predictions.accept import (
     AcceptReport,
     accept_box,
     accept_predicted_balls,
-    group_predictions,
     plan_accept,
+    read_group_predictions,
 )
 from app.features.predictions.jobs import request_accept
 from app.features.predictions.reader import PredictionFiles, resolve_uploaded_files
@@ -36,7 +36,7 @@ from app.features.predictions.schemas import (
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.http.documents import document, make_empty_response, respond_with
+from app.http.documents import make_document_response, make_empty_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -58,9 +58,9 @@ def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList
     return PredictionSetList(items=found)
 
 
-def _added_response(found: review.PredictionSet) -> Response:
+def _make_added_response(found: review.PredictionSet) -> Response:
     headers = {"Location": f"/api/v1/predictions/{found.id}"}
-    return document(PredictionSetDocument.model_validate(found), 201, headers)
+    return make_document_response(PredictionSetDocument.model_validate(found), 201, headers)
 
 
 @router.post(
@@ -82,7 +82,7 @@ def _added_response(found: review.PredictionSet) -> Response:
         "cameras_upload": OwnedKind.UPLOAD,
     },
 )
-@respond_with(_added_response)
+@respond_with(_make_added_response)
 def add_predictions(
     dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
 ) -> review.PredictionSet:
@@ -96,15 +96,17 @@ def add_predictions(
         services.store,
         dataset,
         request.name,
-        _prediction_files(services.settings, request),
+        _resolve_prediction_files(services.settings, request),
         actor=actor,
         read=services.predictions.read,
     )
 
 
-def _accepted_response(found: AcceptReport | Job) -> Response:
+def _make_accepted_response(found: AcceptReport | Job) -> Response:
     return (
-        make_job_response(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
+        make_job_response(found)
+        if isinstance(found, Job)
+        else make_document_response(AcceptOutcome.done(found))
     )
 
 
@@ -122,7 +124,7 @@ def _accepted_response(found: AcceptReport | Job) -> Response:
     },
 )
 @may(Action.LEAD, body={"dataset": OwnedKind.DATASET, "predictions": OwnedKind.PREDICTIONS})
-@respond_with(_accepted_response)
+@respond_with(_make_accepted_response)
 def accept_predictions(
     request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
 ) -> AcceptReport | Job | Response:
@@ -133,7 +135,9 @@ def accept_predictions(
     """
     store, value = services.store, request.value()
     if dry_run or request.dry_run:
-        return document(AcceptOutcome.planned(plan_accept(store, request.dataset, value)))
+        return make_document_response(
+            AcceptOutcome.planned(plan_accept(store, request.dataset, value))
+        )
     if request.views is not None:
         return accept_predicted_balls(store, request.dataset, value, actor=actor)
     return request_accept(services.jobs, store, request.dataset, value, actor=actor)
@@ -185,7 +189,7 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
     """What was predicted for all views of a group, and where its accepted balls come from."""
-    return GroupPredictionsDocument.of(group_predictions(store, group))
+    return GroupPredictionsDocument.of(read_group_predictions(store, group))
 
 
 @router.post(
@@ -195,7 +199,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def accept_prediction(
     view: Id,
     prediction: Id,
@@ -207,11 +211,11 @@ def accept_prediction(
     ] = False,
 ) -> GroupState:
     """Make this very prediction the ball of its view: an edit that can be undone."""
-    with add_current_state_to_conflicts(lambda: load_document_of_view(store, view)):
+    with add_current_state_to_conflicts(lambda: load_group_document_of_view(store, view)):
         return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
 
 
-def _prediction_files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
+def _resolve_prediction_files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
     how = PredictionFiles(
         None,
         format=request.format,

@@ -86,7 +86,7 @@ class PredictionRequest(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _something(self) -> PredictionRequest:
+    def _require_upload(self) -> PredictionRequest:
         if self.upload is None and self.cameras_upload is None:
             raise ValueError("give an upload, a cameras_upload, or both")
         return self
@@ -233,7 +233,7 @@ class AcceptBody(BaseModel):
     dry_run: StrictBool = False
 
     @model_validator(mode="after")
-    def _one_choice(self) -> AcceptBody:
+    def _require_query_or_views(self) -> AcceptBody:
         if (self.q is None) == (self.views is None):
             raise ValueError('give "q" or "views"; an empty "q" means every group')
         return self

@@ -16,11 +16,11 @@ from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.evaluation.frame import Detection, FrameNames, NamedFrame
-from app.evaluation.prediction_files import ReadPredictedCameras
-from app.evaluation.prediction_run import ReadPredictions, list_unknown_frames
+from app.evaluation.frame import Detection, FrameNameIndex, NamedFrame
+from app.evaluation.prediction_files import LoadedPredictedCameras
+from app.evaluation.prediction_run import LoadedPredictions, list_unknown_frames
 from app.features.audit.service import add_audit_event
-from app.features.datasets.service import read_dataset_head, require_name
+from app.features.datasets.service import read_dataset_head, require_valid_name
 from app.features.groups.view_queries import list_dataset_views
 from app.features.predictions.queries import PredictedBox as PredictedBox
 from app.features.predictions.queries import PredictionSet as PredictionSet
@@ -35,10 +35,10 @@ from app.features.predictions.queries import (
     read_view_boxes,
 )
 from app.features.predictions.reader import PredictionFiles, Read, read_files
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
-from app.json_text import canonical_json_text, quoted
+from app.json_text import canonical_json_text, quote_text
 from app.object_store.path import unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
@@ -73,13 +73,13 @@ def add_predictions(
         ConflictError: There is a set of that name.
     """
     if name is not None:
-        require_name(name, "a set of predictions", digits=True)
+        require_valid_name(name, "a set of predictions", digits=True)
     first = files.first
     names = read_frame_names(store, dataset)
-    boxes, cameras = read(files, names, Limits.of(store.settings))
+    boxes, cameras = read(files, names, ImportLimits.of(store.settings))
     nothing = not boxes.detections and not cameras.cameras and not boxes.tracks
     if nothing and (boxes.unknown or cameras.unknown or boxes.report.problems):
-        raise _nothing_known(boxes, cameras, names)
+        raise _unknown_frames_error(boxes, cameras, names)
     if boxes.tracks and not any(track.position for track in boxes.tracks.values()):
         raise next(iter(boxes.report.problems), InputError(f"{first.name} holds no ball"))
     return save_predictions(
@@ -92,7 +92,7 @@ def add_predictions(
         names=names,
         format=boxes.format if files.path is not None else "cameras",
         source=first.name,
-        report=_reading_report(boxes, cameras),
+        report=_make_reading_report(boxes, cameras),
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
         reuse=name is None,
@@ -107,7 +107,7 @@ def save_predictions(
     cameras: Mapping[int, Camera],
     *,
     tracks: Tracks | None = None,
-    names: FrameNames,
+    names: FrameNameIndex,
     format: str,  # noqa: A002
     source: str,
     report: Json,
@@ -146,12 +146,12 @@ def save_predictions(
         found = read_dataset_head(session, dataset)
         if reuse:
             own = list_prediction_sets_of_dataset(session, found.id)
-            known = next((item for item in own if _same_reading(item, values)), None)
+            known = next((item for item in own if _is_same_reading(item, values)), None)
             if known is not None:
                 session.respond(known)
                 return known
-            values["name"] = name = _free_name(name, {item.name for item in own})
-        require_free(session, found.id, name)
+            values["name"] = name = _make_unused_name(name, {item.name for item in own})
+        require_unused_set_name(session, found.id, name)
         present = {row.id for row in list_dataset_views(session, found.id)}
         identity = insert_prediction_set(
             session,
@@ -166,11 +166,11 @@ def save_predictions(
         return made
 
 
-def read_frame_names(store: Store, dataset: str | int) -> FrameNames:
+def read_frame_names(store: Store, dataset: str | int) -> FrameNameIndex:
     """The frames of a dataset by every name that a file may give them."""
     with store.read() as session:
         rows = list_dataset_views(session, read_dataset_head(session, dataset).id)
-    return FrameNames.of(
+    return FrameNameIndex.of(
         NamedFrame(
             id=row.id,
             group=row.group,
@@ -178,7 +178,7 @@ def read_frame_names(store: Store, dataset: str | int) -> FrameNames:
             match=row.match,
             size=ImageSize(row.width, row.height),
             station=row.station if row.shared else "",
-            picture=_picture_name(row.media),
+            picture=_make_picture_name(row.media),
         )
         for row in rows
     )
@@ -259,7 +259,7 @@ def make_prediction_set_name(path: Path) -> str:
     return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
 
 
-def require_free(session: Session, dataset_id: int, name: str) -> None:
+def require_unused_set_name(session: Session, dataset_id: int, name: str) -> None:
     """Raise ConflictError where a dataset has a set of that name."""
     if has_prediction_set(session, dataset_id, name):
         raise ConflictError(
@@ -268,14 +268,14 @@ def require_free(session: Session, dataset_id: int, name: str) -> None:
         )
 
 
-def _same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
+def _is_same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
     """Whether a set has the same boxes and cameras, from the same source with the same report."""
     names = ("digest", "format", "source", "unknown")
     same = all(getattr(known, name) == values[name] for name in names)
     return same and canonical_json_text(known.report) == canonical_json_text(values["report"])
 
 
-def _free_name(name: str, taken: set[str]) -> str:
+def _make_unused_name(name: str, taken: set[str]) -> str:
     """The name, or with the first number that makes it free."""
     return next(
         found
@@ -284,30 +284,30 @@ def _free_name(name: str, taken: set[str]) -> str:
     )
 
 
-def _nothing_known(
-    boxes: ReadPredictions, cameras: ReadPredictedCameras, names: FrameNames
+def _unknown_frames_error(
+    boxes: LoadedPredictions, cameras: LoadedPredictedCameras, names: FrameNameIndex
 ) -> InputError:
     if boxes.report.problems and not boxes.unknown:
         return boxes.report.problems[0]
     unknown, reasons = boxes.unknown + cameras.unknown, {**boxes.reasons, **cameras.reasons}
     first = sorted(unknown)
-    others = f" (also {', '.join(map(quoted, first[1:3]))})" if first[1:] else ""
+    others = f" (also {', '.join(map(quote_text, first[1:3]))})" if first[1:] else ""
     return InputError(
-        f"none of the {len(unknown)} frames belongs to the dataset: {quoted(first[0], 80)} "
+        f"none of the {len(unknown)} frames belongs to the dataset: {quote_text(first[0], 80)} "
         f"{reasons[first[0]]}{others}",
-        hint=f"Frames of the dataset are called {', '.join(map(quoted, names.examples()))}, with their match "
+        hint=f"Frames of the dataset are called {', '.join(map(quote_text, names.examples()))}, with their match "
         "before them where several have one of that name, or as an export calls them.",
     )
 
 
-def _picture_name(media: Media | None) -> str:
+def _make_picture_name(media: Media | None) -> str:
     """Name of the file of a picture with its last folder; empty where a view has none of its own."""
     if media is None or media.frame is not None:
         return ""
     return "/".join(PurePosixPath(media.member or unseal_address(media.path)[0]).parts[-2:])
 
 
-def _reading_report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
+def _make_reading_report(boxes: LoadedPredictions, cameras: LoadedPredictedCameras) -> Json:
     return {
         "read": boxes.report.read,
         "without_score": boxes.without_score,

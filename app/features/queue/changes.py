@@ -80,17 +80,17 @@ def find_newest_entry_and_solution(store: Store) -> tuple[int, int]:
         return find_newest_entry_id(session), find_newest_solution_id(session)
 
 
-def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
+def read_groups_solved_since(store: Store, solution: int) -> list[LoggedChange]:
     """Groups that got a solution after another one; datasets as a whole where they are many."""
     with store.read() as session:
         behind = find_newest_solution_id(session) - solution
         if behind > FAR:
             names = read_dataset_names(session)
             return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
-        return read_solved(session, solution) if behind > 0 else []
+        return read_newly_solved_groups(session, solution) if behind > 0 else []
 
 
-def read_news(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
+def read_new_changes(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
     """What has changed since some entries of the log, and since a solution (None: none is told)."""
     with store.read() as session:
         entry, newest = find_newest_entry_id(session), find_newest_solution_id(session)
@@ -98,7 +98,7 @@ def read_news(store: Store, places: Collection[int], solution: int | None) -> Ne
         solved: list[LoggedChange] = []
         if solution is not None and newest > solution:
             changed = {item.group_id for items in changes.values() for item in items}
-            solved = read_solved(session, solution, changed)
+            solved = read_newly_solved_groups(session, solution, changed)
     return NewChanges(entry, newest, changes, solved)
 
 
@@ -111,7 +111,7 @@ def read_changes(session: Session, after: int) -> list[LoggedChange]:
     return _add_names_and_etags(session, iterate_changes_after_entry(session, after))
 
 
-def read_solved(
+def read_newly_solved_groups(
     session: Session, after: int, known: Iterable[int | None] = ()
 ) -> list[LoggedChange]:
     """Groups that got a solution after another one; ``known`` are told of already."""
@@ -126,9 +126,9 @@ def read_solved(
 
 def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> list[LoggedChange]:
     """Changes with names and ETags; a dataset with too many of them is told as a whole."""
-    items = _newest_change_of_each_group(found)
+    items = _select_newest_change_per_group(found)
     sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
-    items = _newest_change_of_each_group(
+    items = _select_newest_change_per_group(
         replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
     )
     names = read_dataset_names(session)
@@ -152,14 +152,14 @@ def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> lis
     ]
 
 
-def _newest_change_of_each_group(found: Iterable[StoredChange]) -> list[StoredChange]:
+def _select_newest_change_per_group(found: Iterable[StoredChange]) -> list[StoredChange]:
     """The last change of each group, and the last one of each kind of each dataset, in order.
 
     A comment stands beside the change of its group, which it does not hide.
     """
-    last = {(item.dataset_id, item.group_id, _merge_key(item)): item for item in found}
+    last = {(item.dataset_id, item.group_id, _make_merge_key(item)): item for item in found}
     return sorted(last.values(), key=lambda item: item.id or 0)
 
 
-def _merge_key(item: StoredChange) -> str:
+def _make_merge_key(item: StoredChange) -> str:
     return item.kind if item.group_id is None or item.kind == COMMENT else ""

@@ -22,7 +22,7 @@ class QueryField:
     """One field of a query.
 
     Attributes:
-        kind: ``number`` compares, ``flag`` is yes or no, ``choice`` one of ``values``, ``text`` any
+        kind: ``number`` compares, ``read_flag`` is yes or no, ``choice`` one of ``values``, ``text`` any
             text, ``ids`` numbers of groups, ``order`` says how the groups are listed.
         unit: Of a number.
         values: What it can be, or, of a text, words that mean something of their own.
@@ -63,16 +63,18 @@ YES_NO = ("yes", "no")
 WHETHER = ("any", "none")
 
 
-def _number_field(name: str, column: str, meaning: str, unit: str = "", *also: str) -> QueryField:
+def _make_number_field(
+    name: str, column: str, meaning: str, unit: str = "", *also: str
+) -> QueryField:
     others = (*also, column) if column != name else also
     return QueryField(name, "number", meaning, unit, ("none",), others, column)
 
 
-def _text_field(name: str, meaning: str, values: tuple[str, ...] = WHETHER) -> QueryField:
+def _make_text_field(name: str, meaning: str, values: tuple[str, ...] = WHETHER) -> QueryField:
     return QueryField(name, "text", meaning, values=values)
 
 
-def _flag_field(name: str, meaning: str) -> QueryField:
+def _make_flag_field(name: str, meaning: str) -> QueryField:
     return QueryField(name, "flag", meaning, values=YES_NO)
 
 
@@ -89,27 +91,27 @@ _HIDDEN_FIELDS = (
         also=("first_failing",),
     ),
     QueryField("reason", "text", "why it was rejected", values=(*WHETHER, *REASONS)),
-    _flag_field("stale", "changed after its verdict"),
-    _flag_field("solved", "is solved"),
-    _flag_field("passes", "passes every gate"),
-    _flag_field("fixed", "edited before it was accepted"),
+    _make_flag_field("stale", "changed after its verdict"),
+    _make_flag_field("solved", "is solved"),
+    _make_flag_field("passes", "passes every gate"),
+    _make_flag_field("fixed", "edited before it was accepted"),
     QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
     QueryField(
         "proposal", "choice", "what was proposed from a view's paint, until its lines change",
         values=(*WHETHER, *PROPOSAL_OUTCOMES),
     ),
-    _text_field("split", "train, test and so on, the whole name"),
-    _text_field("match", "part of the match's name", ()),
-    _text_field("reviewer", "person who decided"),
-    _text_field("view", "key of a view, or how many views there are", ()),
-    _text_field("label", "part of the label or of the key, like a word without a field", ()),
-    _text_field("key", "key of the group, the whole key"),
-    _text_field("override", "gate that an acceptance overrides"),
+    _make_text_field("split", "train, test and so on, the whole name"),
+    _make_text_field("match", "part of the match's name", ()),
+    _make_text_field("reviewer", "person who decided"),
+    _make_text_field("view", "key of a view, or how many views there are", ()),
+    _make_text_field("label", "part of the label or of the key, like a word without a field", ()),
+    _make_text_field("key", "key of the group, the whole key"),
+    _make_text_field("override", "gate that an acceptance overrides"),
     QueryField(
         "comments", "choice", "comments on it",
         values=(*WHETHER, "open", "resolved"),
     ),
-    _text_field("mentions", "person mentioned in an open comment, by name"),
+    _make_text_field("mentions", "person mentioned in an open comment, by name"),
     QueryField(
         "annotations", "choice",
         "result of its independent annotations; waiting: they differ and need a decision (reviewers)",
@@ -121,30 +123,30 @@ _HIDDEN_FIELDS = (
     ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
     QueryField("batch", "ids", "assigned work: batch:3, in its order unless another is given"),
-    _number_field("jac", "min_jac", "smallest JaC of the views at 0.5 %, 0 to 1", "", "jac05"),
-    _number_field(
+    _make_number_field("jac", "min_jac", "smallest JaC of the views at 0.5 %, 0 to 1", "", "jac05"),
+    _make_number_field(
         "agreement", "agreement",
         "least agreement of the views' cameras with their paint, 0 to 1; none: no paint was read",
     ),
-    _number_field("error", "error_px", "larger reprojection error of the best pair, as its gate judges it", "px"),
-    _number_field("error_percent", "error_percent", "the same error", "% of the image diagonal"),
-    _number_field("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
-    _number_field("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
-    _number_field("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
-    _number_field("height", "height_m", "ball above the grass", "m"),
-    _number_field("distance", "distance_m", "from the camera of the first view to the ball", "m"),
-    _number_field("box", "box_px", "diameter of the ball's box in the first view that shows it", "px"),
-    _number_field("x", "x_m", "ball along the pitch, from its centre to the right", "m"),
-    _number_field("y", "y_m", "ball across the pitch, from its centre to the main camera", "m"),
-    _number_field(
+    _make_number_field("error", "error_px", "larger reprojection error of the best pair, as its gate judges it", "px"),
+    _make_number_field("error_percent", "error_percent", "the same error", "% of the image diagonal"),
+    _make_number_field("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
+    _make_number_field("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
+    _make_number_field("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
+    _make_number_field("height", "height_m", "ball above the grass", "m"),
+    _make_number_field("distance", "distance_m", "from the camera of the first view to the ball", "m"),
+    _make_number_field("box", "box_px", "diameter of the ball's box in the first view that shows it", "px"),
+    _make_number_field("x", "x_m", "ball along the pitch, from its centre to the right", "m"),
+    _make_number_field("y", "y_m", "ball across the pitch, from its centre to the main camera", "m"),
+    _make_number_field(
         "margin", "margin",
         "how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails", "share",
     ),
-    _number_field(
+    _make_number_field(
         "value", "value", "the margin without its sign: small where a small change decides", "share"
     ),
-    _number_field("views", "views", "how many views"),
-    _number_field("number", "number", "place in the dataset, from 1"),
+    _make_number_field("views", "views", "how many views"),
+    _make_number_field("number", "number", "place in the dataset, from 1"),
 )  # fmt: skip
 
 ORDERS = (

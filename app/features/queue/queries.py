@@ -23,7 +23,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.visitors import iterate
 
-from app.db.dialects.dialect import select_numbers
+from app.db.dialects.dialect import select_from_number_list
 from app.db.session import Session
 from app.features.agreement.queries import select_groups_in_state
 from app.features.batches.queries import select_groups_in_batches
@@ -36,7 +36,7 @@ from app.features.people.visibility_queries import (
 )
 from app.features.policies.queries import find_policy_change_time
 from app.features.queue.tables import QUEUE_NUMBERS, QUEUE_SCANNED, QueueModel
-from app.features.solutions.queries import is_solved
+from app.features.solutions.queries import is_group_solved
 from app.soccer.solution import GATES
 
 Condition = ColumnElement[bool]
@@ -64,34 +64,34 @@ def compare_condition(column: str, op: str, value: float | str) -> Condition:
     return condition
 
 
-def is_absent(column: str) -> Condition:
+def absent_condition(column: str) -> Condition:
     """There is no such number."""
     return _queue_column(column).is_(None)
 
 
-def is_empty(column: str) -> Condition:
+def empty_text_condition(column: str) -> Condition:
     """There is no such text."""
     return or_(_queue_column(column).is_(None), _queue_column(column) == "")
 
 
-def is_text(column: str, text: str) -> Condition:
+def text_condition(column: str, text: str) -> Condition:
     """A text that may be absent is this one; turned round, it is another or absent."""
     return and_(_queue_column(column).is_not(None), _queue_column(column) == text)
 
 
-def is_flag(column: str, value: bool) -> Condition:
+def flag_condition(column: str, value: bool) -> Condition:
     """A flag is set, or is known not to be."""
     return _queue_column(column).is_(value)
 
 
-def contains_text(column: str, text: str) -> Condition:
+def contains_text_condition(column: str, text: str) -> Condition:
     """A text holds another."""
     return _queue_column(column).contains(text, autoescape=True)
 
 
 def has_list_item(column: str, item: str) -> Condition:
     """A list between commas has an item."""
-    return contains_text(column, f",{item},")
+    return contains_text_condition(column, f",{item},")
 
 
 def has_all_pictures() -> Condition:
@@ -101,7 +101,7 @@ def has_all_pictures() -> Condition:
 
 def has_group_id(ids: Iterable[int]) -> Condition:
     """The group's id is one of these."""
-    return QueueModel.group_id.in_(select_numbers(ids))
+    return QueueModel.group_id.in_(select_from_number_list(ids))
 
 
 def has_open_proposal(outcome: str | None = None) -> Condition:
@@ -272,7 +272,7 @@ _FEW = 10
 
 
 @dataclass(frozen=True)
-class Listing:
+class GroupListing:
     """The groups of a dataset that fulfil all conditions, as a session sees them; those that are
     hidden from whoever asks are none of them.
 
@@ -286,7 +286,7 @@ class Listing:
 
     def count(self) -> int:
         """How many groups there are."""
-        found: int | None = self.session.scalar(self._over_all_groups(select(func.count())))
+        found: int | None = self.session.scalar(self._filter_statement(select(func.count())))
         return found or 0
 
     def place(self, order: RowOrder, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
@@ -294,15 +294,15 @@ class Listing:
         there are."""
         here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
         before = func.sum(case((order.before(keys), 1), else_=0))
-        statement = self._over_all_groups(select(func.count(), here, before), order)
+        statement = self._filter_statement(select(func.count(), here, before), order)
         total, found, index = self.session.execute(statement).one()
         return (index if found else None), total
 
     def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
         """Some columns of each group."""
         names = list(names)
-        needed = _column_names(self.conditions) | set(names)
-        statement = _with_index(
+        needed = _collect_column_names(self.conditions) | set(names)
+        statement = _hint_index(
             _choose_index(needed), _select_columns(names).where(*self._conditions)
         )
         if by_number:
@@ -329,7 +329,7 @@ class Listing:
         if count <= 0:
             return []
         behind = total - start - count
-        ids = self._page_of_ids(order, min(start, behind) + count, total)
+        ids = self._select_page_of_ids(order, min(start, behind) + count, total)
         if start <= behind:
             return self._read_ids(ids.order_by(*order.ascending).offset(start).limit(count))
         backwards = ids.order_by(*order.backwards).offset(behind).limit(count)
@@ -339,7 +339,7 @@ class Listing:
         self, order: RowOrder, keys: Sequence[Key], limit: int, total: int
     ) -> tuple[list[int], list[int]]:
         """Ids just before some keys and just after, the nearest first, out of ``total``."""
-        ids = self._page_of_ids(order, limit, total)
+        ids = self._select_page_of_ids(order, limit, total)
         before = ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
         after = ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
         return self._read_ids(before), self._read_ids(after)
@@ -353,29 +353,33 @@ class Listing:
     def _ids_statement(self) -> Select[int]:
         return select(QueueModel.group_id).where(*self._conditions)
 
-    def _over_all_groups(self, statement: Any, order: RowOrder | None = None) -> Select[Any]:
+    def _filter_statement(self, statement: Any, order: RowOrder | None = None) -> Select[Any]:
         """The statement over all groups."""
         filtered = statement.select_from(QueueModel).where(*self._conditions)
-        names = _column_names(self.conditions) | (
-            set() if order is None else _column_names(order.keys)
+        names = _collect_column_names(self.conditions) | (
+            set() if order is None else _collect_column_names(order.keys)
         )
-        return filtered if _is_sorted(names) else _with_index(_choose_index(names), filtered)
+        return (
+            filtered if _is_covered_by_index(names) else _hint_index(_choose_index(names), filtered)
+        )
 
-    def _page_of_ids(self, order: RowOrder, reach: int, total: int) -> Select[int]:
+    def _select_page_of_ids(self, order: RowOrder, reach: int, total: int) -> Select[int]:
         """Ids of which ``reach`` are read in order, out of ``total``."""
         few = self.conditions and reach * _FEW > total
         if few:
-            return _with_index(
-                _choose_index(_column_names(self.conditions) | _column_names(order.keys)),
+            return _hint_index(
+                _choose_index(
+                    _collect_column_names(self.conditions) | _collect_column_names(order.keys)
+                ),
                 self._ids_statement,
             )
-        return _with_index(order.index, self._ids_statement)
+        return _hint_index(order.index, self._ids_statement)
 
     def _read_ids(self, statement: Select[int]) -> list[int]:
         return list(self.session.scalars(statement))
 
 
-def _column_names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
+def _collect_column_names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
     """Columns of the queue that expressions read."""
     return {
         part.name
@@ -385,7 +389,7 @@ def _column_names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
     }
 
 
-def _is_sorted(names: set[str]) -> bool:
+def _is_covered_by_index(names: set[str]) -> bool:
     """Whether one index holds all of these columns."""
     return names <= SORTED and len(names - {"number"}) <= 1
 
@@ -395,7 +399,7 @@ def _choose_index(names: set[str]) -> str:
     return _SCAN if names <= {*QUEUE_SCANNED, "dataset_id", "group_id"} else _FILE_ORDER
 
 
-def _with_index(index: str | None, statement: Select[Any]) -> Select[Any]:
+def _hint_index(index: str | None, statement: Select[Any]) -> Select[Any]:
     """The statement by an index, where there is one; SQLite would choose by what it guesses."""
     if index is None:
         return statement
@@ -425,7 +429,9 @@ def read_columns_after(
     return session.execute(statement).all()
 
 
-def find_place(session: Session, group_id: int, order: RowOrder) -> tuple[int, list[Key]] | None:
+def find_group_position(
+    session: Session, group_id: int, order: RowOrder
+) -> tuple[int, list[Key]] | None:
     """The dataset of a group and its keys in an order; None where there is no such group."""
     statement = select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
     row = session.execute(statement).one_or_none()
@@ -466,7 +472,7 @@ def count_groups_to_solve(session: Session) -> tuple[int, int, str | None]:
     total = session.scalar(select(func.count()).select_from(QueueModel)) or 0
     statement = (
         select(QueueModel.dataset_id, func.count(), func.min(QueueModel.changed))
-        .where(not_(is_solved()))
+        .where(not_(is_group_solved()))
         .group_by(QueueModel.dataset_id)
     )
     rows = session.execute(statement).all()

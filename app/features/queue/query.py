@@ -21,7 +21,7 @@ from difflib import get_close_matches
 from hashlib import sha256
 
 from app.errors import InputError
-from app.features.batches.queries import batch_place_column
+from app.features.batches.queries import select_place_in_batch
 from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.features.queue.queries import Condition, RowOrder
@@ -34,7 +34,7 @@ MAX_TERMS = 30
 
 NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
 """Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
-``none`` is where there is no number."""
+``make_empty_track`` is where there is no number."""
 SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
 """What the queue can be sorted by, and the column of it."""
 
@@ -69,7 +69,7 @@ class Query:
     def order(self) -> RowOrder:
         """The order in which it lists groups."""
         if self.batch is not None:
-            return RowOrder(batch_place_column(self.batch))
+            return RowOrder(select_place_in_batch(self.batch))
         # "newest" says the direction itself.
         return RowOrder(SORTS[self.sort], self.descending != (self.sort == "newest"))
 
@@ -181,7 +181,7 @@ def _condition_of_term(term: _QueryTerm) -> Condition:
     if term.field == "batch":
         return conditions.is_in_batch(_parse_id(term, text) for text in term.value.split(","))
     if field_ is not None and field_.kind == "flag":
-        return conditions.is_flag(term.field, _require_choice(term, term.value) == "yes")
+        return conditions.flag_condition(term.field, _require_choice(term, term.value) == "yes")
     test = _TESTS[term.field]
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
@@ -204,7 +204,7 @@ def _parse_id(term: _QueryTerm, text: str) -> int:
 def _number_condition(term: _QueryTerm) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
-        return conditions.is_absent(column)
+        return conditions.absent_condition(column)
     return conditions.compare_condition(
         column, "=" if term.op == ":" else term.op, _parse_number(term)
     )
@@ -236,7 +236,7 @@ def _require_choice(term: _QueryTerm, value: str) -> str:
 
 
 def _any_or_none_condition(value: str, some: Condition) -> Condition:
-    """``some``; the opposite for ``none``."""
+    """``some``; the opposite for ``make_empty_track``."""
     return conditions.negate_condition(some) if value == "none" else some
 
 
@@ -252,16 +252,16 @@ def _finding_condition(term: _QueryTerm, value: str) -> Condition:
 
 
 def _gate_condition(term: _QueryTerm, value: str) -> Condition:
-    """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
+    """The first failing gate; ``make_empty_track`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
-        return conditions.is_flag("solved", False)
+        return conditions.flag_condition("solved", False)
     if value == "none":
-        return conditions.is_flag("passes", True)
+        return conditions.flag_condition("passes", True)
     return conditions.compare_condition("gate", "=", _require_choice(term, value))
 
 
 def _pictures_condition(term: _QueryTerm, value: str) -> Condition:
-    """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
+    """Whether views have a picture: ``make_empty_track`` of them, ``any``, or ``all``."""
     choice = _require_choice(term, value)
     if choice == "all":
         return conditions.has_all_pictures()
@@ -307,20 +307,23 @@ def _view_condition(_term: _QueryTerm, value: str) -> Condition:
 
 
 def _match_condition(_term: _QueryTerm, value: str) -> Condition:
-    return conditions.contains_text("match", value)
+    return conditions.contains_text_condition("match", value)
 
 
 def _text_condition(_term: _QueryTerm, value: str) -> Condition:
     return conditions.any_condition(
-        (conditions.contains_text("label", value), conditions.contains_text("key", value))
+        (
+            conditions.contains_text_condition("label", value),
+            conditions.contains_text_condition("key", value),
+        )
     )
 
 
 def _exact_text_condition(term: _QueryTerm, value: str) -> Condition:
     if value in ("any", "none"):
-        missing = conditions.is_empty(term.field)
+        missing = conditions.empty_text_condition(term.field)
         return missing if value == "none" else conditions.negate_condition(missing)
-    return conditions.is_text(term.field, value)
+    return conditions.text_condition(term.field, value)
 
 
 _TESTS: dict[str, Callable[[_QueryTerm, str], Condition]] = {

@@ -65,7 +65,7 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
     """Bring only what verdicts say in step: a fraction of the work of ``refresh_queue``."""
     for start in range(0, len(group_ids), _BATCH):
         ids = group_ids[start : start + _BATCH]
-        verdicts = _newest_verdicts_by_group(session, ids)
+        verdicts = _read_newest_verdicts_by_group(session, ids)
         edited = filter_edited_groups(session, ids)
         heads = session.execute(
             select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
@@ -73,7 +73,10 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
             .where(GroupModel.id.in_(ids))
         )
         values = [
-            {"of": head.id, **_verdict_columns(head, verdicts.get(head.id), edited, head.passes)}
+            {
+                "of": head.id,
+                **_make_verdict_columns(head, verdicts.get(head.id), edited, head.passes),
+            }
             for head in heads.all()
         ]
         if values:
@@ -103,8 +106,8 @@ def update_row(
     edited = {stored.id} if stored.edited else set[int]()
     values = {
         "changed": stored.changed,
-        **_verdict_columns(stored, verdict, edited, summary.passes),
-        **_solution_columns(summary, noticed),
+        **_make_verdict_columns(stored, verdict, edited, summary.passes),
+        **_make_solution_columns(summary, noticed),
     }
     session.execute(_ROW, {"row": stored.id, **values})
 
@@ -114,7 +117,9 @@ def update_verdict(
 ) -> None:
     """Show a new verdict in a group's row; the rest of it is in step."""
     edited = {stored.id} if stored.edited else set[int]()
-    session.execute(_ROW, {"row": stored.id, **_verdict_columns(stored, verdict, edited, passes)})
+    session.execute(
+        _ROW, {"row": stored.id, **_make_verdict_columns(stored, verdict, edited, passes)}
+    )
 
 
 def find_outdated_rows(session: Session) -> tuple[int, list[int]]:
@@ -131,39 +136,42 @@ def find_outdated_rows(session: Session) -> tuple[int, list[int]]:
         found = {row.group_id: dict(row._mapping) for row in present}
         apart += [
             row["group_id"]
-            for row in _queue_rows(session, some)
+            for row in _build_queue_rows(session, some)
             if row != found.get(row["group_id"])
         ]
     return len(ids), apart
 
 
 def _replace_rows(session: Session, ids: Sequence[int]) -> None:
-    rows = _queue_rows(session, ids)
+    rows = _build_queue_rows(session, ids)
     if rows:
         session.execute(_REPLACE, rows)
 
 
-def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
+def _build_queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
-    views, verdicts = _views_by_group(session, ids), _newest_verdicts_by_group(session, ids)
+    views, verdicts = (
+        _read_views_by_group(session, ids),
+        _read_newest_verdicts_by_group(session, ids),
+    )
     (findings, dismissals), edited = (
         read_import_findings(session, ids),
         filter_edited_groups(session, ids),
     )
-    heads = _groups_with_summaries(session, ids)
+    heads = _read_groups_with_summaries(session, ids)
     own = {head.id: findings_from_rows(findings[head.id], head.inputs_hash) for head, _ in heads}
-    checked = _findings_by_dismissal(session, dismissals, own)
+    checked = _split_findings_by_dismissal(session, dismissals, own)
     rows = []
     for head, summary in heads:
         passes = None if summary is None else summary.passes
-        judged = _verdict_columns(head, verdicts.get(head.id), edited, passes)
-        row = {**_group_columns(head, views[head.id]), **judged}
-        row.update(_solution_columns(summary, [item.kind for item in own[head.id]]))
+        judged = _make_verdict_columns(head, verdicts.get(head.id), edited, passes)
+        row = {**_make_group_columns(head, views[head.id]), **judged}
+        row.update(_make_solution_columns(summary, [item.kind for item in own[head.id]]))
         rows.append(row | checked.get(head.id, {}))
     return rows
 
 
-def _findings_by_dismissal(
+def _split_findings_by_dismissal(
     session: Session,
     dismissals: Mapping[int, GroupDismissals],
     noticed: Mapping[int, Sequence[Finding]],
@@ -190,13 +198,13 @@ def _findings_by_dismissal(
         found = [*(() if solved is None else solved.findings), *noticed[group]]
         opened, closed = split_open_and_dismissed_kinds(found, dismissed)
         checked[group] = {
-            "findings": _comma_separated(opened),
-            "dismissed": _comma_separated(closed),
+            "findings": _join_with_commas(opened),
+            "dismissed": _join_with_commas(closed),
         }
     return checked
 
 
-def _groups_with_summaries(
+def _read_groups_with_summaries(
     session: Session, ids: Sequence[int]
 ) -> list[tuple[Any, SolutionSummary | None]]:
     """Groups with the summary of the newest solution of their present state, if there is one.
@@ -215,7 +223,7 @@ def _groups_with_summaries(
     ]
 
 
-def _views_by_group(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+def _read_views_by_group(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
     statement = (
         select(ViewModel.group_id, ViewModel.id, ViewModel.key, ViewModel.media_path)
         .where(ViewModel.group_id.in_(ids))
@@ -227,7 +235,7 @@ def _views_by_group(session: Session, ids: Sequence[int]) -> dict[int, list[Any]
     return views
 
 
-def _newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+def _read_newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int, Any]:
     newest = (
         select(func.max(VerdictModel.id))
         .where(VerdictModel.group_id.in_(ids))
@@ -239,7 +247,7 @@ def _newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int,
     return {row.group_id: row for row in rows}
 
 
-def _group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
+def _make_group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     main = views[0].id if views and views[0].media_path is not None else None
     names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
     return {
@@ -247,7 +255,7 @@ def _group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
         "group_id": head.id,
         "views": len(views),
         "pictures": sum(view.media_path is not None for view in views),
-        "view_keys": _comma_separated([view.key for view in views]),
+        "view_keys": _join_with_commas([view.key for view in views]),
         "main_view": main,
     }
 
@@ -267,7 +275,7 @@ def filter_edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
     return set(session.scalars(statement))
 
 
-def _verdict_columns(
+def _make_verdict_columns(
     head: Any, verdict: Any, edited: Collection[int], passes: bool | None
 ) -> dict[str, Any]:
     if verdict is None or verdict.state == "unreviewed":
@@ -283,19 +291,21 @@ def _verdict_columns(
     }
 
 
-def _solution_columns(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
+def _make_solution_columns(
+    summary: SolutionSummary | None, noticed: Sequence[str]
+) -> dict[str, Any]:
     if summary is None:
         nothing: dict[str, Any] = {**dict.fromkeys(_NUMBERS), "dismissed": ""}
-        return {**nothing, "solved": False, "passes": None, "findings": _comma_separated(noticed)}
+        return {**nothing, "solved": False, "passes": None, "findings": _join_with_commas(noticed)}
     values = {name: getattr(summary, name) for name in _NUMBERS}
     return {
         **values,
         "passes": summary.passes,
         "solved": True,
-        "findings": _comma_separated([*summary.findings, *noticed]),
+        "findings": _join_with_commas([*summary.findings, *noticed]),
         "dismissed": "",
     }
 
 
-def _comma_separated(items: Sequence[str]) -> str:
+def _join_with_commas(items: Sequence[str]) -> str:
     return f",{','.join(dict.fromkeys(items))}," if items else ""

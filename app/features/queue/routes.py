@@ -27,7 +27,7 @@ from app.features.groups.solution_schemas import (
 from app.features.groups.submit import find_view
 from app.features.groups.suggested_edits import MarkingInfluence, measure_marking_influences
 from app.features.groups.suggestions import Suggestion, find_suggestions
-from app.features.people.visibility_queries import is_blind
+from app.features.people.visibility_queries import has_hidden_groups
 from app.features.queue.fields import FIELDS, ORDERS, FieldKind
 from app.features.queue.service import GroupRow as QueueRow
 from app.features.queue.service import Neighbours as QueueNeighbours
@@ -45,7 +45,7 @@ from app.features.queue.statistics import (
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, DatasetPath, Id, QueryText
 from app.http.documents import Document, ListDocument
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
@@ -305,7 +305,7 @@ class StatisticsHistogram(Document, shows=Measure):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_measure(cls, value: Any) -> Any:
+    def _merge_measure_fields(cls, value: Any) -> Any:
         return (
             {**vars(value), **vars(value.measure)} if isinstance(value, MeasureHistogram) else value
         )
@@ -383,7 +383,7 @@ class SuggestionDocument(Document):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_point(cls, value: Any) -> Any:
+    def _add_point_to_edit(cls, value: Any) -> Any:
         if isinstance(value, Suggestion):
             return {**vars(value), "edit": {**vars(value.fix), "point": value.point}}
         return value
@@ -411,7 +411,7 @@ class Influences(ListDocument[InfluenceDocument]):
 
 
 @query_fields_router.get("/query-fields", operation_id="listQueryFields", responses=responses())
-@may(Action.READ, where=Where.SOMEWHERE)
+@may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_query_fields() -> QueryFieldList:
     """Every field of a query with its operators, unit and values, and every order."""
@@ -433,7 +433,7 @@ def get_statistics(
     Of groups that are hidden from whoever asks nothing is counted. Every bar carries the query that opens the queue with the groups that it counts.
     """
     found = dataset_id(services.store, dataset)
-    if query.strip() or is_blind(found):
+    if query.strip() or has_hidden_groups(found):
         return read_statistics(services.store, found, query)
     return services.statistics.statistics(found)
 
@@ -455,7 +455,7 @@ def get_timeline(
 @paged()
 def get_suggestions(group: Id, store: AppStore) -> Suggestions:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
-    state = submit.load_solved(store, group)
+    state = submit.load_solved_group(store, group)
     if state.solution is None:
         return Suggestions(items=[])
     found = find_suggestions(state.group, state.policy, state.solution)
@@ -471,7 +471,7 @@ def get_suggestions(group: Id, store: AppStore) -> Suggestions:
 def get_influence(view: Id, store: AppStore) -> Influences:
     """What the camera of a view would be without each of its markings; saves nothing."""
     found = find_view(store, view)
-    state = submit.load(store, found.group_id)
+    state = submit.load_group_state(store, found.group_id)
     seen = next(item for item in state.group.views if state.view_ids[item.key] == view)
     items = measure_marking_influences(seen.station, state.group.pitch, state.policy.calibration)
     return Influences(items=items)

@@ -18,7 +18,7 @@ from app.features.agreement.queries import read_group_states
 from app.features.comments.queries import count_open_threads
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
-from app.features.queue.queries import Key, Listing, find_place, read_rows
+from app.features.queue.queries import GroupListing, Key, find_group_position, read_rows
 from app.features.queue.query import NUMBERS, Query, parse_query
 from app.geometry.arrays import FloatArray, IntArray
 from app.json_text import MAX_ID, json_text
@@ -26,7 +26,7 @@ from app.json_text import MAX_ID, json_text
 
 def encode_cursor(query: Query, keys: Sequence[Key]) -> str:
     """The cursor that continues after the row with these keys."""
-    text = json_text([_cursor_name(query), *keys], ascii_=True, compact=True)
+    text = json_text([_make_query_fingerprint(query), *keys], ascii_=True, compact=True)
     return base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
 
 
@@ -41,7 +41,7 @@ def decode_cursor(query: Query, cursor: str) -> list[Key]:
             "the cursor is invalid; request the first page without a cursor", pointer="/cursor"
         ) from error
     sound = all(map(_is_key, values))
-    if name != _cursor_name(query) or len(values) != len(query.order.keys) or not sound:
+    if name != _make_query_fingerprint(query) or len(values) != len(query.order.keys) or not sound:
         raise InputError(
             "this cursor belongs to another query; request the first page without a cursor",
             pointer="/cursor",
@@ -49,7 +49,7 @@ def decode_cursor(query: Query, cursor: str) -> list[Key]:
     return list(values)
 
 
-def _cursor_name(query: Query) -> str:
+def _make_query_fingerprint(query: Query) -> str:
     """What tells a query from others: its order, and a digest of its conditions."""
     order = query.sort + ("-desc" if query.descending else "")
     if query.batch is not None:
@@ -195,7 +195,7 @@ def list_groups(
     order = parsed.order
     keys = None if cursor is None else decode_cursor(parsed, cursor)
     with store.read() as session:
-        listing = Listing(session, dataset_id, parsed.conditions)
+        listing = GroupListing(session, dataset_id, parsed.conditions)
         total = listing.count()
         if start is not None:
             rows = read_rows(session, listing.ids_from(order, start, limit, total), order)
@@ -210,12 +210,12 @@ def list_groups(
     following = encode_cursor(parsed, order.keys_of(rows[-1])) if more else None
     found = [
         replace(
-            _group_row(row, comments),
+            _build_group_row(row, comments),
             submissions=annotations.get(row.group_id, 0),
             annotations=states.get(row.group_id),
         )
         if annotations
-        else _group_row(row, comments)
+        else _build_group_row(row, comments)
         for row in rows
     ]
     return Page(found, following, total)
@@ -231,7 +231,7 @@ def list_ids(
     """
     parsed = parse_query(query)
     with store.read() as session:
-        listing = Listing(session, dataset_id, parsed.conditions)
+        listing = GroupListing(session, dataset_id, parsed.conditions)
         total = listing.count()
         ids = listing.ids_from(parsed.order, start, limit, total)
     return MatchingGroups(tuple(ids), total)
@@ -248,11 +248,11 @@ def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
     parsed = parse_query(query)
     order = parsed.order
     with store.read() as session:
-        place = find_place(session, group_id, order)
+        place = find_group_position(session, group_id, order)
         if place is None:
             raise NotFoundError.group(group_id)
         dataset_id, keys = place
-        listing = Listing(session, dataset_id, parsed.conditions)
+        listing = GroupListing(session, dataset_id, parsed.conditions)
         index, total = listing.place(order, keys, group_id)
         before, after = listing.ids_around(order, keys, _NEIGHBOURS, total)
     return Neighbours(index, total, tuple(before), tuple(after))
@@ -265,17 +265,17 @@ _STORED = [
 ]
 
 
-def _group_row(row: Any, comments: Mapping[int, int]) -> GroupRow:
+def _build_group_row(row: Any, comments: Mapping[int, int]) -> GroupRow:
     return GroupRow(
         id=row.group_id,
-        findings=_split_kinds(row.findings),
-        dismissed=_split_kinds(row.dismissed),
+        findings=_split_comma_list(row.findings),
+        dismissed=_split_comma_list(row.dismissed),
         comments=comments.get(row.group_id, 0),
         **{name: getattr(row, name) for name in _STORED},
     )
 
 
-def _split_kinds(text: str) -> tuple[str, ...]:
+def _split_comma_list(text: str) -> tuple[str, ...]:
     """A list between commas."""
     return tuple(text.strip(",").split(",")) if text else ()
 
@@ -387,7 +387,7 @@ def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
     conditions = parse_query(query).conditions
     # One pass for all of it: seven statements over ten thousand groups take seven times as long.
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns(columns)
+        rows = GroupListing(session, dataset_id, conditions).columns(columns)
     status, solved, stale, *numbers = (
         zip(*rows, strict=True) if rows else ((),) * (3 + len(COLUMNS))
     )

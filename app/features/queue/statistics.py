@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from app.db.store import Store
-from app.features.people.visibility_queries import is_blind as is_blind
-from app.features.queue.queries import Listing, compare_condition
+from app.features.people.visibility_queries import has_hidden_groups as has_hidden_groups
+from app.features.queue.queries import GroupListing, compare_condition
 from app.features.queue.query import NUMBERS, parse_query
 from app.features.queue.service import ERROR_PERCENT, SIGMA_M, find_bin_indices, make_even_bins
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -176,7 +176,7 @@ def read_statistics(store: Store, dataset_id: int, query: str = "") -> Statistic
     """
     conditions = parse_query(query).conditions
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns(COLUMNS)
+        rows = GroupListing(session, dataset_id, conditions).columns(COLUMNS)
     return make_statistics(count_rows(rows))
 
 
@@ -195,10 +195,10 @@ def count_rows(rows: Sequence[Any]) -> StatisticsColumns:
         match=np.array([of_match[name] for name in match], np.int32),
         passes=np.array([bool(value) for value in passes], bool),
         accepted=np.array([state == "accepted" for state in status], bool),
-        cell=_pitch_cells(x, y),
+        cell=_find_pitch_cells(x, y),
         bins=np.array(
             [
-                _bin_values(measure, column)
+                _find_value_bins(measure, column)
                 for measure, column in zip(MEASURES, values, strict=True)
             ],
             np.int8,
@@ -234,14 +234,14 @@ def make_bin_query(measure: Measure, place: int) -> str:
     return " ".join(parts)
 
 
-def _bin_values(measure: Measure, values: FloatArray) -> IntArray:
+def _find_value_bins(measure: Measure, values: FloatArray) -> IntArray:
     place = find_bin_indices(
         measure.edges, values, open_low=measure.open_low, open_high=measure.open_high
     )
     return np.where(np.isnan(values), UNKNOWN, np.where(place < 0, NOWHERE, place))
 
 
-def _pitch_cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
+def _find_pitch_cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     column, row = (
         find_bin_indices(edges, values, open_low=False, open_high=False)
         for edges, values in ((X_EDGES, x), (Y_EDGES, y))
@@ -261,14 +261,14 @@ def _make_histogram(
     counts = np.bincount(code, minlength=len(found.splits) * width).reshape(-1, width)
     series = tuple(
         MeasureSeries(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
-        for split, row in sorted(zip(found.splits, counts, strict=True), key=_pair_name)
+        for split, row in sorted(zip(found.splits, counts, strict=True), key=_get_pair_name)
         if row.any()
     )
     queries = tuple(make_bin_query(measure, number) for number in range(bins))
     return MeasureHistogram(measure, queries, series)
 
 
-def _pair_name(pair: tuple[str, Any]) -> str:
+def _get_pair_name(pair: tuple[str, Any]) -> str:
     return pair[0]
 
 
@@ -350,19 +350,19 @@ def read_timeline(
     if match is not None:
         conditions.append(compare_condition("match", "=", match))
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns(_SOURCES, by_number=True)
+        rows = GroupListing(session, dataset_id, conditions).columns(_SOURCES, by_number=True)
     timeline = Timeline()
     for name, value in _COLUMNS.items():
         getattr(timeline, name).extend(map(value, rows))
     return timeline
 
 
-def _frame_number(row: Any) -> int | None:
+def _parse_row_frame_number(row: Any) -> int | None:
     key = row.key
     return int(key) if key.isascii() and key.isdigit() and len(key) <= _FRAME_DIGITS else None
 
 
-def _ball_point(row: Any) -> tuple[float, float, float] | None:
+def _get_row_ball_point(row: Any) -> tuple[float, float, float] | None:
     place = (row.x_m, row.y_m, row.height_m)
     return None if None in place else (row.x_m, row.y_m, -row.height_m)
 
@@ -374,12 +374,12 @@ _SOURCES = (
 _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "id": lambda row: row.group_id,
     "number": lambda row: row.number,
-    "frame": _frame_number,
+    "frame": _parse_row_frame_number,
     "error_px": lambda row: row.error_px,
     "passes": lambda row: row.passes,
     "gate": lambda row: row.gate,
     "status": lambda row: row.status,
     "stale": lambda row: row.stale,
     "sigma_m": lambda row: row.sigma_m,
-    "point": _ball_point,
+    "point": _get_row_ball_point,
 }

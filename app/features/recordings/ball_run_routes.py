@@ -15,16 +15,16 @@ from app.features.recordings.ball_run_schemas import (
 )
 from app.features.recordings.ball_runs import (
     StoredRun,
-    add_run,
-    change_run,
-    get_run,
-    list_runs,
-    mend_run,
-    remove_run,
+    add_ball_run,
+    change_ball_run,
+    extend_ball_run,
+    get_ball_run,
+    list_ball_runs,
+    remove_ball_run,
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
-from app.http.documents import document, make_empty_response, respond_with
+from app.http.documents import make_document_response, make_empty_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -41,12 +41,12 @@ LOCATION = {"Location": {"description": "Its address.", "schema": {"type": "stri
 RunId = Annotated[int, Path(ge=1, le=MAX_ID, description="Id of the ball run.")]
 
 
-def _tagged(found: StoredRun, status: int = 200, **headers: str) -> Response:
-    return document(BallRunFrames.of(found), status, {"ETag": found.etag, **headers})
+def _make_run_response(found: StoredRun, status: int = 200, **headers: str) -> Response:
+    return make_document_response(BallRunFrames.of(found), status, {"ETag": found.etag, **headers})
 
 
-def _made(found: StoredRun) -> Response:
-    return _tagged(
+def _make_created_response(found: StoredRun) -> Response:
+    return _make_run_response(
         found, 201, Location=f"/api/v1/recordings/{found.recording}/ball-runs/{found.id}"
     )
 
@@ -57,8 +57,8 @@ def _made(found: StoredRun) -> Response:
 def get_runs(recording: Id, services: AppServices) -> BallRunList:
     """The balls that were followed in a recording."""
     # Asked first: what is over by then is in the list.
-    following = services.balls.frames_at_work(recording)
-    items = [BallRunDocument.of(one) for one in list_runs(services.store, recording)]
+    following = services.balls.list_frames_being_followed(recording)
+    items = [BallRunDocument.of(one) for one in list_ball_runs(services.store, recording)]
     return BallRunList(items=items, following=following)
 
 
@@ -74,7 +74,7 @@ def get_runs(recording: Id, services: AppServices) -> BallRunList:
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
-@respond_with(_made)
+@respond_with(_make_created_response)
 def add_one(
     recording: Id, wanted: BallClickRequest, services: AppServices, actor: Actor
 ) -> StoredRun:
@@ -84,7 +84,7 @@ def add_one(
     any. Nothing becomes an annotation before a person accepts it.
     """
     click = wanted.value()
-    return add_run(services.store, services.balls, recording, click, actor=actor)
+    return add_ball_run(services.store, services.balls, recording, click, actor=actor)
 
 
 @router.get(
@@ -96,7 +96,7 @@ def add_one(
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
     """One ball run, with its frames."""
-    return _tagged(get_run(store, recording, run))
+    return _make_run_response(get_ball_run(store, recording, run))
 
 
 @router.post(
@@ -107,7 +107,7 @@ def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
-@respond_with(_tagged)
+@respond_with(_make_run_response)
 def mend_one(
     recording: Id,
     run: RunId,
@@ -118,8 +118,10 @@ def mend_one(
 ) -> StoredRun:
     """Say where the ball is in one more frame, and follow it from there, up to where both agree."""
     store, click = services.store, wanted.value()
-    with add_current_state_to_conflicts(lambda: BallRunFrames.of(get_run(store, recording, run))):
-        return mend_run(store, services.balls, recording, run, click, if_match, actor=actor)
+    with add_current_state_to_conflicts(
+        lambda: BallRunFrames.of(get_ball_run(store, recording, run))
+    ):
+        return extend_ball_run(store, services.balls, recording, run, click, if_match, actor=actor)
 
 
 @router.patch(
@@ -129,7 +131,7 @@ def mend_one(
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@respond_with(_tagged)
+@respond_with(_make_run_response)
 def change_one(
     recording: Id,
     run: RunId,
@@ -144,8 +146,10 @@ def change_one(
     that somebody else said stays. Taken back, exactly those balls go.
     """
     store = services.store
-    with add_current_state_to_conflicts(lambda: BallRunFrames.of(get_run(store, recording, run))):
-        return change_run(
+    with add_current_state_to_conflicts(
+        lambda: BallRunFrames.of(get_ball_run(store, recording, run))
+    ):
+        return change_ball_run(
             store, recording, run, wanted.value(), if_match, actor=actor, paint=services.paint
         )
 
@@ -161,4 +165,4 @@ def change_one(
 @respond_with(make_empty_response)
 def delete_one(recording: Id, run: RunId, store: AppStore, actor: Actor) -> None:
     """Delete a ball run; balls that views have from it stay."""
-    remove_run(store, recording, run, actor=actor)
+    remove_ball_run(store, recording, run, actor=actor)

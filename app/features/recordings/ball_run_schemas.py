@@ -85,7 +85,7 @@ class BallRunDocument(Document):
     @staticmethod
     def of(found: StoredRun) -> BallRunDocument:
         """The document of a run."""
-        return BallRunDocument(**_head(found))
+        return BallRunDocument(**_build_run_summary(found))
 
 
 class BallRunFrames(BallRunDocument):
@@ -110,7 +110,7 @@ class BallRunFrames(BallRunDocument):
             for name in ("x", "y", "diameter", "sigma_px", "confidence")
         }
         return BallRunFrames(
-            **_head(found),
+            **_build_run_summary(found),
             **columns,
             frame=[ball.frame for ball in balls],
             state="".join(ball.state[0].upper() for ball in balls),
@@ -125,7 +125,7 @@ class BallRunList(ListDocument[BallRunDocument]):
     )
 
 
-def _head(found: StoredRun) -> dict[str, object]:
+def _build_run_summary(found: StoredRun) -> dict[str, object]:
     run = found.run
     return {
         "id": found.id,

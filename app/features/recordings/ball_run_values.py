@@ -13,7 +13,7 @@ from app.db.json_columns import (
     parse_json_column,
     report_damaged_values,
 )
-from app.soccer.codec import digest
+from app.soccer.codec import digest_json
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
 _COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}
@@ -60,7 +60,7 @@ class StoredRun:
         }
 
 
-def run_of_row(row: Any, sha256: str | None) -> StoredRun:
+def build_run_from_row(row: Any, sha256: str | None) -> StoredRun:
     """The run of a row.
 
     Args:
@@ -78,11 +78,11 @@ def run_of_row(row: Any, sha256: str | None) -> StoredRun:
         groups=parse_json_column(row.groups),
         actor=row.actor,
         created=row.created,
-        etag=f'"{digest([row.id, row.revision, row.created])[:16]}"',
+        etag=f'"{digest_json([row.id, row.revision, row.created])[:16]}"',
     )
 
 
-def run_columns(run: BallRun) -> dict[str, Any]:
+def run_to_columns(run: BallRun) -> dict[str, Any]:
     """The columns of the table that hold a run."""
     return {"first": run.first, "last": run.last, "body": compress_json(run_to_json(run))}
 

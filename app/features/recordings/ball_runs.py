@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -16,19 +16,19 @@ from app.features.groups.bulk_edits import ViewEdits, edit_views
 from app.features.groups.edit import Edit, SetBalls
 from app.features.groups.queries import read_groups
 from app.features.groups.state import read_etags, require_etag
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.recordings.ball_run_values import StoredRun as StoredRun
-from app.features.recordings.ball_run_values import run_columns, run_of_row
-from app.features.recordings.follow import EACH_WAY, BallFollower, follow_hints
+from app.features.recordings.ball_run_values import build_run_from_row, run_to_columns
+from app.features.recordings.follow import EACH_WAY, BallFollower, collect_follow_hints
 from app.features.recordings.queries import (
-    delete_run,
-    find_run,
-    insert_run,
-    list_run_rows,
-    update_run,
-    views_of_video,
+    delete_ball_run,
+    find_ball_run,
+    insert_ball_run,
+    list_ball_run_rows,
+    list_views_of_video,
+    update_ball_run,
 )
-from app.features.recordings.service import Recording, get_recording, need_recording
+from app.features.recordings.service import Recording, get_recording, require_recording
 from app.features.recordings.shots import get_shots
 from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
@@ -51,35 +51,37 @@ class RunChange:
     confirmed: tuple[int, ...] | None = None
 
 
-def list_runs(store: Store, recording_id: int) -> list[StoredRun]:
+def list_ball_runs(store: Store, recording_id: int) -> list[StoredRun]:
     """The runs of a recording, by their first frames.
 
     Raises:
         NotFoundError: There is no such recording.
     """
     with store.read() as session:
-        sha256 = need_recording(session, recording_id).sha256
-        return [run_of_row(row, sha256) for row in list_run_rows(session, recording_id)]
+        sha256 = require_recording(session, recording_id).sha256
+        return [
+            build_run_from_row(row, sha256) for row in list_ball_run_rows(session, recording_id)
+        ]
 
 
-def get_run(store: Store, recording_id: int, run_id: int) -> StoredRun:
+def get_ball_run(store: Store, recording_id: int, run_id: int) -> StoredRun:
     """A run of a recording.
 
     Raises:
         NotFoundError: The recording has no such run.
     """
     with store.read() as session:
-        return _need(session, recording_id, run_id)
+        return _require_ball_run(session, recording_id, run_id)
 
 
-def _need(session: Session, recording_id: int, run_id: int) -> StoredRun:
-    row = find_run(session, run_id)
+def _require_ball_run(session: Session, recording_id: int, run_id: int) -> StoredRun:
+    row = find_ball_run(session, run_id)
     if row is None or row.recording_id != recording_id:
         raise NotFoundError(f"recording {recording_id} has no ball run {run_id}")
-    return run_of_row(row, need_recording(session, recording_id).sha256)
+    return build_run_from_row(row, require_recording(session, recording_id).sha256)
 
 
-def add_run(
+def add_ball_run(
     store: Store, follower: BallFollower, recording_id: int, click: BallClick, *, actor: str
 ) -> StoredRun:
     """Follow a ball from a click, and keep what came of it.
@@ -95,29 +97,29 @@ def add_run(
         ConflictError: The recording cannot be read.
         InputError: The frame is outside of the recording, or nothing near the click looks like a ball.
     """
-    with follower.at_work(recording_id, click.frame):
-        recording, run = _followed(store, follower, recording_id, click)
-        return _insert(store, recording, run, actor)
+    with follower.mark_frame_being_followed(recording_id, click.frame):
+        recording, run = _follow_click(store, follower, recording_id, click)
+        return _save_new_run(store, recording, run, actor)
 
 
-def _insert(store: Store, recording: Recording, run: BallRun, actor: str) -> StoredRun:
+def _save_new_run(store: Store, recording: Recording, run: BallRun, actor: str) -> StoredRun:
     """Keep a new run."""
     with store.write() as session:
-        number = insert_run(
+        number = insert_ball_run(
             session,
             actor,
             dataset_id=recording.dataset_id,
             recording_id=recording.id,
             sha256=recording.sha256,
-            **run_columns(run),
+            **run_to_columns(run),
         )
-        found = _need(session, recording.id, number)
-        _note(session, actor, "ball followed", found)
+        found = _require_ball_run(session, recording.id, number)
+        _log_run_event(session, actor, "ball followed", found)
         session.respond(found)
     return found
 
 
-def mend_run(
+def extend_ball_run(
     store: Store,
     follower: BallFollower,
     recording_id: int,
@@ -130,31 +132,33 @@ def mend_run(
     """Say where the ball is in one more frame of a run, and follow it from there, too.
 
     Raises:
-        ConflictError, InputError: As ``add_run``; or the run is accepted.
+        ConflictError, InputError: As ``add_ball_run``; or the run is accepted.
         StaleRevisionError: Somebody changed it meanwhile.
     """
-    before = get_run(store, recording_id, run_id)
+    before = get_ball_run(store, recording_id, run_id)
     _require_open(before, if_match)
-    with follower.at_work(recording_id, click.frame):
-        _, new = _followed(store, follower, recording_id, click, before.run)
-        return _mend(store, before, new, if_match, actor)
+    with follower.mark_frame_being_followed(recording_id, click.frame):
+        _, new = _follow_click(store, follower, recording_id, click, before.run)
+        return _save_extended_run(store, before, new, if_match, actor)
 
 
-def _mend(store: Store, before: StoredRun, new: BallRun, if_match: str, actor: str) -> StoredRun:
+def _save_extended_run(
+    store: Store, before: StoredRun, new: BallRun, if_match: str, actor: str
+) -> StoredRun:
     """Keep a run with what one more click was followed to."""
     recording_id, run_id = before.recording, before.id
     with store.write() as session:
-        before = _need(session, recording_id, run_id)
+        before = _require_ball_run(session, recording_id, run_id)
         _require_open(before, if_match)
-        run = before.run.mended(new)
+        run = before.run.merge_run(new)
         kept = [frame for frame in before.confirmed if frame in {ball.frame for ball in run.balls}]
-        values = {**run_columns(run), "confirmed": canonical_json_text(kept)}
-        found = _change(session, before, actor, "ball followed anew", **values)
+        values = {**run_to_columns(run), "confirmed": canonical_json_text(kept)}
+        found = _save_run_change(session, before, actor, "ball followed anew", **values)
         session.respond(found)
     return found
 
 
-def change_run(
+def change_ball_run(
     store: Store,
     recording_id: int,
     run_id: int,
@@ -162,7 +166,7 @@ def change_run(
     if_match: str,
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
 ) -> StoredRun:
     """Confirm uncertain frames of a run, accept it, or take that back.
 
@@ -177,15 +181,15 @@ def change_run(
     """
     if change.accepted is None and change.confirmed is None:
         raise InputError("this request changes nothing", hint="Send accepted or confirmed.")
-    before = get_run(store, recording_id, run_id)
+    before = get_ball_run(store, recording_id, run_id)
     require_etag(before.etag, if_match, "this ball run")
     if change.confirmed is not None:
         _require_open(before, if_match)
-        with store.write() as session, without_response():
-            before = _need(session, recording_id, run_id)
+        with store.write() as session, without_pending_response():
+            before = _require_ball_run(session, recording_id, run_id)
             _require_open(before, if_match)
-            text = canonical_json_text(_checked(before, change.confirmed))
-            before = _change(session, before, actor, "ball confirmed", confirmed=text)
+            text = canonical_json_text(_validate_uncertain_frames(before, change.confirmed))
+            before = _save_run_change(session, before, actor, "ball confirmed", confirmed=text)
     groups: Mapping[str, int] = {}
     if change.accepted is not None:
         if change.accepted and before.stale:
@@ -193,34 +197,34 @@ def change_run(
                 "the video file has changed since the ball was followed",
                 hint="Follow the ball again.",
             )
-        with without_response():
-            groups = _place(store, before, change.accepted, actor, paint)
+        with without_pending_response():
+            groups = _apply_run_to_views(store, before, change.accepted, actor, paint)
     with store.write() as session:
-        present = _need(session, recording_id, run_id)
+        present = _require_ball_run(session, recording_id, run_id)
         require_etag(present.etag, before.etag, "this ball run")
         if change.accepted is not None:
             by = actor if change.accepted else None
             did = "ball run accepted" if change.accepted else "ball run taken back"
             values = {"accepted_by": by, "groups": canonical_json_text(groups)}
-            present = _change(session, present, actor, did, **values)
+            present = _save_run_change(session, present, actor, did, **values)
         session.respond(present)
     return present
 
 
-def remove_run(store: Store, recording_id: int, run_id: int, *, actor: str) -> None:
+def remove_ball_run(store: Store, recording_id: int, run_id: int, *, actor: str) -> None:
     """Delete a run; balls that groups have from it stay.
 
     Raises:
         NotFoundError: The recording has no such run.
     """
     with store.write() as session:
-        found = _need(session, recording_id, run_id)
-        delete_run(session, run_id)
-        _note(session, actor, "ball run removed", found)
+        found = _require_ball_run(session, recording_id, run_id)
+        delete_ball_run(session, run_id)
+        _log_run_event(session, actor, "ball run removed", found)
         session.respond(None)
 
 
-def _followed(
+def _follow_click(
     store: Store,
     follower: BallFollower,
     recording_id: int,
@@ -240,9 +244,9 @@ def _followed(
     inside = (one for one in shots.items if one.first <= click.frame <= one.last)
     shot = next(((one.first, one.last) for one in inside), (click.frame, click.frame))
     around = range(max(shot[0], click.frame - EACH_WAY), min(shot[1], click.frame + EACH_WAY) + 1)
-    hints = follow_hints(store, recording, around)
+    hints = collect_follow_hints(store, recording, around)
     if mended is not None:
-        hints = replace(hints, seen=mended.surest(), clicks=mended.clicks)
+        hints = replace(hints, seen=mended.find_most_certain_click(), clicks=mended.clicks)
     run = follower.follow(recording, click, shot, hints)
     if run is None:
         raise InputError(
@@ -252,14 +256,14 @@ def _followed(
     return recording, run
 
 
-def _place(
-    store: Store, run: StoredRun, accepted: bool, actor: str, paint: PaintFollower | None
+def _apply_run_to_views(
+    store: Store, run: StoredRun, accepted: bool, actor: str, paint: PaintUpdater | None
 ) -> dict[str, int]:
     """Give the views of a run's frames its balls, or take those away that come from it."""
     recording = get_recording(store, run.recording)
     trusted, items, counts = run.trusted, list[ViewEdits](), {"placed": 0, "kept": 0}
     with store.read() as session:
-        shown = views_of_video(session, recording.dataset_id, str(recording.sha256))
+        shown = list_views_of_video(session, recording.dataset_id, str(recording.sha256))
         shown = [view for view in shown if view.number in trusted]
         ids = sorted({view.group for view in shown})
         for start in range(0, len(ids), _BATCH):
@@ -271,13 +275,13 @@ def _place(
                 balls = next(
                     one.balls for one in groups[view.group].group.views if one.key == view.key
                 )
-                mine = _annotation(run, trusted[view.number])
+                mine = _make_annotation(run, trusted[view.number])
                 if accepted and balls and balls != (mine,):
                     counts["kept"] += 1
                     continue
                 if not accepted and balls != (mine,):
                     continue
-                change = partial(_set_balls, balls=(mine,) if accepted else ())
+                change = partial(_make_set_balls_edit, balls=(mine,) if accepted else ())
                 number = groups[view.group].view_ids[view.key]
                 items.append(ViewEdits(number, None, etags[view.group], change))
     report = edit_views(store, recording.dataset_id, items, actor=actor, paint=paint)
@@ -286,11 +290,11 @@ def _place(
     return counts if accepted else {}
 
 
-def _set_balls(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:
+def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:
     return [SetBalls(view, balls)]
 
 
-def _annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
+def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
     half = ball.diameter / 2
     box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
     return BallAnnotation(box=box, predicted_by=run.name)
@@ -302,7 +306,7 @@ def _require_open(run: StoredRun, if_match: str) -> None:
         raise ConflictError("this ball run is accepted", hint="Undo the acceptance first.")
 
 
-def _checked(run: StoredRun, frames: Sequence[int]) -> list[int]:
+def _validate_uncertain_frames(run: StoredRun, frames: Sequence[int]) -> list[int]:
     uncertain = {ball.frame for ball in run.run.balls if ball.state == "uncertain"}
     for place, frame in enumerate(frames):
         if frame not in uncertain:
@@ -313,14 +317,16 @@ def _checked(run: StoredRun, frames: Sequence[int]) -> list[int]:
     return sorted(set(frames))
 
 
-def _change(session: Session, run: StoredRun, actor: str, did: str, **values: Any) -> StoredRun:
-    row = find_run(session, run.id)
+def _save_run_change(
+    session: Session, run: StoredRun, actor: str, did: str, **values: Any
+) -> StoredRun:
+    row = find_ball_run(session, run.id)
     assert row is not None
-    update_run(session, run.id, revision=row.revision + 1, **values)
-    _note(session, actor, did, run)
-    return _need(session, run.recording, run.id)
+    update_ball_run(session, run.id, revision=row.revision + 1, **values)
+    _log_run_event(session, actor, did, run)
+    return _require_ball_run(session, run.recording, run.id)
 
 
-def _note(session: Session, actor: str, did: str, run: StoredRun) -> None:
+def _log_run_event(session: Session, actor: str, did: str, run: StoredRun) -> None:
     what = {"recording": run.recording, "run": run.id, "first": run.run.first, "last": run.run.last}
     add_audit_event(session, actor, did, run.dataset_id, **what)

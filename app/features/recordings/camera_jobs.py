@@ -10,19 +10,19 @@ from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.camera_tracking import (
-    require_stretch,
-    require_turnable,
-    track_now,
-    turn_cameras,
+    require_cameras_turnable,
+    require_trackable_stretch,
+    rotate_cameras_half_turn,
+    track_stretch_in_worker,
 )
 from app.features.recordings.service import get_recording
-from app.features.solve.jobs import request_solve
+from app.features.solve.jobs import request_solve_job
 from app.wording import plural
 
 KIND = "track"
 
 
-def request_cameras(
+def request_camera_tracking(
     jobs: Jobs, store: Store, recording_id: int, first: int, last: int, *, actor: str
 ) -> Job:
     """Track a stretch of a recording, soon.
@@ -38,18 +38,18 @@ def request_cameras(
         NotFoundError, ConflictError, InputError: As ``camera_tracking.require_stretch``.
     """
     recording = get_recording(store, recording_id)
-    require_stretch(recording, first, last)
+    require_trackable_stretch(recording, first, last)
     return jobs.submit(
         KIND,
         f"Track the camera of frames {first} to {last} of {recording.name}",
-        partial(cameras_work, jobs, store),
+        partial(run_camera_job, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,
         request={"recording": recording_id, "first": first, "last": last},
     )
 
 
-def request_turn(
+def request_camera_half_turn(
     jobs: Jobs, store: Store, recording_id: int, frame: int, turned: bool, *, actor: str
 ) -> Job:
     """Turn the cameras of a stretch by half a turn of the pitch, or back, soon.
@@ -63,14 +63,14 @@ def request_turn(
         actor: Who wants it.
 
     Raises:
-        NotFoundError, ConflictError: As ``camera_tracking.require_turnable``.
+        NotFoundError, ConflictError: As ``camera_tracking.require_cameras_turnable``.
     """
     recording = get_recording(store, recording_id)
-    found = require_turnable(store, recording_id, frame, turned)
+    found = require_cameras_turnable(store, recording_id, frame, turned)
     return jobs.submit(
         KIND,
         f"Turn the camera of frames {found.first} to {found.last} of {recording.name} to the other side",
-        partial(cameras_work, jobs, store),
+        partial(run_camera_job, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,
         request={
@@ -82,24 +82,32 @@ def request_turn(
     )
 
 
-def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
+def run_camera_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     """The work itself; its result counts outcomes."""
     asked, actor = progress.job.request, progress.job.actor
     recording = get_recording(store, asked["recording"])
     first, last = asked["first"], asked["last"]
 
-    def step(done: int, total: int | None = None, _: str = "") -> None:
+    def report_step(done: int, total: int | None = None, _: str = "") -> None:
         rest = "; what was lost is followed backwards" if done == total else ""
         progress(done, total, f"{plural(done, 'frame')} of {recording.name} followed{rest}.")
 
     with leave_work_to_next_server(progress):
         if "turned" in asked:
-            found, given = turn_cameras(store, recording.id, first, asked["turned"], actor=actor)
-        else:
-            found, given = track_now(
-                store, recording.id, first, last, actor=actor, progress=step, stop=progress.check
+            found, given = rotate_cameras_half_turn(
+                store, recording.id, first, asked["turned"], actor=actor
             )
-    solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id if given else None
+        else:
+            found, given = track_stretch_in_worker(
+                store,
+                recording.id,
+                first,
+                last,
+                actor=actor,
+                progress=report_step,
+                stop=progress.check,
+            )
+    solve = request_solve_job(jobs, store, recording.dataset_id, actor=actor).id if given else None
     summary = found.summary
     counts = {name: getattr(summary, name) for name in ("frames", "tracked", "bridged", "lost")}
     return {
@@ -114,6 +122,6 @@ def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     }
 
 
-def resume_cameras(jobs: Jobs, store: Store) -> None:
+def resume_camera_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at begin again."""
-    jobs.register_resume(KIND, partial(cameras_work, jobs, store))
+    jobs.register_resume(KIND, partial(run_camera_job, jobs, store))

@@ -8,8 +8,8 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.errors import NotFoundError
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
-from app.features.recordings.camera_jobs import request_cameras, request_turn
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
+from app.features.recordings.camera_jobs import request_camera_half_turn, request_camera_tracking
 from app.features.recordings.camera_schemas import (
     CameraFormat,
     CamerasChange,
@@ -20,15 +20,15 @@ from app.features.recordings.camera_schemas import (
 )
 from app.features.recordings.cameras import (
     MEDIA_TYPES,
-    camera_output,
-    get_cameras,
-    list_cameras,
-    pitch_of,
+    export_shot_cameras,
+    get_pitch_of_recording,
+    get_shot_cameras,
+    list_shot_cameras,
     read_cameras,
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, is_not_modified
-from app.http.documents import document, respond_with
+from app.http.documents import make_document_response, respond_with
 from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
@@ -61,14 +61,14 @@ FILE: Responses = {
 @paged()
 def get_stretches(recording: Id, store: AppStore) -> CamerasList:
     """The stretches of a recording that have a camera for each frame, and what became of their frames."""
-    found = list_cameras(store, recording)
+    found = list_shot_cameras(store, recording)
     return CamerasList(items=[CamerasDocument.model_validate(one) for one in found])
 
 
 @router.post(
     "/{recording}/cameras",
     operation_id="trackCameras",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
@@ -80,7 +80,7 @@ def track_cameras(
     Lines that were drawn in groups of its frames are known. The cameras take the place of those that share a
     frame with them; groups of its frames get them as given, unless somebody has given or drawn another one.
     """
-    return request_cameras(
+    return request_camera_tracking(
         services.jobs, services.store, recording, wanted.first, wanted.last, actor=actor
     )
 
@@ -96,25 +96,25 @@ def get_stretch(
     recording: Id, frame: Frame, store: AppStore, request: Request, before: Before = False
 ) -> Response:
     """The camera of each frame of the stretch that has a frame."""
-    found = get_cameras(store, recording, frame)
+    found = get_shot_cameras(store, recording, frame)
     digest = found.digest_before if before else found.digest
     if digest is None:
         raise NotFoundError(
             "there are no earlier cameras of these frames: they were tracked only once"
         )
-    pitch = pitch_of(store, recording)
+    pitch = get_pitch_of_recording(store, recording)
     tag = f'"{digest}-{pitch.length:g}-{pitch.width:g}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     if is_not_modified(request, tag):
         return Response(status_code=304, headers=headers)
     frames = read_cameras(store.settings, digest)
-    return document(FrameCamerasDocument.of(frames, pitch), 200, headers)
+    return make_document_response(FrameCamerasDocument.of(frames, pitch), 200, headers)
 
 
 @router.patch(
     "/{recording}/cameras/{frame}",
     operation_id="turnCameras",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
@@ -126,7 +126,9 @@ def turn_stretch(
     Its paint is the same from the other side, so that a camera which stands opposite is tracked turned. Groups of its
     frames follow, unless somebody has given or drawn another camera. Lines that are drawn in a frame say which side it is.
     """
-    return request_turn(services.jobs, services.store, recording, frame, wanted.turned, actor=actor)
+    return request_camera_half_turn(
+        services.jobs, services.store, recording, frame, wanted.turned, actor=actor
+    )
 
 
 @router.get(
@@ -150,8 +152,8 @@ def get_file(
     `soccernet`: `camera_<frame>.json` each and `track.json`, zipped; `npz`: K, R, t and k, a row a frame from 0;
     `opentrackio`: a sample a frame, zipped.
     """
-    found = get_cameras(store, recording, frame)
-    name, content = camera_output(store, found, form)
+    found = get_shot_cameras(store, recording, frame)
+    name, content = export_shot_cameras(store, found, form)
     headers = {
         "Content-Disposition": make_content_disposition(name),
         "Cache-Control": "private, no-cache",

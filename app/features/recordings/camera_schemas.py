@@ -152,9 +152,11 @@ class FrameCamerasDocument(Document):
             **columns,
             keyframe=[frame.number for frame in frames if frame.is_keyframe],
             reason=[frame.reason for frame in frames],
-            camera=[_camera(frame) for frame in frames],
+            camera=[_camera_to_numbers(frame) for frame in frames],
             sigma=[
-                None if row["sigma"] is None else [_short(row["sigma"][name]) for name in _SIGMA]
+                None
+                if row["sigma"] is None
+                else [_round_to_three_digits(row["sigma"][name]) for name in _SIGMA]
                 for row in rows
             ],
         )
@@ -163,11 +165,11 @@ class FrameCamerasDocument(Document):
 _SIGMA = ("position", "pan", "tilt", "roll", "focal_px")
 
 
-def _short(value: float) -> float:
+def _round_to_three_digits(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def _camera(frame: FrameCamera) -> list[float] | None:
+def _camera_to_numbers(frame: FrameCamera) -> list[float] | None:
     """So many digits that no pixel moves by a hundredth."""
     camera = frame.camera
     if camera is None:

@@ -22,30 +22,30 @@ from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.cameras import (
     CameraSummary,
     ShotCameras,
-    camera_place,
-    cameras_at,
-    get_cameras,
-    give_cameras,
-    list_cameras,
+    assign_tracked_cameras,
+    cameras_file_path,
+    get_shot_cameras,
+    list_shot_cameras,
+    list_views_of_stretch,
     read_cameras,
-    views_of_stretch,
+    read_cameras_of_frames,
 )
-from app.features.recordings.index import in_worker, read_index
+from app.features.recordings.index import read_index, run_in_worker
 from app.features.recordings.queries import (
-    delete_overlapping,
-    digests_of,
+    delete_overlapping_cameras,
     insert_cameras,
+    list_camera_digests,
 )
-from app.features.recordings.service import Recording, get_recording, need_recording
-from app.json_text import canonical_json_text, digest_of
+from app.features.recordings.service import Recording, get_recording, require_recording
+from app.json_text import canonical_json_text, digest_content
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.tracking.camera_file import frames_to_bytes
+from app.tracking.camera_file import frame_cameras_to_bytes
 from app.tracking.clip import Clip
-from app.tracking.sides import stand_opposite, turned_frame
+from app.tracking.sides import are_on_opposite_side, turn_frame_camera
 from app.tracking.track import FrameCamera, track_clip
 from app.worker_process import WorkerLimits
 
@@ -56,7 +56,7 @@ MOST_FRAMES = 15_000
 
 
 @dataclass(frozen=True)
-class Tracked:
+class TrackedStretch:
     """What the process that tracks returns: a camera of each frame, and which lines were of no use.
 
     ``turned`` and ``pitch``: as of ``CameraSummary``.
@@ -68,7 +68,7 @@ class Tracked:
     pitch: dict[str, Any] | None = None
 
 
-def require_stretch(recording: Recording, first: int, last: int) -> None:
+def require_trackable_stretch(recording: Recording, first: int, last: int) -> None:
     """Require that a stretch can be tracked.
 
     Raises:
@@ -90,7 +90,7 @@ def require_stretch(recording: Recording, first: int, last: int) -> None:
         )
 
 
-def track_now(
+def track_stretch_in_worker(
     store: Store,
     recording_id: int,
     first: int,
@@ -119,43 +119,45 @@ def track_now(
 
     Raises:
         ConflictError: The recording cannot be read, or it became another one meanwhile.
-        InputError: As ``require_stretch``.
+        InputError: As ``require_trackable_stretch``.
     """
     recording = get_recording(store, recording_id)
-    require_stretch(recording, first, last)
+    require_trackable_stretch(recording, first, last)
     sha256 = recording.require_readable()
     policy = get_dataset_head(store, recording.dataset_id).policy.calibration
     lines: dict[int, Lines] = {}
     with store.read() as session:
-        drawn = views_of_stretch(session, recording, first, last, with_lines=True)
+        drawn = list_views_of_stretch(session, recording, first, last, with_lines=True)
         pitch = read_edited_pitches(session, recording.dataset_id, [recording.name])
     for number, stored, key in drawn:
         station = stored.stations[key].station
         if not (station.flipped or station.picture):
             lines.setdefault(number, station.lines)
     known = (store.settings, sha256, first, last, lines, pitch.get(recording.name), policy)
-    tracked: Tracked = in_worker(
+    tracked: TrackedStretch = run_in_worker(
         recording.path, track_stretch, *known, progress=progress, stop=stop, limits=LIMITS
     )
     if not set(lines) - set(tracked.unusable):
-        tracked = _on_its_side(store, recording, tracked)
+        tracked = _keep_turned_side(store, recording, tracked)
     return save_cameras(store, recording, (first, last), tracked, sorted(lines), actor)
 
 
-def _on_its_side(store: Store, recording: Recording, tracked: Tracked) -> Tracked:
+def _keep_turned_side(
+    store: Store, recording: Recording, tracked: TrackedStretch
+) -> TrackedStretch:
     """Cameras without lines on the side to which a person turned those before."""
     first, last = tracked.frames[0].number, tracked.frames[-1].number
-    overlapping = (one for one in list_cameras(store, recording.id) if one.first <= last)
+    overlapping = (one for one in list_shot_cameras(store, recording.id) if one.first <= last)
     if not any(one.summary.turned and first <= one.last for one in overlapping):
         return tracked
-    before = cameras_at(store, recording, range(first, last + 1))
-    if not stand_opposite(tracked.frames, before):
+    before = read_cameras_of_frames(store, recording, range(first, last + 1))
+    if not are_on_opposite_side(tracked.frames, before):
         return tracked
-    frames = [turned_frame(frame) for frame in tracked.frames]
-    return Tracked(frames, tracked.unusable, True, _turned_pitch(tracked.pitch))
+    frames = [turn_frame_camera(frame) for frame in tracked.frames]
+    return TrackedStretch(frames, tracked.unusable, True, _rotate_pitch_half_turn(tracked.pitch))
 
 
-def _turned_pitch(pitch: dict[str, Any] | None) -> dict[str, Any] | None:
+def _rotate_pitch_half_turn(pitch: dict[str, Any] | None) -> dict[str, Any] | None:
     """A pitch that is shown, after half a turn: its tripod stands opposite."""
     if pitch is None:
         return None
@@ -163,7 +165,7 @@ def _turned_pitch(pitch: dict[str, Any] | None) -> dict[str, Any] | None:
     return {**pitch, "tripod": [-x, -y, z]}
 
 
-def turn_cameras(
+def rotate_cameras_half_turn(
     store: Store, recording_id: int, frame: int, turned: bool, *, actor: str
 ) -> tuple[ShotCameras, int]:
     """Turn the cameras of a stretch by half a turn of the pitch against what the tracker gave, or back.
@@ -181,32 +183,36 @@ def turn_cameras(
         The cameras, and how many groups were given another one.
 
     Raises:
-        ConflictError: As ``require_turnable``, the cameras cannot be read, or somebody tracked the stretch meanwhile.
+        ConflictError: As ``require_cameras_turnable``, the cameras cannot be read, or somebody tracked the stretch meanwhile.
         NotFoundError: There are no cameras at that frame.
     """
-    found = require_turnable(store, recording_id, frame, turned)
+    found = require_cameras_turnable(store, recording_id, frame, turned)
     if found.summary.turned == turned:
         return found, 0
-    frames = [turned_frame(one) for one in read_cameras(store.settings, found.digest)]
+    frames = [turn_frame_camera(one) for one in read_cameras(store.settings, found.digest)]
     return save_cameras(
         store,
         get_recording(store, recording_id),
         (found.first, found.last),
-        Tracked(frames, found.summary.unusable, turned, _turned_pitch(found.summary.pitch)),
+        TrackedStretch(
+            frames, found.summary.unusable, turned, _rotate_pitch_half_turn(found.summary.pitch)
+        ),
         found.summary.annotated,
         actor,
         turned_from=found,
     )
 
 
-def require_turnable(store: Store, recording_id: int, frame: int, turned: bool) -> ShotCameras:
+def require_cameras_turnable(
+    store: Store, recording_id: int, frame: int, turned: bool
+) -> ShotCameras:
     """The cameras at a frame, which may be turned by half.
 
     Raises:
         ConflictError: They are of another video, or lines of a frame say which half of the pitch is left.
         NotFoundError: There are none.
     """
-    found = get_cameras(store, recording_id, frame)
+    found = get_shot_cameras(store, recording_id, frame)
     if found.stale:
         raise ConflictError(
             "the video file has changed since the shot was tracked", hint="Track the shot again."
@@ -231,34 +237,34 @@ def track_stretch(
     pitch: Pitch | None,
     policy: CalibrationPolicy,
     send: Callable[[tuple[int, int | None, str]], object],
-) -> Tracked:
+) -> TrackedStretch:
     """The work of the process: decode, calibrate and follow."""
     clip = Clip.open(path, read_index(settings, sha256), first, last)
 
-    def makes_camera(drawn: Lines) -> bool:
+    def can_calibrate_from_lines(drawn: Lines) -> bool:
         return calibrate(drawn, pitch or Pitch(), clip.size, CLICKED).camera is not None
 
-    def tell(done: int) -> None:
+    def report_frames_done(done: int) -> None:
         send((done, total, ""))
 
-    usable = {number: drawn for number, drawn in lines.items() if makes_camera(drawn)}
+    usable = {number: drawn for number, drawn in lines.items() if can_calibrate_from_lines(drawn)}
     total = last - first + 1
-    found = track_clip(clip, usable, pitch, policy, tell)
+    found = track_clip(clip, usable, pitch, policy, report_frames_done)
     unusable = tuple(sorted(set(lines) - set(usable)))
-    return Tracked(found.frames, unusable, pitch=pitch_to_row(found.shown, on_shown=False))
+    return TrackedStretch(found.frames, unusable, pitch=pitch_to_row(found.shown, on_shown=False))
 
 
 def save_cameras(
     store: Store,
     recording: Recording,
     stretch: tuple[int, int],
-    tracked: Tracked,
+    tracked: TrackedStretch,
     annotated: Sequence[int],
     actor: str,
     *,
     turned_from: ShotCameras | None = None,
 ) -> tuple[ShotCameras, int]:
-    """Keep what was found of a stretch (first and last frame): ``track_now`` without the tracking.
+    """Keep what was found of a stretch (first and last frame): ``track_stretch_in_worker`` without the tracking.
 
     ``turned_from`` are the cameras of which it was made by turning them.
 
@@ -266,26 +272,26 @@ def save_cameras(
         ConflictError: The video is another one by now, or so are the cameras that were turned.
     """
     first, last = stretch
-    made = _keep(store.settings, recording, tracked, annotated)
+    made = _write_cameras_file(store.settings, recording, tracked, annotated)
     rests = [
-        (rest, _keep(store.settings, recording, rest, one.summary.annotated))
-        for one in list_cameras(store, recording.id)
-        for rest in _outside(store.settings, one, first, last)
+        (rest, _write_cameras_file(store.settings, recording, rest, one.summary.annotated))
+        for one in list_shot_cameras(store, recording.id)
+        for rest in _split_cameras_outside_stretch(store.settings, one, first, last)
     ]
-    tracked_before = cameras_at(store, recording, range(first, last + 1))
+    tracked_before = read_cameras_of_frames(store, recording, range(first, last + 1))
     common = {
         "dataset_id": recording.dataset_id,
         "recording_id": recording.id,
         "sha256": recording.sha256,
     }
     with store.write() as session:
-        row = need_recording(session, recording.id)
+        row = require_recording(session, recording.id)
         if row.sha256 != recording.sha256:
             raise ConflictError(
                 f'the video file of "{recording.name}" was replaced while the shot was tracked',
                 hint="Track the shot again.",
             )
-        replaced = delete_overlapping(session, recording.id, first, last)
+        replaced = delete_overlapping_cameras(session, recording.id, first, last)
         if turned_from is not None and [old.digest for old in replaced] != [turned_from.digest]:
             raise ConflictError(
                 "the cameras of this shot were changed in the meantime",
@@ -307,8 +313,10 @@ def save_cameras(
                     insert_cameras(
                         session, **common, **values, revision=old.revision, actor=old.actor
                     )
-        views = views_of_stretch(session, recording, first, last)
-        changed = give_cameras(session, recording, tracked.frames, views, tracked_before, actor)
+        views = list_views_of_stretch(session, recording, first, last)
+        changed = assign_tracked_cameras(
+            session, recording, tracked.frames, views, tracked_before, actor
+        )
         add_audit_event(
             session,
             actor,
@@ -318,24 +326,24 @@ def save_cameras(
             name=recording.name,
             frames=f"{first} to {last}",
         )
-        used = digests_of(session)
+        used = list_camera_digests(session)
     for old in replaced:
         for name in {old.digest, old.before} - used - {None}:
             # What stays is reported by doctor.
             with suppress(OSError):
-                camera_place(store.settings, name).unlink(missing_ok=True)
-    return get_cameras(store, recording.id, first), changed
+                cameras_file_path(store.settings, name).unlink(missing_ok=True)
+    return get_shot_cameras(store, recording.id, first), changed
 
 
-def _keep(
-    settings: Settings, recording: Recording, tracked: Tracked, annotated: Sequence[int]
+def _write_cameras_file(
+    settings: Settings, recording: Recording, tracked: TrackedStretch, annotated: Sequence[int]
 ) -> dict[str, Any]:
     """Write the file of some cameras; returns what their row says of them."""
-    content = frames_to_bytes(tracked.frames)
-    digest = digest_of(content)
+    content = frame_cameras_to_bytes(tracked.frames)
+    digest = digest_content(content)
     try:
         settings.recordings.mkdir(mode=0o700, parents=True, exist_ok=True)
-        replace_file(camera_place(settings, digest), content)
+        replace_file(cameras_file_path(settings, digest), content)
     except OSError as error:
         raise StorageError(
             f"the cameras of {recording.name} cannot be stored ({error.strerror})",
@@ -343,7 +351,7 @@ def _keep(
         ) from error
     numbers = [frame.number for frame in tracked.frames]
     inside = tuple(number for number in annotated if numbers[0] <= number <= numbers[-1])
-    summary = _summary(tracked, inside)
+    summary = _summarize_cameras(tracked, inside)
     return {
         "first": numbers[0],
         "last": numbers[-1],
@@ -352,7 +360,9 @@ def _keep(
     }
 
 
-def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> list[Tracked]:
+def _split_cameras_outside_stretch(
+    settings: Settings, old: ShotCameras, first: int, last: int
+) -> list[TrackedStretch]:
     """The parts of cameras before and behind a stretch that overlaps them; those of another video, or
     that cannot be read, are none."""
     if old.last < first or last < old.first or old.stale:
@@ -366,7 +376,7 @@ def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> lis
         [frame for frame in frames if frame.number > last],
     )
     return [
-        Tracked(
+        TrackedStretch(
             part,
             tuple(one for one in old.summary.unusable if part[0].number <= one <= part[-1].number),
             old.summary.turned,
@@ -377,7 +387,7 @@ def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> lis
     ]
 
 
-def _summary(tracked: Tracked, annotated: Sequence[int]) -> CameraSummary:
+def _summarize_cameras(tracked: TrackedStretch, annotated: Sequence[int]) -> CameraSummary:
     counts = count_outcomes([{"outcome": frame.outcome} for frame in tracked.frames])
     measured = [frame for frame in tracked.frames if frame.error_px is not None]
     worst = max(measured, key=lambda frame: frame.error_px or 0.0, default=None)

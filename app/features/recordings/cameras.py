@@ -27,11 +27,11 @@ from app.features.imports.ingest import IngestReport
 from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.queries import (
     list_tracked_stretches,
-    views_of_video,
+    list_views_of_video,
 )
-from app.features.recordings.service import Recording, get_recording, need_recording
+from app.features.recordings.service import Recording, get_recording, require_recording
 from app.soccer.pitch import Pitch
-from app.tracking.camera_file import frames_from_bytes
+from app.tracking.camera_file import frame_cameras_from_bytes
 from app.tracking.track import FrameCamera
 
 
@@ -91,37 +91,39 @@ class ShotCameras:
     created: str
 
 
-def list_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
+def list_shot_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
     """The stretches of a recording that have cameras, in their order.
 
     Raises:
         NotFoundError: There is no such recording.
     """
     with store.read() as session:
-        recording = need_recording(session, recording_id)
+        recording = require_recording(session, recording_id)
         rows = list_tracked_stretches(session, recording_id)
         sha256 = recording.sha256
-        views = views_of_video(session, recording.dataset_id, sha256) if rows and sha256 else []
+        views = (
+            list_views_of_video(session, recording.dataset_id, sha256) if rows and sha256 else []
+        )
     drawn = sorted({view.number for view in views if view.has_lines})
-    return [_of_row(row, sha256, drawn) for row in rows]
+    return [_build_shot_cameras(row, sha256, drawn) for row in rows]
 
 
-def get_cameras(store: Store, recording_id: int, frame: int) -> ShotCameras:
+def get_shot_cameras(store: Store, recording_id: int, frame: int) -> ShotCameras:
     """The cameras of the stretch that has a frame.
 
     Raises:
         NotFoundError: There are none.
     """
-    for found in list_cameras(store, recording_id):
+    for found in list_shot_cameras(store, recording_id):
         if found.first <= frame <= found.last:
             return found
     raise NotFoundError(f"recording {recording_id} has no cameras at frame {frame}")
 
 
-def pitch_of(store: Store, recording_id: int) -> Pitch:
+def get_pitch_of_recording(store: Store, recording_id: int) -> Pitch:
     """The pitch of the match that a recording is of: as a person gave it, or as the Laws plan it."""
     with store.read() as session:
-        row = need_recording(session, recording_id)
+        row = require_recording(session, recording_id)
         return read_edited_pitches(session, row.dataset_id, [row.name]).get(row.name) or Pitch()
 
 
@@ -131,25 +133,25 @@ def read_cameras(settings: Settings, digest: str) -> list[FrameCamera]:
     Raises:
         ConflictError: It is gone, or damaged.
     """
-    return read_cameras_at(camera_place(settings, digest))
+    return read_cameras_file(cameras_file_path(settings, digest))
 
 
-def read_cameras_at(place: Path) -> list[FrameCamera]:
+def read_cameras_file(place: Path) -> list[FrameCamera]:
     """The same by the place where they lie."""
     try:
-        return frames_from_bytes(place.read_bytes())
+        return frame_cameras_from_bytes(place.read_bytes())
     except (OSError, InputError) as error:
         raise ConflictError(
             "the cameras of this shot cannot be read", hint="Track the shot again."
         ) from error
 
 
-def camera_place(settings: Settings, digest: str) -> Path:
+def cameras_file_path(settings: Settings, digest: str) -> Path:
     """Where cameras of a digest lie."""
     return settings.recordings / f"{digest}.cameras.npz"
 
 
-def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
+def _build_shot_cameras(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
     return ShotCameras(
         id=int(row.id),
         recording=int(row.recording_id),
@@ -169,12 +171,12 @@ def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
     )
 
 
-def cameras_at(
+def read_cameras_of_frames(
     store: Store, recording: Recording, numbers: Iterable[int]
 ) -> dict[int, FrameCamera]:
     """What the tracker found of frames of a recording; those of no tracked stretch are left out."""
     wanted, found = set(numbers), dict[int, FrameCamera]()
-    for stretch in list_cameras(store, recording.id):
+    for stretch in list_shot_cameras(store, recording.id):
         inside = {number for number in wanted if stretch.first <= number <= stretch.last}
         if inside and not stretch.stale:
             with suppress(ConflictError):
@@ -191,11 +193,11 @@ ShownFrame = tuple[int, StoredGroup, str]
 """Number of a frame, a group with a view that shows it, and the key of that view."""
 
 
-def views_of_stretch(
+def list_views_of_stretch(
     session: Session, recording: Recording, first: int, last: int, *, with_lines: bool = False
 ) -> list[ShownFrame]:
     """The views that show a frame of a stretch; those of drawn lines alone where asked."""
-    shown = views_of_video(session, recording.dataset_id, recording.require_readable())
+    shown = list_views_of_video(session, recording.dataset_id, recording.require_readable())
     wanted = [one for one in shown if first <= one.number <= last]
     wanted = [one for one in wanted if one.has_lines or not with_lines]
     ids, groups = sorted({one.group for one in wanted}), dict[int, StoredGroup]()
@@ -204,7 +206,7 @@ def views_of_stretch(
     return [(one.number, groups[one.group], one.key) for one in wanted if one.group in groups]
 
 
-def give_cameras(
+def assign_tracked_cameras(
     session: Session,
     recording: Recording,
     frames: Sequence[FrameCamera],
@@ -245,7 +247,7 @@ MEDIA_TYPES = {
 """By format."""
 
 
-def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, bytes]:
+def export_shot_cameras(store: Store, found: ShotCameras, form: str) -> tuple[str, bytes]:
     """Name and content of a file of cameras.
 
     Args:
@@ -276,10 +278,10 @@ def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, byt
         if form == "opentrackio":
             export_cameras(folder, out, form, frames[0].size)
             folder = out
-        return f"{title}-{form}.zip", _zipped(folder)
+        return f"{title}-{form}.zip", _zip_folder(folder)
 
 
-def _zipped(folder: Path) -> bytes:
+def _zip_folder(folder: Path) -> bytes:
     content = BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for file in sorted(folder.iterdir()):

@@ -18,7 +18,7 @@ def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
     """Bring recordings into a dataset, index them and find their shots; print what they are."""
     server = get_current_server()
     if server is None:
-        found = _import_here(paths, dataset)
+        found = _import_videos_locally(paths, dataset)
     else:
         found = []
         with connect_to_server(server) as client, show_progress("Indexing") as progress:
@@ -35,15 +35,17 @@ def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
         print_values(row, False)
 
 
-def _import_here(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
-    from app.features.recordings.index import index_now
-    from app.features.recordings.service import add_recording, require_video
+def _import_videos_locally(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
+    from app.features.recordings.index import index_recording_in_worker
+    from app.features.recordings.service import add_recording, require_video_file
 
-    files = [require_video(path.resolve()) for path in paths]
+    files = [require_video_file(path.resolve()) for path in paths]
     found = []
     with open_store() as store, show_progress("Indexing") as progress:
         for file in files:
             recording = add_recording(store, dataset, file, actor=get_current_actor())
-            indexed = index_now(store, recording.id, progress=progress, stop=lambda: None)
+            indexed = index_recording_in_worker(
+                store, recording.id, progress=progress, stop=lambda: None
+            )
             found.append(vars(indexed))
     return found

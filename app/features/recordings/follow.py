@@ -12,12 +12,12 @@ from typing import Any
 from app.config import Settings
 from app.db.store import Store
 from app.errors import OverloadedError
-from app.features.recordings.cameras import cameras_at
-from app.features.recordings.frame_boxes import boxes_in
+from app.features.recordings.cameras import read_cameras_of_frames
+from app.features.recordings.frame_boxes import read_detected_balls_in_frames
 from app.features.recordings.index import read_index
-from app.features.recordings.queries import predicted_in, views_of_video
+from app.features.recordings.queries import list_views_of_video, read_predicted_boxes
 from app.features.recordings.service import Recording
-from app.media.frames import picture_error_of_ended_process
+from app.media.frames import make_picture_error
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowHints
 from app.video.frames import Image, RecordingReader
@@ -43,7 +43,7 @@ class BallFollower:
         self._at_work: list[tuple[int, int]] = []
 
     @contextmanager
-    def at_work(self, recording_id: int, frame: int) -> Iterator[None]:
+    def mark_frame_being_followed(self, recording_id: int, frame: int) -> Iterator[None]:
         """While a click in a frame of a recording is followed, and until what came of it is kept."""
         with self._lock:
             self._at_work.append((recording_id, frame))
@@ -53,7 +53,7 @@ class BallFollower:
             with self._lock:
                 self._at_work.remove((recording_id, frame))
 
-    def frames_at_work(self, recording_id: int) -> list[int]:
+    def list_frames_being_followed(self, recording_id: int) -> list[int]:
         """Frames of a recording whose clicks are being followed now."""
         with self._lock:
             return sorted(frame for recording, frame in self._at_work if recording == recording_id)
@@ -76,12 +76,10 @@ class BallFollower:
         sha256 = recording.require_readable()
 
         def explain(error: WorkerEnded) -> Exception:
-            return picture_error_of_ended_process(
-                f"{recording.name} around frame {click.frame}", error
-            )
+            return make_picture_error(f"{recording.name} around frame {click.frame}", error)
 
         asked = (recording.path, sha256, click, bounds, hints, self._settings)
-        task = self.submit(follow_in_file, *asked, explain=explain)
+        task = self.submit(follow_ball_in_recording, *asked, explain=explain)
         try:
             found: BallRun | None = task.future.result()
         except CancelledError as error:
@@ -103,7 +101,7 @@ class BallFollower:
         self._pool.close()
 
 
-def follow_in_file(
+def follow_ball_in_recording(
     path: Path,
     sha256: str,
     click: BallClick,
@@ -114,7 +112,7 @@ def follow_in_file(
     """The work of the process."""
     reader = RecordingReader(path, read_index(settings, sha256), KEPT_BYTES)
 
-    def read(number: int) -> Image:
+    def read_frame(number: int) -> Image:
         if number < click.frame and not reader.has(number):
             # To decode forwards from a key frame costs as much for one frame as for those before it.
             for before in range(max(number - BEHIND, bounds[0]), number):
@@ -124,7 +122,7 @@ def follow_in_file(
     first, last = max(bounds[0], click.frame - EACH_WAY), min(bounds[1], click.frame + EACH_WAY)
     try:
         return follow_ball(
-            read,
+            read_frame,
             click,
             range(click.frame - 1, first - 1, -1),
             range(click.frame + 1, last + 1),
@@ -134,23 +132,23 @@ def follow_in_file(
         reader.close()
 
 
-def follow_hints(store: Store, recording: Recording, frames: range) -> FollowHints:
+def collect_follow_hints(store: Store, recording: Recording, frames: range) -> FollowHints:
     """What is known of frames of a recording: cameras over time, and what detectors say."""
-    found = cameras_at(store, recording, frames)
+    found = read_cameras_of_frames(store, recording, frames)
     cameras = {number: one.camera for number, one in found.items() if one.camera is not None}
-    detected = _detected(store, recording, frames)
-    for number, balls in boxes_in(store.settings, recording, frames).items():
+    detected = _read_detected_balls(store, recording, frames)
+    for number, balls in read_detected_balls_in_frames(store.settings, recording, frames).items():
         detected[number] = (*detected.get(number, ()), *balls)
     return FollowHints(cameras, detected)
 
 
-def _detected(
+def _read_detected_balls(
     store: Store, recording: Recording, frames: range
 ) -> dict[int, tuple[DetectedBall, ...]]:
     """What detectors predicted in views of groups that show the frames."""
     with store.read() as session:
-        shown = views_of_video(session, recording.dataset_id, recording.require_readable())
-        rows = predicted_in(session, [view for view in shown if view.number in frames])
+        shown = list_views_of_video(session, recording.dataset_id, recording.require_readable())
+        rows = read_predicted_boxes(session, [view for view in shown if view.number in frames])
     return {
         number: tuple(
             DetectedBall(

@@ -18,15 +18,15 @@ from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import InputError, NotFoundError, StorageError
-from app.evaluation.frame import Detection, FrameNames, NamedFrame
+from app.evaluation.frame import Detection, FrameNameIndex, NamedFrame
 from app.evaluation.prediction_files import AUTO, read_predictions
 from app.features.audit.service import add_audit_event
-from app.features.datasets.service import read_dataset_head, require_name
+from app.features.datasets.service import read_dataset_head, require_valid_name
 from app.features.recordings.index import read_index
-from app.features.recordings.queries import names_and_paths
+from app.features.recordings.queries import list_names_and_paths
 from app.features.recordings.service import Details, Recording, get_recording
 from app.progress import ReportProgress
-from app.soccer.frames import ImageSize, box_from_corner
+from app.soccer.frames import ImageSize, box_from_corner_origin
 from app.tracking.ball_run import DetectedBall
 from app.video.frames import read_frames
 
@@ -46,7 +46,7 @@ class BallDetector(Protocol):
 
 
 @dataclass(frozen=True)
-class KeptBoxes:
+class SavedBoxesReport:
     """What was kept as a set.
 
     Attributes:
@@ -72,7 +72,7 @@ def find_recording(store: Store, dataset: str, name: str) -> Recording:
         ConflictError: It cannot be read now.
     """
     with store.read() as session:
-        rows = names_and_paths(session, read_dataset_head(session, dataset).id)
+        rows = list_names_and_paths(session, read_dataset_head(session, dataset).id)
     found = next((row.id for row in rows if row.name == name), None)
     if found is None:
         raise NotFoundError(f'the dataset "{dataset}" has no recording "{name}"')
@@ -91,7 +91,7 @@ def detect_in_frames(
     min_score: float,
     actor: str,
     progress: ReportProgress | None = None,
-) -> KeptBoxes:
+) -> SavedBoxesReport:
     """Let a detector look at frames of a recording; the set appears whole, when it has looked at all.
 
     Args:
@@ -108,7 +108,7 @@ def detect_in_frames(
         InputError: The name or the frames are impossible, or the model does not run.
         ImageError: A frame cannot be decoded.
     """
-    require_name(name, "a set of boxes", digits=True)
+    require_valid_name(name, "a set of boxes", digits=True)
     count = recording.frames or 0
     frames = range(count) if frames is None else frames
     if not len(frames) or frames[0] < 0 or frames[-1] >= count:
@@ -121,23 +121,23 @@ def detect_in_frames(
             progress(number - frames[0], len(frames), what)
         boxes = model.detect(image[:, :, ::-1], min_score=min_score, most=MOST)
         # YOLO counts from the corner of the first pixel.
-        found[number] = [Detection(box_from_corner(one.box), one.score) for one in boxes]
-    return _keep(store, recording, name, found, len(frames), 0, actor)
+        found[number] = [Detection(box_from_corner_origin(one.box), one.score) for one in boxes]
+    return _save_boxes(store, recording, name, found, len(frames), 0, actor)
 
 
-def read_boxes_of_file(
+def import_boxes_from_file(
     store: Store, recording: Recording, path: Path, name: str, *, min_score: float, actor: str
-) -> KeptBoxes:
+) -> SavedBoxesReport:
     """Take boxes from a file, in any format of predictions, whose frames are called by their numbers.
 
     Raises:
         InputError: The name is impossible, or no box is of a frame of the recording.
         DatasetFormatError: It is no such file.
     """
-    require_name(name, "a set of boxes", digits=True)
+    require_valid_name(name, "a set of boxes", digits=True)
     size = ImageSize(recording.width or 1, recording.height or 1)
     count = recording.frames or 0
-    names = FrameNames.of(
+    names = FrameNameIndex.of(
         NamedFrame(number, str(number), f"{number}.png", recording.name, size)
         for number in range(count)
     )
@@ -151,10 +151,10 @@ def read_boxes_of_file(
         number: [one for one in boxes if one.score >= min_score]
         for number, boxes in read.detections.items()
     }
-    return _keep(store, recording, name, sure, count, len(read.unknown), actor)
+    return _save_boxes(store, recording, name, sure, count, len(read.unknown), actor)
 
 
-def boxes_in(
+def read_detected_balls_in_frames(
     settings: Settings, recording: Recording, frames: range
 ) -> dict[int, tuple[DetectedBall, ...]]:
     """What detectors take for the ball in some frames, by number of the frame; of all sets.
@@ -162,7 +162,7 @@ def boxes_in(
     Raises:
         StorageError: The file is damaged.
     """
-    _, kept = _read(settings, recording)
+    _, kept = _read_boxes_file(settings, recording)
     found: dict[int, list[DetectedBall]] = {}
     inside = (kept["frame"] >= frames.start) & (kept["frame"] < frames.stop)
     columns = (kept[name][inside].tolist() for name in _COLUMNS[1:])
@@ -171,7 +171,7 @@ def boxes_in(
     return {frame: tuple(balls) for frame, balls in found.items()}
 
 
-def _keep(
+def _save_boxes(
     store: Store,
     recording: Recording,
     name: str,
@@ -179,13 +179,13 @@ def _keep(
     looked_at: int,
     unknown: int,
     actor: str,
-) -> KeptBoxes:
-    sets, kept = _read(store.settings, recording)
+) -> SavedBoxesReport:
+    sets, kept = _read_boxes_file(store.settings, recording)
     others = [each for each in sets if each != name]
     stays = np.isin(kept["set"], [sets.index(each) for each in others])
     number_of = {sets.index(each): number for number, each in enumerate(others)}
     old = [number_of[number] for number in kept["set"][stays].tolist()]
-    new = list(_rows(found, len(others)))
+    new = list(_make_box_rows(found, len(others)))
     columns: dict[str, Any] = {
         column: np.concatenate([
             np.array(old, dtype=float) if column == "set" else kept[column][stays],
@@ -195,17 +195,17 @@ def _keep(
     }  # fmt: skip
     out = BytesIO()
     np.savez_compressed(out, sets=np.array([*others, name]), **columns)
-    place = _place(store.settings, recording)
+    place = _boxes_file_path(store.settings, recording)
     place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     replace_file(place, out.getvalue())
-    done = KeptBoxes(name, len({row[1] for row in new}), len(new), looked_at, unknown)
+    done = SavedBoxesReport(name, len({row[1] for row in new}), len(new), looked_at, unknown)
     with store.write() as session:
         what: Details = {"recording": recording.id, "name": recording.name, "predictions": name}
         add_audit_event(session, actor, "balls detected", recording.dataset_id, **what)
     return done
 
 
-def _rows(
+def _make_box_rows(
     found: Mapping[int, Sequence[Detection]], number: int
 ) -> Iterable[tuple[float, float, float, float, float, float]]:
     """A row for each box that is kept, as columns are called."""
@@ -217,14 +217,14 @@ def _rows(
             yield float(number), float(frame), *middle, (box.width + box.height) / 2, one.score
 
 
-def _place(settings: Settings, recording: Recording) -> Path:
+def _boxes_file_path(settings: Settings, recording: Recording) -> Path:
     # What begins with the digest of a video is kept as long as a recording shows it.
     return settings.recordings / f"{recording.require_readable()}.{recording.id}.balls.npz"
 
 
-def _read(settings: Settings, recording: Recording) -> tuple[list[str], dict[str, Any]]:
+def _read_boxes_file(settings: Settings, recording: Recording) -> tuple[list[str], dict[str, Any]]:
     """Names of the sets, and columns of their boxes; the column ``set`` has their numbers."""
-    place = _place(settings, recording)
+    place = _boxes_file_path(settings, recording)
     if not place.is_file():
         return [], {name: np.zeros(0) for name in _COLUMNS}
     try:

@@ -17,9 +17,9 @@ from app.durable import replace_file
 from app.errors import ConflictError, ImageError, OverloadedError, ReviewError
 from app.features.recordings.index import read_index
 from app.features.recordings.service import Recording
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.media.files import JPEG_QUALITY
-from app.media.frames import picture_error_of_ended_process
+from app.media.frames import make_picture_error
 from app.video.frames import Image, RecordingReader
 from app.worker_pool import PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
@@ -65,7 +65,7 @@ class RecordingFrames:
         sha256 = recording.require_readable()
 
         def explain(error: WorkerEnded) -> ReviewError:
-            return picture_error_of_ended_process(f"frame {number} of {recording.name}", error)
+            return make_picture_error(f"frame {number} of {recording.name}", error)
 
         asked = (recording.path, sha256, number, width, self._settings)
         return self._pool.submit(read_jpeg, *asked, explain=explain)
@@ -73,16 +73,16 @@ class RecordingFrames:
     def request_frames_beside(self, recording: Recording, number: int) -> None:
         """Have the frames beside one decoded, one after the other, as long as nobody waits for any."""
         if recording.sha256 is not None:
-            self._go_on(recording.path, recording.sha256, number, self._settings)
+            self._continue_reading_ahead(recording.path, recording.sha256, number, self._settings)
 
-    def _go_on(self, *asked: Any) -> None:
-        def then(done: Future[bool]) -> None:
+    def _continue_reading_ahead(self, *asked: Any) -> None:
+        def continue_when_done(done: Future[bool]) -> None:
             if not done.cancelled() and done.exception() is None and done.result():
-                self._go_on(*asked)
+                self._continue_reading_ahead(*asked)
 
         if self._pool.tasks == 0:
             with suppress(OverloadedError):
-                self._pool.submit(read_ahead, *asked).future.add_done_callback(then)
+                self._pool.submit(read_ahead, *asked).future.add_done_callback(continue_when_done)
 
     def close(self) -> None:
         """End the process."""
@@ -90,7 +90,7 @@ class RecordingFrames:
 
 
 @dataclass
-class _Open:
+class _OpenRecording:
     """A recording that the process keeps open; the frame that was asked for last, its width, how many frames in a row it
     has gone that way (backwards: below 0), the frames that are decoded before somebody asks, in their order, and
     those that are, as JPEG."""
@@ -110,7 +110,7 @@ class _Open:
 
     def make_ready(self, number: int) -> None:
         """Keep a frame that is decoded as somebody will ask for it."""
-        data = _encoded(self.reader.read(number), self.width)
+        data = _encode_jpeg(self.reader.read(number), self.width)
         self.ready[number, self.width] = data
         self.ready_bytes += len(data)
         while self.ready_bytes > READY_BYTES:
@@ -118,7 +118,7 @@ class _Open:
             self.ready_bytes -= len(oldest)
 
 
-_OPEN: OrderedDict[tuple[str, str], _Open] = OrderedDict()
+_OPEN: OrderedDict[tuple[str, str], _OpenRecording] = OrderedDict()
 """By path and sha256."""
 
 
@@ -130,13 +130,13 @@ def read_jpeg(path: Path, sha256: str, number: int, width: int | None, settings:
         ImageError: The frame cannot be decoded.
         NotFoundError: There is no frame of that number.
     """
-    key = digest_of(repr((sha256, number, width, JPEG_QUALITY)).encode())
+    key = digest_content(repr((sha256, number, width, JPEG_QUALITY)).encode())
     place = settings.cache / "frames" / key[:2] / f"{key[2:]}.jpg"
     is_small = width is not None and width <= THUMBNAIL
     if is_small:
         with suppress(OSError):
             return place.read_bytes()
-    data = _read(path, sha256, number, width, settings)
+    data = _read_frame_jpeg(path, sha256, number, width, settings)
     if is_small:
         # A full disk costs the cache and no picture.
         with suppress(OSError):
@@ -148,7 +148,7 @@ def read_jpeg(path: Path, sha256: str, number: int, width: int | None, settings:
 def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool:
     """Come one step nearer to what is asked for next, if it goes on as it did; whether there is more to do."""
     with suppress(ConflictError, ImageError):
-        found = _opened(path, sha256, settings)
+        found = _open_recording(path, sha256, settings)
         if found.way > 0:
             following = range(number + 1, min(number + 1 + AHEAD, found.count))
             found.planned = [one for one in following if not found.has(one)]
@@ -164,8 +164,10 @@ def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool
     return False
 
 
-def _read(path: Path, sha256: str, number: int, width: int | None, settings: Settings) -> bytes:
-    found = _opened(path, sha256, settings)
+def _read_frame_jpeg(
+    path: Path, sha256: str, number: int, width: int | None, settings: Settings
+) -> bytes:
+    found = _open_recording(path, sha256, settings)
     follows = 0 < number - found.last <= 2 * AHEAD
     found.width = width
     is_kept = found.has(number)
@@ -174,23 +176,23 @@ def _read(path: Path, sha256: str, number: int, width: int | None, settings: Set
         found.planned.clear()
         found.way = 0
     if not follows and not is_kept:
-        _read_up_to(found.reader, number)
+        _decode_up_to_frame(found.reader, number)
     found.way, found.last = found.way + way, number
     ready = found.ready.get((number, width))
-    return _encoded(found.reader.read(number), width) if ready is None else ready
+    return _encode_jpeg(found.reader.read(number), width) if ready is None else ready
 
 
-def _read_up_to(reader: RecordingReader, number: int) -> None:
+def _decode_up_to_frame(reader: RecordingReader, number: int) -> None:
     """Decode a frame with those before it, which costs little more than to find that one."""
     for before in range(max(number - BEHIND, 0), number + 1):
         reader.read(before)
 
 
-def _opened(path: Path, sha256: str, settings: Settings) -> _Open:
+def _open_recording(path: Path, sha256: str, settings: Settings) -> _OpenRecording:
     key = (str(path), sha256)
     if key not in _OPEN:
         index = read_index(settings, sha256)
-        _OPEN[key] = _Open(RecordingReader(path, index, KEPT_BYTES), len(index))
+        _OPEN[key] = _OpenRecording(RecordingReader(path, index, KEPT_BYTES), len(index))
         while len(_OPEN) > MOST_OPEN:
             _, oldest = _OPEN.popitem(last=False)
             oldest.reader.close()
@@ -198,7 +200,7 @@ def _opened(path: Path, sha256: str, settings: Settings) -> _Open:
     return _OPEN[key]
 
 
-def _encoded(image: Image, width: int | None) -> bytes:
+def _encode_jpeg(image: Image, width: int | None) -> bytes:
     height, present = image.shape[:2]
     if width is not None and width < present:
         size = (max(width, 1), max(round(height * width / present), 1))

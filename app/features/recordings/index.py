@@ -18,14 +18,14 @@ from app.features.recordings.queries import delete_links, update_recording
 from app.features.recordings.service import (
     Details,
     Recording,
-    file_stamp,
-    name_of_video,
-    need_recording,
-    recording_of,
+    build_recording_from_row,
+    choose_name_for_video,
+    compute_file_stamp,
+    require_recording,
 )
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical_json_text
-from app.media.frames import picture_error_of_ended_process
+from app.media.frames import make_picture_error
 from app.progress import ReportProgress
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
 from app.video.indexing import index_recording
@@ -39,7 +39,7 @@ Send = Callable[[tuple[int, int | None, str]], object]
 Found = TypeVar("Found")
 
 
-def index_now(
+def index_recording_in_worker(
     store: Store,
     recording_id: int,
     *,
@@ -61,20 +61,22 @@ def index_now(
         NotFoundError: The file is not there.
     """
     with store.read() as session:
-        row = need_recording(session, recording_id)
+        row = require_recording(session, recording_id)
     path = Path(row.path)
-    stamp = file_stamp(path)
+    stamp = compute_file_stamp(path)
     if stamp is None:
         raise NotFoundError(f"{path.name} is no longer in the place that it was imported from")
-    facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
-    if file_stamp(path) != stamp:
+    facts, shots = run_in_worker(
+        path, index_recording_file, store.settings, progress=progress, stop=stop
+    )
+    if compute_file_stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
     with store.write() as session:
-        row = need_recording(session, recording_id)
+        row = require_recording(session, recording_id)
         what: Details
         found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical_json_text(facts)}
         if row.sha256 != facts["sha256"]:
-            name = name_of_video(session, row, facts["sha256"])
+            name = choose_name_for_video(session, row, facts["sha256"])
             if name != row.name:
                 found["name"] = name
                 what = {"recording": recording_id, "name": name, "before": row.name}
@@ -86,10 +88,10 @@ def index_now(
             what = {"recording": recording_id, "name": row.name, "links": gone}
             add_audit_event(session, row.actor, "links removed", row.dataset_id, **what)
         update_recording(session, recording_id, **found)
-        return recording_of(need_recording(session, recording_id))
+        return build_recording_from_row(require_recording(session, recording_id))
 
 
-def in_worker(
+def run_in_worker(
     path: Path,
     work: Callable[..., Found],
     *arguments: Any,
@@ -99,24 +101,24 @@ def in_worker(
 ) -> Found:
     """The result of ``work(path, *arguments, send)`` in a worker process."""
 
-    def answer(place: tuple[int, int | None, str]) -> None:
+    def report_progress(place: tuple[int, int | None, str]) -> None:
         done, total, sentence = place
         progress(done, total, *([sentence] if sentence else []))
 
-    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].working():
+    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].track_task():
         try:
-            found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
+            found: Found = worker.run(work, path, *arguments, on_message=report_progress, stop=stop)
         except WorkerEnded as error:
-            raise picture_error_of_ended_process(path.name, error) from error
+            raise make_picture_error(path.name, error) from error
     return found
 
 
-def index_file(
+def index_recording_file(
     path: Path, settings: Settings, send: Send
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Facts and shots of a recording, whose index is written; in a worker process."""
     index = index_recording(path, settings, lambda done, total: send((done, total, "")))
-    place = index_place(settings, index.facts.sha256)
+    place = index_file_path(settings, index.facts.sha256)
     try:
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(place, index_to_bytes(index))
@@ -131,14 +133,14 @@ def index_file(
         "variable": index.is_variable,
         "seconds": index.end,
     }
-    return facts, _found_shots(path, index, send)
+    return facts, _detect_shots(path, index, send)
 
 
-def _found_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[str, Any]]:
-    def tell(done: int, total: int | None = None, sentence: str = "") -> None:
+def _detect_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[str, Any]]:
+    def send_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         send((done, total, sentence))
 
-    found = find_shots_of_indexed(path, index, tell).shots
+    found = find_shots_of_indexed(path, index, send_progress).shots
     return [
         {
             "first": one.first,
@@ -151,7 +153,7 @@ def _found_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[str
     ]
 
 
-def index_place(settings: Settings, sha256: str) -> Path:
+def index_file_path(settings: Settings, sha256: str) -> Path:
     """Where the index of a recording lies."""
     return settings.recordings / f"{sha256}.npz"
 
@@ -162,48 +164,50 @@ def read_index(settings: Settings, sha256: str) -> RecordingIndex:
     Raises:
         ConflictError: It is gone, or of an older version.
     """
-    return read_index_at(index_place(settings, sha256))
+    return read_index_file(index_file_path(settings, sha256))
 
 
-def read_index_at(place: Path) -> RecordingIndex:
+def read_index_file(place: Path) -> RecordingIndex:
     """The same by the place where it lies."""
     try:
         return index_from_bytes(place.read_bytes())
     except (OSError, InputError) as error:
-        raise _no_index() from error
+        raise _missing_index_error() from error
 
 
-def _no_index() -> ConflictError:
+def _missing_index_error() -> ConflictError:
     return ConflictError("the index of this recording cannot be read", hint="Index it again.")
 
 
 def has_index(store: Store, recording: Recording) -> bool:
     """Whether the index of a recording fits its file, and this version can read it."""
     try:
-        read_index_seconds(index_place(store.settings, recording.require_readable()))
+        read_index_seconds(index_file_path(store.settings, recording.require_readable()))
     except (ConflictError, InputError, OSError):
         return False
     return True
 
 
-def shots_of(path: Path, settings: Settings, sha256: str, send: Send) -> list[dict[str, Any]]:
+def detect_shots_in_file(
+    path: Path, settings: Settings, sha256: str, send: Send
+) -> list[dict[str, Any]]:
     """Shots of a recording that is indexed; in a worker process."""
-    return _found_shots(path, read_index(settings, sha256), send)
+    return _detect_shots(path, read_index(settings, sha256), send)
 
 
 @lru_cache(maxsize=4)
-def _seconds(index: Path) -> FloatArray:
+def _read_frame_times(index: Path) -> FloatArray:
     """When each frame is shown, by the place of an index: that of a whole match takes a second to read."""
     try:
         return read_index_seconds(index)
     except (OSError, InputError) as error:
-        raise _no_index() from error
+        raise _missing_index_error() from error
 
 
-def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
+def read_frame_times(settings: Settings, sha256: str) -> FloatArray:
     """When each frame of a recording is shown, seconds after the first one, shape (N,).
 
     Raises:
         ConflictError: Its index is gone, or of an older version.
     """
-    return _seconds(index_place(settings, sha256))
+    return _read_frame_times(index_file_path(settings, sha256))

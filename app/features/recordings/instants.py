@@ -21,13 +21,13 @@ from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.ingest import BATCH, ImportOrigin, IngestReport, import_group_batch
-from app.features.recordings.cameras import SOURCE, cameras_at
+from app.features.recordings.cameras import SOURCE, read_cameras_of_frames
 from app.features.recordings.index import read_index
-from app.features.recordings.link_frames import linked_frames
+from app.features.recordings.link_frames import find_linked_frames
 from app.features.recordings.links import list_links
-from app.features.recordings.match_clock import match_time
-from app.features.recordings.queries import views_of_video
-from app.features.recordings.service import Recording, get_recording, groups_taken
+from app.features.recordings.match_clock import compute_match_time
+from app.features.recordings.queries import list_views_of_video
+from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -64,7 +64,7 @@ class TakenInstants:
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _ShownFrame:
     """A frame that is a view of a group.
 
     Attributes:
@@ -90,12 +90,12 @@ class _Shown:
 class _LinkedViews:
     """Views of linked replays by their live frame."""
 
-    of: defaultdict[int, list[_Shown]] = field(default_factory=lambda: defaultdict(list))
+    of: defaultdict[int, list[_ShownFrame]] = field(default_factory=lambda: defaultdict(list))
     missed: list[int] = field(default_factory=list)
     """Live frames that are outside of the stretch of a replay, once for each such replay."""
 
 
-def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
+def validate_instant_frames(recording: Recording, frames: Sequence[int]) -> list[int]:
     """The numbers of frames in their order, each once.
 
     Raises:
@@ -120,7 +120,7 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
     return numbers
 
 
-def take_instants(
+def make_groups_of_instants(
     store: Store,
     recording_id: int,
     frames: Sequence[int],
@@ -144,22 +144,22 @@ def take_instants(
         dry_run: Count what would become of them, and keep nothing.
 
     Raises:
-        ConflictError, InputError: As ``require_instants``, also of the recording of a replay.
+        ConflictError, InputError: As ``validate_instant_frames``, also of the recording of a replay.
         ImageError: A frame cannot be decoded.
         StorageError: The disk refuses.
     """
     recording = get_recording(store, recording_id)
-    numbers = require_instants(recording, frames)
-    there = groups_taken(store, recording)
-    replays = _linked_views(store, recording, numbers, there) if linked else _LinkedViews()
+    numbers = validate_instant_frames(recording, frames)
+    there = find_groups_of_recording(store, recording)
+    replays = _find_linked_views(store, recording, numbers, there) if linked else _LinkedViews()
     wanted = [number for number in numbers if number not in there or number in replays.of]
     index = read_index(store.settings, recording.require_readable())
     origin, report = ImportOrigin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
-    tracked = cameras_at(store, recording, wanted)
-    live = [_Shown(recording, index, number, tracked.get(number)) for number in wanted]
-    groups = _groups(store, live, replays.of, there)
+    tracked = read_cameras_of_frames(store, recording, wanted)
+    live = [_ShownFrame(recording, index, number, tracked.get(number)) for number in wanted]
+    groups = _build_groups(store, live, replays.of, there)
     while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
             import_group_batch(session, origin, batch, report, set())
@@ -181,7 +181,7 @@ def take_instants(
     )
 
 
-def _linked_views(
+def _find_linked_views(
     store: Store, recording: Recording, numbers: Sequence[int], there: Mapping[int, int]
 ) -> _LinkedViews:
     """The frames of all linked replays that show what live frames show; of links whose speed is known, not
@@ -192,16 +192,18 @@ def _linked_views(
             continue
         replay = get_recording(store, link.replay.recording)
         with store.read() as session:
-            shown = views_of_video(session, replay.dataset_id, replay.require_readable())
+            shown = list_views_of_video(session, replay.dataset_id, replay.require_readable())
         have = {view.group for view in shown if view.number in link.replay.frames}
         inside = [number for number in numbers if number in link.live.frames]
         asked = [number for number in inside if there.get(number) not in have]
         if not asked:
             continue
         index = read_index(store.settings, replay.require_readable())
-        same = linked_frames(store, link)
+        same = find_linked_frames(store, link)
         frames = {number: same.replay[number - same.first] for number in asked}
-        tracked = cameras_at(store, replay, [one for one in frames.values() if one is not None])
+        tracked = read_cameras_of_frames(
+            store, replay, [one for one in frames.values() if one is not None]
+        )
         for number, frame in frames.items():
             if frame is None:
                 found.missed.append(number)
@@ -214,23 +216,25 @@ def _linked_views(
                 "repeated": frame in same.repeated,
                 "blended": frame in same.blended,
             }
-            view = _Shown(replay, index, frame, tracked.get(frame), told)
+            view = _ShownFrame(replay, index, frame, tracked.get(frame), told)
             if all(view.place != other.place for other in found.of[number]):
                 found.of[number].append(view)
     return found
 
 
-def _groups(
+def _build_groups(
     store: Store,
-    live: Sequence[_Shown],
-    linked: Mapping[int, Sequence[_Shown]],
+    live: Sequence[_ShownFrame],
+    linked: Mapping[int, Sequence[_ShownFrame]],
     there: Mapping[int, int],
 ) -> Iterator[Group]:
     """Groups of live frames with further views of replays; those that are there keep the views that they have."""
     settings = store.settings
     for start in range(0, len(live), BATCH):
         some = live[start : start + BATCH]
-        _keep(settings, [*some, *(view for one in some for view in linked.get(one.number, ()))])
+        _store_frame_images(
+            settings, [*some, *(view for one in some for view in linked.get(one.number, ()))]
+        )
         with store.read() as session:
             known = read_groups(session, [there[one.number] for one in some if one.number in there])
         for one in some:
@@ -238,19 +242,19 @@ def _groups(
             key = f"{match}/{one.number}.png"
             stored = known.get(there.get(one.number, 0))
             if stored is None:
-                views = [_view(settings, one, f"{one.number}.png", key)]
+                views = [_build_view(settings, one, f"{one.number}.png", key)]
             else:
-                views = [_as_taken(stored, view, one) for view in stored.group.views]
+                views = [_strip_edits_from_view(stored, view, one) for view in stored.group.views]
             for other in linked.get(one.number, ()):
                 name = f"{other.number}.png"
                 if other.recording.id != one.recording.id:
                     name = f"{other.recording.name}_{name}"
                 if all(name != view.key for view in views):
-                    views.append(_view(settings, other, name, f"{key}/{name}"))
+                    views.append(_build_view(settings, other, name, f"{key}/{name}"))
             yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
 
 
-def _as_taken(stored: StoredGroup, view: View, live: _Shown) -> View:
+def _strip_edits_from_view(stored: StoredGroup, view: View, live: _ShownFrame) -> View:
     """A view of a group that is there, without what people said of it since: an import keeps that, and what is
     given. Its live view gets the camera of its frame where it has neither camera nor lines."""
     kept = stored.stations[view.key]
@@ -266,7 +270,7 @@ def _as_taken(stored: StoredGroup, view: View, live: _Shown) -> View:
     return replace(view, station=station)
 
 
-def _keep(settings: Settings, views: Sequence[_Shown]) -> None:
+def _store_frame_images(settings: Settings, views: Sequence[_ShownFrame]) -> None:
     """Keep frames, each recording read once and forwards."""
     by_place = {view.place: view for view in views}
     missing = [one for one in by_place.values() if not (settings.recordings / one.place).is_file()]
@@ -274,26 +278,31 @@ def _keep(settings: Settings, views: Sequence[_Shown]) -> None:
         mine = {one.number: one for one in missing if one.recording.id == number}
         any_one = next(iter(mine.values()))
         for at, image in read_frames(any_one.recording.path, any_one.index, sorted(mine)):
-            _kept(settings.recordings / mine[at].place, image)
+            _store_frame_png(settings.recordings / mine[at].place, image)
 
 
-def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
+def _build_view(settings: Settings, shown: _ShownFrame, name: str, key: str) -> View:
     """The view of a frame that is kept; ``key`` is that of its station."""
     facts, frame = shown.index.facts, shown.tracked
     station = Station(key, ImageSize(facts.width, facts.height))
-    told = {**_provenance(shown.recording, shown.index, shown.number), **(shown.link or {})}
+    told = {
+        **_describe_provenance(shown.recording, shown.index, shown.number),
+        **(shown.link or {}),
+    }
     if frame is not None and frame.camera is not None:
         station = station.with_given_camera(frame.camera, frame.covariance)
         # Another camera may be given later: this is what was given now.
-        told["camera_when_taken"] = _given_by_track(frame)
+        told["camera_when_taken"] = _describe_tracked_camera(frame)
     media = Media(str(settings.recordings / shown.place))
     return View(name, station, media=media, extras=Extras(metadata={"recording": told}))
 
 
-def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dict[str, Any]:
+def _describe_provenance(
+    recording: Recording, index: RecordingIndex, number: int
+) -> dict[str, Any]:
     """Which frame of what a group shows: time stamp in ticks of its time base, seconds, and time of the match."""
     over, under = index.facts.time_base
-    half, time = match_time(recording.clocks, index.seconds, number) or (None, None)
+    half, time = compute_match_time(recording.clocks, index.seconds, number) or (None, None)
     shown = {} if half is None else {"match_half": half, "match_seconds": time}
     return {
         **shown,
@@ -306,14 +315,14 @@ def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dic
     }
 
 
-def _given_by_track(frame: FrameCamera) -> dict[str, Any]:
+def _describe_tracked_camera(frame: FrameCamera) -> dict[str, Any]:
     """What the tracker says of the camera that it gives a frame."""
     row = frame_to_row(frame)
     names = ("outcome", "keyframe", "supported", "explained", "error_px", "sigma")
     return {"source": SOURCE, **{name: row[name] for name in names}}
 
 
-def _kept(place: Path, image: Any) -> Path:
+def _store_frame_png(place: Path, image: Any) -> Path:
     """Where a frame is kept, as PNG; nothing is written where it is."""
     if place.is_file():
         return place

@@ -13,23 +13,23 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import TooLargeError
-from app.features.imports.upload_queries import get_upload, save_upload, upload_path
+from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
-from app.features.recordings.index import has_index, index_now
-from app.features.recordings.instants import require_instants, take_instants
+from app.features.recordings.index import has_index, index_recording_in_worker
+from app.features.recordings.instants import make_groups_of_instants, validate_instant_frames
 from app.features.recordings.service import (
     Recording,
     add_recording,
+    find_groups_of_recording,
     get_recording,
-    groups_taken,
-    require_video,
+    require_video_file,
 )
 from app.features.recordings.shots import detect_shots_again
-from app.features.solve.jobs import request_solve
+from app.features.solve.jobs import request_solve_job
 from app.progress import ReportProgress
 from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
@@ -60,18 +60,18 @@ def request_recording(
         InputError: It is not a video file by its name, or the name of the dataset cannot be one.
         NotFoundError: There is no such upload or file.
     """
-    path = _path_of(settings, source)
+    path = _resolve_video_path(settings, source)
     if "upload" in source:
         # It is read where it is, so it stays.
-        save_upload(settings, source["upload"])
+        mark_upload_permanent(settings, source["upload"])
     recording = add_recording(store, dataset, path, actor=actor)
     return request_index(jobs, store, recording, actor=actor)
 
 
-def _path_of(settings: Settings, source: Mapping[str, str]) -> Path:
+def _resolve_video_path(settings: Settings, source: Mapping[str, str]) -> Path:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
-        return require_video(upload_path(settings, upload.id).absolute())
+        return require_video_file(upload_path(settings, upload.id).absolute())
     found = resolve_folder(settings, source["folder"])
     if not isinstance(found, Path):
         raise TooLargeError(
@@ -79,7 +79,7 @@ def _path_of(settings: Settings, source: Mapping[str, str]) -> Path:
             hint="Copy it into a folder that the operator allows, or upload it.",
             pointer="/source/folder",
         )
-    return require_video(found.absolute())
+    return require_video_file(found.absolute())
 
 
 def request_index(
@@ -89,30 +89,34 @@ def request_index(
     return jobs.submit(
         INDEX,
         f"Find the shots of {recording.name}" if shots else f"Index {recording.name}",
-        partial(index_work, store),
+        partial(run_index_job, store),
         dataset_id=recording.dataset_id,
         actor=actor,
         request={"recording": recording.id, "shots": shots},
     )
 
 
-def index_work(store: Store, progress: JobProgress) -> Json:
+def run_index_job(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result is what was found."""
     recording_id = progress.job.request["recording"]
     recording = get_recording(store, recording_id)
     name = recording.name
     progress(0, None, f"Reading {name}.")
 
-    def step(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_instants_step(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
     with leave_work_to_next_server(progress):
         if progress.job.request["shots"] and has_index(store, recording):
             actor = progress.job.actor
-            detect_shots_again(store, recording_id, actor=actor, progress=step, stop=progress.check)
+            detect_shots_again(
+                store, recording_id, actor=actor, progress=report_instants_step, stop=progress.check
+            )
             found = get_recording(store, recording_id)
         else:
-            found = index_now(store, recording_id, progress=step, stop=progress.check)
+            found = index_recording_in_worker(
+                store, recording_id, progress=report_instants_step, stop=progress.check
+            )
     return {
         "recording": found.id,
         "name": found.name,
@@ -156,48 +160,48 @@ def request_instants(
         actor: Who wants it.
 
     Raises:
-        NotFoundError, ConflictError, InputError: As ``instants.require_instants``.
+        NotFoundError, ConflictError, InputError: As ``instants.validate_instant_frames``.
     """
     recording = get_recording(store, recording_id)
-    numbers = require_instants(recording, frames)
+    numbers = validate_instant_frames(recording, frames)
     return jobs.submit(
         INSTANTS,
         f"{'Dry run: make' if options.dry_run else 'Make'} {plural(len(numbers), 'group')} of {recording.name}",
-        partial(instants_work, jobs, store),
+        partial(run_instants_job, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,
         request={"recording": recording_id, "frames": numbers, **asdict(options)},
     )
 
 
-def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
+def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     """The work itself; its result counts groups, and names the first one and the jobs that follow."""
     asked, actor = progress.job.request, progress.job.actor
     recording = get_recording(store, asked["recording"])
 
-    def step(done: int, total: int | None = None, _: str = "") -> None:
+    def report_instants_step(done: int, total: int | None = None, _: str = "") -> None:
         progress(done, total, f"{plural(done, 'instant')} of {recording.name} taken.")
 
     with leave_work_to_next_server(progress):
-        taken = take_in_worker(
+        taken = make_groups_in_worker(
             store,
             recording,
             asked["frames"],
             linked=asked.get("linked", False),
             dry_run=asked.get("dry_run", False),
             actor=actor,
-            progress=step,
+            progress=report_instants_step,
             stop=progress.check,
         )
     solve = proposals = None
     dry_run = asked.get("dry_run", False)
     if (taken["new"] or taken["changed"]) and not dry_run:
-        solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
+        solve = request_solve_job(jobs, store, recording.dataset_id, actor=actor).id
         views = taken["new"] + taken["changed"] + taken["linked_views"]
         if asked["propose"] and taken["cameras"] < views:
             number, match = recording.dataset_id, recording.name
             proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
-    groups = groups_taken(store, recording)
+    groups = find_groups_of_recording(store, recording)
     return {
         **taken,
         "dry_run": dry_run,
@@ -207,7 +211,7 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     }
 
 
-def take_in_worker(
+def make_groups_in_worker(
     store: Store,
     recording: Recording,
     frames: Sequence[int],
@@ -224,7 +228,7 @@ def take_in_worker(
         taken = run_in_worker(
             store,
             "recordings",
-            partial(take_instants, dry_run=dry_run),
+            partial(make_groups_of_instants, dry_run=dry_run),
             recording.id,
             frames,
             linked,
@@ -240,5 +244,5 @@ def take_in_worker(
 
 def resume_recordings(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on; what is done stays as it is."""
-    jobs.register_resume(INDEX, partial(index_work, store))
-    jobs.register_resume(INSTANTS, partial(instants_work, jobs, store))
+    jobs.register_resume(INDEX, partial(run_index_job, store))
+    jobs.register_resume(INSTANTS, partial(run_instants_job, jobs, store))

@@ -10,11 +10,11 @@ import numpy as np
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.recordings.index import index_place, read_index_at
+from app.features.recordings.index import index_file_path, read_index_file
 from app.features.recordings.link_values import LinkedShot, ShotLink
-from app.features.recordings.links import need_link, shot_seconds, step_of
+from app.features.recordings.links import compute_frame_interval, read_shot_times, require_link
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.video.repeats import blended, repeated
+from app.video.repeats import find_blended_frames, find_repeated_frames
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LinkedFrames:
     blended: tuple[int, ...]
 
 
-def linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
+def find_linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
     """Which frame of a replay shows the same as each frame of its live shot.
 
     Raises:
@@ -44,15 +44,17 @@ def linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
     """
     settings = store.settings
     with store.read() as session:
-        row = need_link(session, link.live.recording, link.id)
-    live = shot_seconds(settings, row.live_sha256, link.live)
-    marks = _marks(index_place(settings, row.replay_sha256), link.replay.first, link.replay.last)
+        row = require_link(session, link.live.recording, link.id)
+    live = read_shot_times(settings, row.live_sha256, link.live)
+    marks = _read_repeat_and_blend_flags(
+        index_file_path(settings, row.replay_sha256), link.replay.first, link.replay.last
+    )
     nearest: list[int | None] = [None] * len(live)
     off: list[float | None] = [None] * len(live)
     if link.map.is_usable:
-        replay = link.map.live(shot_seconds(settings, row.replay_sha256, link.replay))
-        half = step_of(live) / 2
-        frames, later = nearest_frames(live, replay, np.logical_or(*marks), half)
+        replay = link.map.live(read_shot_times(settings, row.replay_sha256, link.replay))
+        half = compute_frame_interval(live) / 2
+        frames, later = find_nearest_frames(live, replay, np.logical_or(*marks), half)
         for at in np.flatnonzero(frames >= 0):
             nearest[at] = link.replay.first + int(frames[at])
             off[at] = float(later[at])
@@ -62,17 +64,17 @@ def linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
     return LinkedFrames(link.live.first, tuple(nearest), tuple(off), repeats, blends)
 
 
-def unsound_frames(settings: Settings, sha256: str, shot: LinkedShot) -> set[int]:
+def find_repeated_or_blended_frames(settings: Settings, sha256: str, shot: LinkedShot) -> set[int]:
     """Frames of a shot that show the one before once more, or a mix of those beside them.
 
     Raises:
         ConflictError: The index is gone, or of an older version.
     """
-    marks = _marks(index_place(settings, sha256), shot.first, shot.last)
+    marks = _read_repeat_and_blend_flags(index_file_path(settings, sha256), shot.first, shot.last)
     return {shot.first + int(at) for at in np.flatnonzero(np.logical_or(*marks))}
 
 
-def nearest_frames(
+def find_nearest_frames(
     live: FloatArray, replay: FloatArray, marked: BoolArray, half: float
 ) -> tuple[IntArray, FloatArray]:
     """For each live time the number of the nearest time of the replay, and how much later that is.
@@ -89,16 +91,16 @@ def nearest_frames(
         Numbers of frames, shape (N,); seconds, shape (N,).
     """
     order: IntArray = np.argsort(replay, kind="stable")
-    found = order[_nearest_of(replay[order], live)]
+    found = order[_find_nearest_times(replay[order], live)]
     sound = order[~marked[order]]
     if len(sound):
-        unmarked = sound[_nearest_of(replay[sound], live)]
+        unmarked = sound[_find_nearest_times(replay[sound], live)]
         found = np.where(np.abs(replay[unmarked] - live) <= half, unmarked, found)
     outside = (replay.min() - live > half) | (replay.max() - live < -half)
     return np.where(outside, -1, found), np.where(outside, 0.0, replay[found] - live)
 
 
-def _nearest_of(times: FloatArray, wanted: FloatArray) -> IntArray:
+def _find_nearest_times(times: FloatArray, wanted: FloatArray) -> IntArray:
     """Places of the nearest of ascending times, of equal ones the first, shape (N,)."""
     behind = np.minimum(np.searchsorted(times, wanted), len(times) - 1)
     before = np.searchsorted(times, times[np.maximum(behind - 1, 0)])
@@ -107,7 +109,7 @@ def _nearest_of(times: FloatArray, wanted: FloatArray) -> IntArray:
 
 
 @lru_cache(maxsize=64)
-def _marks(index: Path, first: int, last: int) -> BoolArray:
+def _read_repeat_and_blend_flags(index: Path, first: int, last: int) -> BoolArray:
     """Whether frames of a shot are repeated, and whether they are blended, shape (2, N)."""
-    rows = read_index_at(index).measured[first : last + 1]
-    return np.array([repeated(rows), blended(rows)])
+    rows = read_index_file(index).measured[first : last + 1]
+    return np.array([find_repeated_frames(rows), find_blended_frames(rows)])

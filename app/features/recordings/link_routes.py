@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
-from app.features.recordings.link_frames import LinkedFrames, linked_frames
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
+from app.features.recordings.link_frames import LinkedFrames, find_linked_frames
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
     InstantsEdit,
@@ -17,14 +17,14 @@ from app.features.recordings.link_schemas import (
     LiveSuggestions,
     NewShotLink,
 )
-from app.features.recordings.link_suggestions import suggest_live
-from app.features.recordings.link_values import ShotLink, links_csv
+from app.features.recordings.link_suggestions import suggest_live_shots
+from app.features.recordings.link_values import ShotLink, format_links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.features.recordings.routes import CSV_FILE
 from app.features.tracks.link_ball import request_ball_link
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
-from app.http.documents import document, make_empty_response, respond_with
+from app.http.documents import make_document_response, make_empty_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -39,14 +39,14 @@ LinkId = Annotated[int, Path(ge=1, le=MAX_ID, description="Id of the link.")]
 ReplayFrame = Annotated[int, Path(ge=0, le=MAX_ID, description="Any frame of the replay.")]
 
 
-def _tagged(found: ShotLink, status: int = 200, **headers: str) -> Response:
+def _make_link_response(found: ShotLink, status: int = 200, **headers: str) -> Response:
     shown = LinkDocument.model_validate(found)
-    return document(shown, status, {"ETag": found.etag, **headers})
+    return make_document_response(shown, status, {"ETag": found.etag, **headers})
 
 
-def _made(found: ShotLink) -> Response:
+def _make_created_response(found: ShotLink) -> Response:
     at = f"/api/v1/recordings/{found.live.recording}/links/{found.id}"
-    return _tagged(found, 201, Location=at)
+    return _make_link_response(found, 201, Location=at)
 
 
 @router.get("/links", operation_id="listLinks", responses=responses(404))
@@ -72,7 +72,7 @@ def get_links(recording: Id, store: AppStore) -> LinkList:
 def get_links_file(recording: Id, store: AppStore) -> Response:
     """The same as CSV: a row for each, or for each piece of one whose speed changes."""
     headers = {"Content-Disposition": 'attachment; filename="touchline-links.csv"'}
-    text = links_csv(list_links(store, recording))
+    text = format_links_csv(list_links(store, recording))
     return Response(text, headers=headers, media_type=CSV_FILE)
 
 
@@ -94,7 +94,7 @@ def get_links_file(recording: Id, store: AppStore) -> Response:
     recording=OwnedKind.RECORDING,
     body={"replay/recording": OwnedKind.RECORDING},
 )
-@respond_with(_made)
+@respond_with(_make_created_response)
 def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -> ShotLink:
     """Link a replay to the live shot of this recording that it shows again, without an instant yet."""
     live, replay = wanted.live, wanted.replay
@@ -111,7 +111,7 @@ def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -
 @paged()
 def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveSuggestions:
     """Live shots that the replay at a frame may show, the likeliest first, and why."""
-    return LiveSuggestions(items=suggest_live(store, recording, frame))
+    return LiveSuggestions(items=suggest_live_shots(store, recording, frame))
 
 
 @router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
@@ -127,7 +127,7 @@ def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) ->
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     """Which frame of the replay shows the same as each live frame."""
-    return linked_frames(store, get_link(store, recording, link))
+    return find_linked_frames(store, get_link(store, recording, link))
 
 
 @router.put(
@@ -137,7 +137,7 @@ def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@respond_with(_tagged)
+@respond_with(_make_link_response)
 def put_instants(
     recording: Id,
     link: LinkId,
@@ -166,7 +166,9 @@ def put_instants(
 
 
 @router.post(
-    "/links/{link}/ball", operation_id="linkByBall", **openapi_of_job_response(404, 413, 415)
+    "/links/{link}/ball",
+    operation_id="linkByBall",
+    **describe_job_response_for_openapi(404, 413, 415),
 )
 @may(
     Action.LEAD,

@@ -9,13 +9,18 @@ from pathlib import Path
 
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.recordings.cameras import ShotCameras, camera_place, list_cameras, read_cameras_at
+from app.features.recordings.cameras import (
+    ShotCameras,
+    cameras_file_path,
+    list_shot_cameras,
+    read_cameras_file,
+)
 from app.features.recordings.links import list_links
-from app.features.recordings.match_clock import MatchClock, clock_at
+from app.features.recordings.match_clock import MatchClock, find_clock_at_frame
 from app.features.recordings.service import Recording, list_recordings
 from app.features.recordings.shots import Shot, get_shots
 from app.tracking.link_fit import SLOWEST
-from app.tracking.view_path import PathComparison, ViewPath, compare_paths, view_path
+from app.tracking.view_path import PathComparison, ViewPath, compare_paths, compute_view_path
 
 SUGGESTED = 6
 """Live shots that are suggested for a replay."""
@@ -53,7 +58,7 @@ class LiveSuggestion:
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class _LiveShotCandidate:
     recording: Recording
     shot: Shot
     seconds: float
@@ -61,7 +66,7 @@ class _Candidate:
     """Seconds from its end to the replay; None: another recording, of which nothing says."""
 
 
-def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSuggestion]:
+def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[LiveSuggestion]:
     """Live shots that the replay at a frame may show, the likeliest first.
 
     They are shots of the main camera: those of the replay's half that end before it in its own recording, then those
@@ -84,18 +89,20 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
     if found is None:
         raise InputError(f"frame {frame} does not belong to any shot", pointer="/frame")
     replay, (start, end) = found
-    half = _half(mine.recording.clocks, replay.first)
+    half = _find_match_half(mine.recording.clocks, replay.first)
     candidates = [
-        _Candidate(mine.recording, shot, last - first, start - last)
+        _LiveShotCandidate(mine.recording, shot, last - first, start - last)
         for shot, (first, last) in timed
         if shot.kind == "main"
         and shot.last < replay.first
         and shot.kept is not False
-        and _half(mine.recording.clocks, shot.first) == half
+        and _find_match_half(mine.recording.clocks, shot.first) == half
     ]
     candidates.sort(key=lambda one: one.before or 0.0)
-    candidates += _of_others(store, mine.recording, half, LIKENED - len(candidates))
-    paths = _Paths(store)
+    candidates += _list_shots_of_other_recordings(
+        store, mine.recording, half, LIKENED - len(candidates)
+    )
+    paths = _ViewPathCache(store)
     path = paths.of(mine.recording, replay)
     known = {
         (one.live.recording, one.live.first): one.id
@@ -109,7 +116,7 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
             live = paths.of(one.recording, one.shot)
             like = None if live is None else compare_paths(live, path)
         short = one.seconds < SLOWEST * (end - start)
-        rank = _rank(like)
+        rank = _compute_rank_key(like)
         ranked.append(
             (
                 (one.before is None and rank[0] > 0, short, *rank, number),
@@ -118,7 +125,7 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
                     one.recording.name,
                     one.shot.first,
                     one.shot.last,
-                    _why(one, short, like),
+                    _explain_suggestion(one, short, like),
                     known.get((one.recording.id, one.shot.first)),
                     None if like is None else like.apart_m,
                     like is not None and like.turned,
@@ -128,15 +135,17 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
     return [suggestion for _, suggestion in sorted(ranked, key=lambda item: item[0])][:SUGGESTED]
 
 
-def _half(clocks: Sequence[MatchClock], frame: int) -> int | None:
+def _find_match_half(clocks: Sequence[MatchClock], frame: int) -> int | None:
     """The half of the match in a frame; None where nobody read the clock."""
-    clock = clock_at(clocks, frame)
+    clock = find_clock_at_frame(clocks, frame)
     return None if clock is None else clock.half
 
 
-def _of_others(store: Store, mine: Recording, half: int | None, most: int) -> list[_Candidate]:
+def _list_shots_of_other_recordings(
+    store: Store, mine: Recording, half: int | None, most: int
+) -> list[_LiveShotCandidate]:
     """Main shots of other recordings, but for those of which the clock says another half."""
-    found: list[_Candidate] = []
+    found: list[_LiveShotCandidate] = []
     for recording in list_recordings(store, mine.dataset_id):
         if len(found) >= most:
             break
@@ -144,13 +153,13 @@ def _of_others(store: Store, mine: Recording, half: int | None, most: int) -> li
             continue
         listed = get_shots(store, recording.id)
         for shot, (first, last) in zip(listed.items, listed.times, strict=True):
-            there = _half(recording.clocks, shot.first)
+            there = _find_match_half(recording.clocks, shot.first)
             if shot.kind == "main" and (half is None or there in (half, None)):
-                found.append(_Candidate(recording, shot, last - first, None))
+                found.append(_LiveShotCandidate(recording, shot, last - first, None))
     return found[: max(most, 0)]
 
 
-def _rank(like: PathComparison | None) -> tuple[float, float]:
+def _compute_rank_key(like: PathComparison | None) -> tuple[float, float]:
     """What a likeness says first, and by how much: the smaller, the likelier."""
     if like is None or ALIKE_M < like.apart_m <= UNLIKE_M:
         return 1.0, 0.0
@@ -159,7 +168,7 @@ def _rank(like: PathComparison | None) -> tuple[float, float]:
     return 0.0, like.apart_m // _ROUND_M
 
 
-def _why(one: _Candidate, short: bool, like: PathComparison | None) -> str:
+def _explain_suggestion(one: _LiveShotCandidate, short: bool, like: PathComparison | None) -> str:
     if one.before is None:
         told = f"Main camera of {one.recording.name}; the time of this shot is not known"
     else:
@@ -173,7 +182,7 @@ def _why(one: _Candidate, short: bool, like: PathComparison | None) -> str:
     return f"{told} At speed {like.speed:.2g}, both show places {like.apart_m:.0f} m apart{turned}."
 
 
-class _Paths:
+class _ViewPathCache:
     """Where the cameras of shots look, as far as they are tracked."""
 
     def __init__(self, store: Store) -> None:
@@ -183,7 +192,7 @@ class _Paths:
     def of(self, recording: Recording, shot: Shot) -> ViewPath | None:
         """The path of the stretch with the most frames of a shot; None where none is tracked."""
         if recording.id not in self._stretches:
-            self._stretches[recording.id] = list_cameras(self._store, recording.id)
+            self._stretches[recording.id] = list_shot_cameras(self._store, recording.id)
         inside = [
             (min(one.last, shot.last) - max(one.first, shot.first), one.digest)
             for one in self._stretches[recording.id]
@@ -193,12 +202,14 @@ class _Paths:
             return None
         _, digest = max(inside)
         try:
-            return _path(camera_place(self._store.settings, digest), shot.first, shot.last)
+            return _read_view_path(
+                cameras_file_path(self._store.settings, digest), shot.first, shot.last
+            )
         except ConflictError:
             return None
 
 
 @lru_cache(maxsize=512)
-def _path(place: Path, first: int, last: int) -> ViewPath:
-    frames = [one for one in read_cameras_at(place) if first <= one.number <= last]
-    return view_path([one.time for one in frames], [one.camera for one in frames])
+def _read_view_path(place: Path, first: int, last: int) -> ViewPath:
+    frames = [one for one in read_cameras_file(place) if first <= one.number <= last]
+    return compute_view_path([one.time for one in frames], [one.camera for one in frames])

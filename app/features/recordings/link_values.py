@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from app.db.json_columns import parse_json_column
-from app.formats.csv_text import csv_line
+from app.formats.csv_text import format_csv_line
 from app.geometry.arrays import FloatArray
-from app.json_text import digest_of
+from app.json_text import digest_content
 from app.soccer.choices import LinkOutcome, LinkSource
 from app.tracking.time_map import TimeMap
 
@@ -89,7 +89,7 @@ class LinkMap:
     """Which time of the live shot each time of a replay shows.
 
     Attributes:
-        outcome: ``none``: nothing is known; ``offset``: the speed is assumed; ``linked``: offset and speed are known,
+        outcome: ``make_empty_track``: nothing is known; ``offset``: the speed is assumed; ``linked``: offset and speed are known,
             or those of all pieces; ``unobservable``: they cannot be told.
         found_by: From what: ``instants`` of people, or the ``ball``.
         reason: Why there is no map of one offset and speed.
@@ -157,14 +157,14 @@ class ShotLink:
     etag: str
 
 
-def links_csv(found: Iterable[ShotLink]) -> str:
+def format_links_csv(found: Iterable[ShotLink]) -> str:
     """Links as CSV: a row for each, or for each piece of one whose speed changes."""
     columns = (
         *("link", "live", "live_first", "live_last", "replay", "replay_first", "replay_last"),
         *("outcome", "found_by", "first", "last", "offset_s", "speed", "offset_sigma_s"),
         *("speed_sigma", "instants"),
     )
-    lines = [csv_line(columns)]
+    lines = [format_csv_line(columns)]
     for one in found:
         live, replay, how = one.live, one.replay, one.map
         head = (one.id, live.name, live.first, live.last, replay.name, replay.first, replay.last)
@@ -174,11 +174,13 @@ def links_csv(found: Iterable[ShotLink]) -> str:
         ]
         whole = (replay.first, replay.last, how.offset_s, how.speed)
         for piece in pieces or [(*whole, how.offset_sigma_s, how.speed_sigma)]:
-            lines.append(csv_line((*head, how.outcome, how.found_by, *piece, len(one.instants))))
+            lines.append(
+                format_csv_line((*head, how.outcome, how.found_by, *piece, len(one.instants)))
+            )
     return "".join(lines)
 
 
-def described(
+def make_link_map(
     made: TimeMap, replay: LinkedShot, times: FloatArray, found_by: LinkSource | None
 ) -> LinkMap:
     """A map as it is kept and shown.
@@ -198,7 +200,7 @@ def described(
             one.last,
             float(one.offset or 0.0),
             float(one.speed or 0.0),
-            _sigma(one)[1] or 0.0,
+            _compute_offset_speed_sigma(one)[1] or 0.0,
         )
         for one, ends in zip(made.pieces, frames, strict=True)
     )
@@ -215,7 +217,7 @@ def described(
         made.reason,
         made.offset if whole else None,
         made.speed if whole else None,
-        *(_sigma(made) if whole else (None, None)),
+        *(_compute_offset_speed_sigma(made) if whole else (None, None)),
         made.sigma_at(float(times[-1]) / 2) if whole else None,
         made.miss,
         pieces,
@@ -223,14 +225,14 @@ def described(
     )
 
 
-def _sigma(made: TimeMap) -> tuple[float | None, float | None]:
+def _compute_offset_speed_sigma(made: TimeMap) -> tuple[float | None, float | None]:
     if made.covariance is None:
         return None, None
     offset, speed = np.sqrt(np.maximum(made.covariance.diagonal(), 0.0)).tolist()
     return offset, speed
 
 
-def shots_of_link(row: Any) -> tuple[LinkedShot, LinkedShot]:
+def parse_linked_shots(row: Any) -> tuple[LinkedShot, LinkedShot]:
     """The live shot and the replay of the row of a link."""
     return (
         LinkedShot(row.live_id, row.live_name, row.live_first, row.live_last),
@@ -238,15 +240,15 @@ def shots_of_link(row: Any) -> tuple[LinkedShot, LinkedShot]:
     )
 
 
-def etag_of(row: Any) -> str:
+def make_link_etag(row: Any) -> str:
     """The ETag of the row of a link."""
     content = f"{row.instants} {row.assumed_speed} {row.map}"
-    return f'"{row.revision}-{digest_of(content.encode())[:12]}"'
+    return f'"{row.revision}-{digest_content(content.encode())[:12]}"'
 
 
-def link_of(row: Any) -> ShotLink:
+def build_link_from_row(row: Any) -> ShotLink:
     """The link of a row."""
-    live, replay = shots_of_link(row)
+    live, replay = parse_linked_shots(row)
     stored, instants = (
         parse_json_column(row.map),
         tuple(Instant(*one) for one in parse_json_column(row.instants)),
@@ -268,5 +270,5 @@ def link_of(row: Any) -> ShotLink:
         map=made,
         actor=row.actor,
         created=row.created,
-        etag=etag_of(row),
+        etag=make_link_etag(row),
     )

@@ -20,15 +20,15 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
 from app.features.groups.state import require_etag
-from app.features.recordings.index import frame_seconds
+from app.features.recordings.index import read_frame_times
 from app.features.recordings.link_values import (
     LinkedShot,
     LinkMap,
     ShotLink,
-    described,
-    etag_of,
-    link_of,
-    shots_of_link,
+    build_link_from_row,
+    make_link_etag,
+    make_link_map,
+    parse_linked_shots,
 )
 from app.features.recordings.queries import (
     RecordingRow,
@@ -38,10 +38,10 @@ from app.features.recordings.queries import (
     list_link_rows,
     update_link,
 )
-from app.features.recordings.service import need_recording
+from app.features.recordings.service import require_recording
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical_json_text
-from app.tracking.time_map import map_of_instants
+from app.tracking.time_map import fit_map_to_instants
 from app.wording import plural
 
 MAX_INSTANTS = 100
@@ -57,8 +57,8 @@ def list_links(store: Store, recording_id: int) -> list[ShotLink]:
         NotFoundError: There is no such recording.
     """
     with store.read() as session:
-        need_recording(session, recording_id)
-        return [link_of(row) for row in list_link_rows(session, recording_id)]
+        require_recording(session, recording_id)
+        return [build_link_from_row(row) for row in list_link_rows(session, recording_id)]
 
 
 def get_link(store: Store, recording_id: int, link_id: int) -> ShotLink:
@@ -68,10 +68,10 @@ def get_link(store: Store, recording_id: int, link_id: int) -> ShotLink:
         NotFoundError: The recording has no such link.
     """
     with store.read() as session:
-        return link_of(need_link(session, recording_id, link_id))
+        return build_link_from_row(require_link(session, recording_id, link_id))
 
 
-def need_link(session: Session, recording_id: int, link_id: int) -> Any:
+def require_link(session: Session, recording_id: int, link_id: int) -> Any:
     row = find_link(session, link_id)
     if row is None or recording_id not in (row.live_id, row.replay_id):
         raise NotFoundError(f"recording {recording_id} has no link {link_id}")
@@ -116,7 +116,9 @@ def add_link(
                 pointer="/replay",
             )
         rows = list_link_rows(session, live[0])
-        number = next((row.id for row in rows if _sides(row) == (live, replay)), None)
+        number = next(
+            (row.id for row in rows if _get_live_and_replay_frames(row) == (live, replay)), None
+        )
         if number is None:
             if len(rows) >= MAX_LINKS:
                 raise InputError(f"a recording has at most {MAX_LINKS:,} links")
@@ -130,8 +132,8 @@ def add_link(
                 assumed_speed=None,
                 map=canonical_json_text(asdict(LinkMap("none"))),
             )
-            note_link(session, actor, "replay linked", find_link(session, number))
-        found = link_of(find_link(session, number))
+            log_link_event(session, actor, "replay linked", find_link(session, number))
+        found = build_link_from_row(find_link(session, number))
         session.respond(found)
     return found
 
@@ -139,7 +141,7 @@ def add_link(
 _SIDE = ("id", "first", "last")
 
 
-def _sides(row: Any) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
+def _get_live_and_replay_frames(row: Any) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
     return (row.live_id, row.live_first, row.live_last), (
         row.replay_id,
         row.replay_first,
@@ -150,7 +152,7 @@ def _sides(row: Any) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
 def _require_shot(
     session: Session, recording: int, first: int, last: int, pointer: str
 ) -> RecordingRow:
-    row = need_recording(session, recording)
+    row = require_recording(session, recording)
     if row.facts is None:
         raise ConflictError(
             f'the recording "{row.name}" is not indexed yet',
@@ -166,7 +168,7 @@ def _require_shot(
     return row
 
 
-def note_link(session: Session, actor: str, did: str, row: Any) -> None:
+def log_link_event(session: Session, actor: str, did: str, row: Any) -> None:
     """Write into the log what somebody did to a link."""
     what = {"link": row.id, "live": row.live_name, "replay": row.replay_name}
     frames = {"live_first": row.live_first, "replay_first": row.replay_first}
@@ -201,28 +203,28 @@ def set_instants(
         StaleRevisionError: Somebody else was faster.
     """
     with store.read() as session:
-        seen = need_link(session, recording_id, link_id)
+        seen = require_link(session, recording_id, link_id)
     if if_match is not None:
-        require_etag(etag_of(seen), if_match, "this link")
+        require_etag(make_link_etag(seen), if_match, "this link")
     # The map takes a while: others write meanwhile. It depends on the shots alone, which stay as they are.
-    pairs = _sound(instants, *shots_of_link(seen))
-    made, residuals = _map_of(store.settings, seen, pairs, assumed_speed)
+    pairs = _validate_instants(instants, *parse_linked_shots(seen))
+    made, residuals = _compute_link_map(store.settings, seen, pairs, assumed_speed)
     with store.write() as session:
-        row = need_link(session, recording_id, link_id)
+        row = require_link(session, recording_id, link_id)
         if if_match is not None:
-            require_etag(etag_of(row), if_match, "this link")
+            require_etag(make_link_etag(row), if_match, "this link")
         if (row.live_sha256, row.replay_sha256) != (seen.live_sha256, seen.replay_sha256):
             raise ConflictError(
                 "the file of a recording has changed since then", hint="Link the shots again."
             )
-        if save_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
-            note_link(session, actor, "instants linked", row)
-        found = link_of(find_link(session, link_id))
+        if save_link_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
+            log_link_event(session, actor, "instants linked", row)
+        found = build_link_from_row(find_link(session, link_id))
         session.respond(found)
     return found
 
 
-def save_map(
+def save_link_map(
     session: Session,
     row: Any,
     pairs: Sequence[tuple[int, int]],
@@ -250,13 +252,13 @@ def remove_link(store: Store, recording_id: int, link_id: int, *, actor: str) ->
         NotFoundError: The recording has no such link.
     """
     with store.write() as session:
-        row = need_link(session, recording_id, link_id)
+        row = require_link(session, recording_id, link_id)
         delete_link(session, link_id)
-        note_link(session, actor, "link removed", row)
+        log_link_event(session, actor, "link removed", row)
         session.respond(None)
 
 
-def _sound(
+def _validate_instants(
     instants: Sequence[tuple[int, int]], live: LinkedShot, replay: LinkedShot
 ) -> list[tuple[int, int]]:
     """The instants by the frames of the replay."""
@@ -282,45 +284,45 @@ def _sound(
     return pairs
 
 
-def shot_seconds(settings: Settings, sha256: str | None, shot: LinkedShot) -> FloatArray:
+def read_shot_times(settings: Settings, sha256: str | None, shot: LinkedShot) -> FloatArray:
     """When the frames of a shot are shown, seconds after its first one, shape (N,)."""
     if sha256 is None:
         raise ConflictError(f'"{shot.name}" is not indexed yet', hint="Index it again.")
-    seconds = frame_seconds(settings, sha256)[shot.first : shot.last + 1]
+    seconds = read_frame_times(settings, sha256)[shot.first : shot.last + 1]
     return np.asarray(seconds - seconds[0])
 
 
-def step_of(seconds: FloatArray) -> float:
+def compute_frame_interval(seconds: FloatArray) -> float:
     """Usual time between two frames, seconds."""
     steps = np.diff(seconds)
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.04
 
 
-def _map_of(
+def _compute_link_map(
     settings: Settings,
     row: Any,
     pairs: Sequence[tuple[int, int]],
     assumed_speed: float | None,
 ) -> tuple[LinkMap, list[float | None]]:
     """The map of instants, and the residual of each in live frames."""
-    _, replay = shots_of_link(row)
-    live_times, times = link_seconds(settings, row)
-    given = instant_seconds(row, pairs, live_times, times)
-    found = map_of_instants(given, step_of(live_times), assumed_speed)
-    made = described(found, replay, times, "instants" if pairs else None)
-    return made, residuals_of(made, given, live_times)
+    _, replay = parse_linked_shots(row)
+    live_times, times = read_link_times(settings, row)
+    given = compute_instant_times(row, pairs, live_times, times)
+    found = fit_map_to_instants(given, compute_frame_interval(live_times), assumed_speed)
+    made = make_link_map(found, replay, times, "instants" if pairs else None)
+    return made, compute_link_residuals(made, given, live_times)
 
 
-def link_seconds(settings: Settings, row: Any) -> tuple[FloatArray, FloatArray]:
+def read_link_times(settings: Settings, row: Any) -> tuple[FloatArray, FloatArray]:
     """When the frames of the live shot and of the replay are shown, seconds after the first ones."""
-    live, replay = shots_of_link(row)
+    live, replay = parse_linked_shots(row)
     return (
-        shot_seconds(settings, row.live_sha256, live),
-        shot_seconds(settings, row.replay_sha256, replay),
+        read_shot_times(settings, row.live_sha256, live),
+        read_shot_times(settings, row.replay_sha256, replay),
     )
 
 
-def instant_seconds(
+def compute_instant_times(
     row: Any, pairs: Sequence[tuple[int, int]], live: FloatArray, replay: FloatArray
 ) -> FloatArray:
     """Live and replay time of instants, from the times of the frames, shape (N, 2)."""
@@ -328,11 +330,13 @@ def instant_seconds(
     return np.array(given).reshape(-1, 2)
 
 
-def residuals_of(made: LinkMap, given: FloatArray, live: FloatArray) -> list[float | None]:
+def compute_link_residuals(
+    made: LinkMap, given: FloatArray, live: FloatArray
+) -> list[float | None]:
     """Live frames by which a map puts instants later, from their times and those of the live frames."""
     if not made.is_usable:
         return [None] * len(given)
     residuals: list[float | None] = (
-        (made.live(given[:, 1]) - given[:, 0]) / step_of(live)
+        (made.live(given[:, 1]) - given[:, 0]) / compute_frame_interval(live)
     ).tolist()
     return residuals

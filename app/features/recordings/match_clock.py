@@ -30,7 +30,7 @@ class MatchClock:
     seconds: float
 
 
-def require_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchClock]:
+def validate_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchClock]:
     """The readings by their frames.
 
     Raises:
@@ -55,7 +55,7 @@ def require_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchClock
     return found
 
 
-def match_time(
+def compute_match_time(
     clocks: Sequence[MatchClock], seconds: FloatArray, frame: int
 ) -> tuple[int, float] | None:
     """Half and time of the match in a frame; None where nobody has read the clock.
@@ -65,13 +65,13 @@ def match_time(
         seconds: When each frame of the recording is shown, shape (N,).
         frame: Number of the frame.
     """
-    clock = clock_at(clocks, frame)
+    clock = find_clock_at_frame(clocks, frame)
     if clock is None:
         return None
     return clock.half, clock.seconds + float(seconds[frame] - seconds[clock.frame])
 
 
-def clock_at(clocks: Sequence[MatchClock], frame: int) -> MatchClock | None:
+def find_clock_at_frame(clocks: Sequence[MatchClock], frame: int) -> MatchClock | None:
     """The reading of the clock that holds in a frame; None where nobody has read it."""
     before = [clock for clock in clocks if clock.frame <= frame]
     return before[-1] if before else next(iter(clocks), None)

@@ -41,7 +41,7 @@ class RecordingRow(Protocol):
     groups: int
 
 
-def _rows() -> Select[Any]:
+def _select_recordings() -> Select[Any]:
     columns = (
         column for column in RecordingModel.__table__.columns if column.name not in ("actor",)
     )
@@ -60,9 +60,9 @@ def _rows() -> Select[Any]:
     ).join_from(RecordingModel, DatasetModel, DatasetModel.id == RecordingModel.dataset_id)
 
 
-def list_rows(session: Session, dataset_id: int | None = None) -> Sequence[RecordingRow]:
+def list_recording_rows(session: Session, dataset_id: int | None = None) -> Sequence[RecordingRow]:
     """The recordings of a dataset, or of all, the newest first."""
-    statement = _rows().order_by(RecordingModel.id.desc())
+    statement = _select_recordings().order_by(RecordingModel.id.desc())
     if dataset_id is not None:
         statement = statement.where(RecordingModel.dataset_id == dataset_id)
     return cast(Sequence[RecordingRow], session.execute(statement).all())
@@ -70,17 +70,19 @@ def list_rows(session: Session, dataset_id: int | None = None) -> Sequence[Recor
 
 def find_recording(session: Session, recording_id: int) -> RecordingRow | None:
     """A recording by its id."""
-    found = session.execute(_rows().where(RecordingModel.id == recording_id)).one_or_none()
+    found = session.execute(
+        _select_recordings().where(RecordingModel.id == recording_id)
+    ).one_or_none()
     return cast(RecordingRow | None, found)
 
 
-def names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
+def list_names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
     """``id``, ``name``, ``path`` and ``sha256`` of a dataset's recordings."""
     columns = (RecordingModel.id, RecordingModel.name, RecordingModel.path, RecordingModel.sha256)
     return session.execute(select(*columns).where(RecordingModel.dataset_id == dataset_id)).all()
 
 
-def taken_frames(session: Session, dataset_id: int, name: str) -> Sequence[Any]:
+def list_group_keys_of_recording(session: Session, dataset_id: int, name: str) -> Sequence[Any]:
     """``key`` and ``id`` of the groups that were taken from a recording."""
     statement = select(GroupModel.key, GroupModel.id).where(
         GroupModel.dataset_id == dataset_id, GroupModel.match == name
@@ -88,13 +90,13 @@ def taken_frames(session: Session, dataset_id: int, name: str) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def match_names(session: Session, dataset_id: int) -> set[str]:
+def list_match_names(session: Session, dataset_id: int) -> set[str]:
     """The matches of a dataset's groups."""
     statement = select(GroupModel.match).where(GroupModel.dataset_id == dataset_id).distinct()
     return set(session.scalars(statement))
 
 
-def matches_of_video(session: Session, dataset_id: int, sha256: str) -> list[str]:
+def list_matches_of_video(session: Session, dataset_id: int, sha256: str) -> list[str]:
     """The matches of groups whose first view shows a frame of a video, that with most of them first."""
     statement = (
         select(GroupModel.match)
@@ -148,7 +150,7 @@ def list_tracked_stretches(session: Session, recording_id: int) -> Sequence[Any]
     return session.execute(statement.order_by(model.first)).all()
 
 
-def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[FrameView]:
+def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[FrameView]:
     """The views of a dataset that show a frame of a video, in any group: their pictures are kept below its sha256."""
     kept = ViewModel.media_path
     statement = (
@@ -166,7 +168,9 @@ def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[Frame
     return found
 
 
-def delete_overlapping(session: Session, recording_id: int, first: int, last: int) -> Sequence[Any]:
+def delete_overlapping_cameras(
+    session: Session, recording_id: int, first: int, last: int
+) -> Sequence[Any]:
     """Delete what shares a frame with a stretch; returns its rows."""
     rows = list_tracked_stretches(session, recording_id)
     gone = [row for row in rows if row.first <= last and first <= row.last]
@@ -181,13 +185,13 @@ def insert_cameras(session: Session, **values: Any) -> None:
     session.execute(insert(ShotCamerasModel), [row])
 
 
-def digests_of(session: Session) -> set[str]:
+def list_camera_digests(session: Session) -> set[str]:
     """The digests of all files of cameras that are in use."""
     rows = session.execute(select(ShotCamerasModel.digest, ShotCamerasModel.before))
     return {digest for row in rows for digest in row if digest is not None}
 
 
-def list_run_rows(session: Session, recording_id: int) -> Sequence[Any]:
+def list_ball_run_rows(session: Session, recording_id: int) -> Sequence[Any]:
     """The runs of a recording by their first frames."""
     model = BallRunModel
     statement = select(*list_columns_with_shown_actor(model)).where(
@@ -196,7 +200,7 @@ def list_run_rows(session: Session, recording_id: int) -> Sequence[Any]:
     return session.execute(statement.order_by(model.first, model.id)).all()
 
 
-def find_run(session: Session, run_id: int) -> Any | None:
+def find_ball_run(session: Session, run_id: int) -> Any | None:
     """A run by its id."""
     statement = select(*list_columns_with_shown_actor(BallRunModel)).where(
         BallRunModel.id == run_id
@@ -204,7 +208,7 @@ def find_run(session: Session, run_id: int) -> Any | None:
     return session.execute(statement).one_or_none()
 
 
-def insert_run(session: Session, actor: str, **values: Any) -> int:
+def insert_ball_run(session: Session, actor: str, **values: Any) -> int:
     """Insert a run; returns its id."""
     identity = find_next_row_id(session, BallRunModel)
     new = {"groups": "{}", "confirmed": "[]", "accepted_by": None, "revision": 0}
@@ -213,17 +217,17 @@ def insert_run(session: Session, actor: str, **values: Any) -> int:
     return identity
 
 
-def update_run(session: Session, run_id: int, **values: Any) -> None:
+def update_ball_run(session: Session, run_id: int, **values: Any) -> None:
     """Change columns of a run."""
     session.execute(update(BallRunModel).where(BallRunModel.id == run_id).values(values))
 
 
-def delete_run(session: Session, run_id: int) -> None:
+def delete_ball_run(session: Session, run_id: int) -> None:
     """Delete a run."""
     session.execute(delete(BallRunModel).where(BallRunModel.id == run_id))
 
 
-def predicted_in(session: Session, views: Sequence[FrameView]) -> dict[int, list[Any]]:
+def read_predicted_boxes(session: Session, views: Sequence[FrameView]) -> dict[int, list[Any]]:
     """Boxes that detectors predicted in views, by number of the frame that a view shows."""
     numbers = {(view.group, view.key): view.number for view in views}
     model = PredictionModel
@@ -245,7 +249,7 @@ def predicted_in(session: Session, views: Sequence[FrameView]) -> dict[int, list
 _LIVE, _REPLAY = aliased(RecordingModel), aliased(RecordingModel)
 
 
-def _links() -> Select[Any]:
+def _select_links() -> Select[Any]:
     columns = (column for column in ShotLinkModel.__table__.columns if column.name != "actor")
     actor = shown_actor_column(ShotLinkModel.actor, ShotLinkModel.created).label("actor")
     sides = (
@@ -264,12 +268,12 @@ def list_link_rows(session: Session, recording_id: int) -> Sequence[Any]:
     """The links whose live shot or whose replay is of a recording, by their live frames."""
     mine = or_(ShotLinkModel.live_id == recording_id, ShotLinkModel.replay_id == recording_id)
     order = (ShotLinkModel.live_id, ShotLinkModel.live_first, ShotLinkModel.id)
-    return session.execute(_links().where(mine).order_by(*order)).all()
+    return session.execute(_select_links().where(mine).order_by(*order)).all()
 
 
 def find_link(session: Session, link_id: int) -> Any | None:
     """A link by its id."""
-    return session.execute(_links().where(ShotLinkModel.id == link_id)).one_or_none()
+    return session.execute(_select_links().where(ShotLinkModel.id == link_id)).one_or_none()
 
 
 def insert_link(session: Session, actor: str, **values: Any) -> int:

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from app.features.datasets.service import dataset_id
 from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.recordings.jobs import (
     InstantOptions,
     request_index,
@@ -33,7 +33,7 @@ from app.features.recordings.service import (
     remove_recording,
     set_clocks,
 )
-from app.features.recordings.shots import RecordingShots, get_shots, put_shots, shots_csv
+from app.features.recordings.shots import RecordingShots, format_shots_csv, get_shots, replace_shots
 from app.http.cursor import paged
 from app.http.deps import (
     Actor,
@@ -45,13 +45,18 @@ from app.http.deps import (
     SeesWhole,
     is_not_modified,
 )
-from app.http.documents import document, make_empty_response, respond_with, respond_with_document
+from app.http.documents import (
+    make_document_responder,
+    make_document_response,
+    make_empty_response,
+    respond_with,
+)
 from app.http.errors import add_current_state_to_conflicts
-from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
-from app.json_text import MAX_ID, digest_of
+from app.json_text import MAX_ID, digest_content
 from app.media.images import JPEG
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
@@ -70,7 +75,7 @@ OfDataset = Annotated[
 
 
 @router.get("", operation_id="listRecordings", responses=responses(404))
-@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
+@may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 @paged()
 def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None) -> RecordingList:
     """Recordings of a dataset, or of all that one sees."""
@@ -78,7 +83,9 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
     return RecordingList(items=[one for one in found if sight.sees(one.dataset_id)])
 
 
-@router.post("", operation_id="addRecording", **openapi_of_job_response(404, 413, 415, 503))
+@router.post(
+    "", operation_id="addRecording", **describe_job_response_for_openapi(404, 413, 415, 503)
+)
 @may(
     Action.LEAD,
     body={
@@ -122,7 +129,7 @@ def get_one(recording: Id, store: AppStore) -> Recording:
     responses=responses(404, 413, 415),
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@respond_with(respond_with_document(RecordingDocument.model_validate))
+@respond_with(make_document_responder(RecordingDocument.model_validate))
 def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: Actor) -> Recording:
     """Say what the clock of the match shows in frames of a recording; others follow from them.
 
@@ -163,7 +170,7 @@ async def get_frame(
     """A frame as JPEG, scaled down when a width is given; exactly the one of that number."""
     found = await to_thread.run_sync(get_recording, services.store, recording)
     sha256, wide = found.require_readable(), clamp_width(width)
-    etag = f'"{digest_of(f"{sha256} {frame} {wide}".encode())}"'
+    etag = f'"{digest_content(f"{sha256} {frame} {wide}".encode())}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
@@ -175,8 +182,8 @@ async def get_frame(
     return Response(data, media_type=JPEG, headers=headers)
 
 
-def _tagged(found: RecordingShots) -> Response:
-    return document(ShotList.of(found), 200, {"ETag": found.etag})
+def _make_shots_response(found: RecordingShots) -> Response:
+    return make_document_response(ShotList.of(found), 200, {"ETag": found.etag})
 
 
 @router.get(
@@ -206,7 +213,9 @@ def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
 def get_shots_file(recording: Id, store: AppStore) -> Response:
     """The same as CSV, a row for each shot."""
     headers = {"Content-Disposition": 'attachment; filename="touchline-shots.csv"'}
-    return Response(shots_csv(get_shots(store, recording)), headers=headers, media_type=CSV_FILE)
+    return Response(
+        format_shots_csv(get_shots(store, recording)), headers=headers, media_type=CSV_FILE
+    )
 
 
 @router.put(
@@ -216,16 +225,18 @@ def get_shots_file(recording: Id, store: AppStore) -> Response:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@respond_with(_tagged)
+@respond_with(_make_shots_response)
 def set_shots(
     recording: Id, wanted: ShotsEdit, store: AppStore, actor: Actor, if_match: IfMatch
 ) -> RecordingShots:
     """Replace the list of shots: split, merged, of another kind, kept or dropped."""
     with add_current_state_to_conflicts(lambda: ShotList.of(get_shots(store, recording))):
-        return put_shots(store, recording, wanted.values(), if_match, actor=actor)
+        return replace_shots(store, recording, wanted.values(), if_match, actor=actor)
 
 
-@router.post("/{recording}/shots", operation_id="findShots", **openapi_of_job_response(404))
+@router.post(
+    "/{recording}/shots", operation_id="findShots", **describe_job_response_for_openapi(404)
+)
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
@@ -241,7 +252,7 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
 @router.post(
     "/{recording}/groups",
     operation_id="takeInstants",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)

@@ -12,25 +12,25 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.json_columns import parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import find_dataset
-from app.features.datasets.service import insert_dataset, require_name
-from app.features.recordings.match_clock import MatchClock, require_clocks
+from app.features.datasets.service import insert_dataset, require_valid_name
+from app.features.recordings.match_clock import MatchClock, validate_clocks
 from app.features.recordings.queries import (
     RecordingRow,
     delete_recording,
     find_recording,
     insert_recording,
-    list_rows,
-    match_names,
-    matches_of_video,
-    names_and_paths,
-    taken_frames,
+    list_group_keys_of_recording,
+    list_match_names,
+    list_matches_of_video,
+    list_names_and_paths,
+    list_recording_rows,
     update_recording,
 )
 from app.formats.frame_names import VIDEO_SUFFIXES
@@ -103,7 +103,7 @@ class Recording:
 def list_recordings(store: Store, dataset_id: int | None = None) -> list[Recording]:
     """The recordings of a dataset, or of all, the newest first."""
     with store.read() as session:
-        return [recording_of(row) for row in list_rows(session, dataset_id)]
+        return [build_recording_from_row(row) for row in list_recording_rows(session, dataset_id)]
 
 
 def get_recording(store: Store, recording_id: int) -> Recording:
@@ -113,10 +113,10 @@ def get_recording(store: Store, recording_id: int) -> Recording:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        return recording_of(need_recording(session, recording_id))
+        return build_recording_from_row(require_recording(session, recording_id))
 
 
-def need_recording(session: Session, recording_id: int) -> RecordingRow:
+def require_recording(session: Session, recording_id: int) -> RecordingRow:
     """The row of a recording; raises NotFoundError when there is none."""
     row = find_recording(session, recording_id)
     if row is None:
@@ -137,19 +137,19 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
     Raises:
         InputError: The name of the dataset cannot be one.
     """
-    with store.write() as session, without_response():
+    with store.write() as session, without_pending_response():
         row = find_dataset(session, dataset)
         if row is None:
-            require_name(dataset, "a dataset", pointer="/dataset")
+            require_valid_name(dataset, "a dataset", pointer="/dataset")
         number = insert_dataset(session, dataset, TOUCHLINE, actor) if row is None else int(row.id)
-        known = names_and_paths(session, number)
+        known = list_names_and_paths(session, number)
         there = next((row.id for row in known if row.path == str(path)), None)
         if there is None:
-            taken = {row.name for row in known} | match_names(session, number)
-            name = _free_name(path.stem, taken)
+            taken = {row.name for row in known} | list_match_names(session, number)
+            name = _make_unused_name(path.stem, taken)
             there = insert_recording(session, number, name, str(path), actor=actor)
             add_audit_event(session, actor, "recording added", number, recording=there, name=name)
-        return recording_of(need_recording(session, there))
+        return build_recording_from_row(require_recording(session, there))
 
 
 def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
@@ -159,7 +159,7 @@ def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
         NotFoundError: There is none.
     """
     with store.write() as session:
-        row = need_recording(session, recording_id)
+        row = require_recording(session, recording_id)
         delete_recording(session, recording_id)
         what: Details = {"recording": recording_id, "name": row.name}
         add_audit_event(session, actor, "recording removed", row.dataset_id, **what)
@@ -172,23 +172,23 @@ def set_clocks(
     """Replace the readings of the clock of the match; groups that are taken later tell its time.
 
     Raises:
-        InputError: As ``require_clocks``.
+        InputError: As ``validate_clocks``.
         NotFoundError: There is no such recording.
     """
     with store.write() as session:
-        row = need_recording(session, recording_id)
-        found = require_clocks(clocks, parse_json_column(row.facts)["frames"] if row.facts else 0)
+        row = require_recording(session, recording_id)
+        found = validate_clocks(clocks, parse_json_column(row.facts)["frames"] if row.facts else 0)
         text = canonical_json_text([asdict(clock) for clock in found]) if found else None
         if text != row.clocks:
             update_recording(session, recording_id, clocks=text)
             what: Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
             add_audit_event(session, actor, "match clock set", row.dataset_id, **what)
-        recording = recording_of(need_recording(session, recording_id))
+        recording = build_recording_from_row(require_recording(session, recording_id))
         session.respond(recording)
     return recording
 
 
-def require_video(path: Path) -> Path:
+def require_video_file(path: Path) -> Path:
     """A file whose name is that of a video; what it is, indexing says.
 
     Raises:
@@ -202,30 +202,30 @@ def require_video(path: Path) -> Path:
     return path
 
 
-def name_of_video(session: Session, row: RecordingRow, sha256: str) -> str:
+def choose_name_for_video(session: Session, row: RecordingRow, sha256: str) -> str:
     """The name of a recording that shows another video now: its groups have it as their match, and no others.
 
     Groups that were taken from the same video before, also of a recording that was removed since, are its own again.
     """
-    known = names_and_paths(session, row.dataset_id)
+    known = list_names_and_paths(session, row.dataset_id)
     others = {one.name for one in known if one.id != row.id}
-    mine = matches_of_video(session, row.dataset_id, sha256)
+    mine = list_matches_of_video(session, row.dataset_id, sha256)
     again = next((match for match in mine if match and match not in others), None)
-    matches = match_names(session, row.dataset_id)
+    matches = list_match_names(session, row.dataset_id)
     if again is not None or row.name not in matches:
         return again or row.name
-    return _free_name(row.name, others | matches)
+    return _make_unused_name(row.name, others | matches)
 
 
-def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
+def find_groups_of_recording(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
-        rows = taken_frames(session, recording.dataset_id, recording.name)
+        rows = list_group_keys_of_recording(session, recording.dataset_id, recording.name)
     ids = {row.key: int(row.id) for row in rows}
-    return {number: ids[key] for number, key in frames_of_keys(ids).items()}
+    return {number: ids[key] for number, key in map_frames_to_group_keys(ids).items()}
 
 
-def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
+def map_frames_to_group_keys(keys: Iterable[str]) -> dict[int, str]:
     """Keys of groups that were taken from a recording, by the number of their frame."""
     found = {}
     for key in keys:
@@ -235,7 +235,7 @@ def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
     return found
 
 
-def recording_of(row: RecordingRow) -> Recording:
+def build_recording_from_row(row: RecordingRow) -> Recording:
     """The recording of a row."""
     path = Path(row.path)
     facts: Mapping[str, Any] = {} if row.facts is None else parse_json_column(row.facts)
@@ -252,21 +252,21 @@ def recording_of(row: RecordingRow) -> Recording:
         **{name: facts.get(name) for name in (*names, *shape)},
         shots=len(parse_json_column(row.shots)),
         groups=int(row.groups),
-        problem=None if row.stamp is None else _problem(path, row.stamp),
+        problem=None if row.stamp is None else _describe_file_problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
         clocks=tuple(MatchClock(**one) for one in parse_json_column(row.clocks or "[]")),
     )
 
 
-def _problem(path: Path, stamp: str) -> str | None:
-    present = file_stamp(path)
+def _describe_file_problem(path: Path, stamp: str) -> str | None:
+    present = compute_file_stamp(path)
     if present is None:
         return f"{path.name} is no longer in the place that it was imported from"
     return None if present == stamp else f"{path.name} has changed since it was indexed"
 
 
-def file_stamp(path: Path) -> str | None:
+def compute_file_stamp(path: Path) -> str | None:
     """Size and time of change of a file; None where there is none, or a link that may lead anywhere."""
     try:
         status = path.lstat()
@@ -279,7 +279,7 @@ def file_stamp(path: Path) -> str | None:
     )
 
 
-def _free_name(stem: str, taken: set[str]) -> str:
+def _make_unused_name(stem: str, taken: set[str]) -> str:
     """A name for a recording that no other of its dataset has."""
     clean = _UNSAFE.sub("_", stem).strip(" .")[:100] or "recording"
     name, number = clean, 2

@@ -11,11 +11,16 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.service import add_audit_event
 from app.features.groups.state import require_etag
-from app.features.recordings.index import frame_seconds, in_worker, shots_of
+from app.features.recordings.index import detect_shots_in_file, read_frame_times, run_in_worker
 from app.features.recordings.queries import RecordingRow, update_recording
-from app.features.recordings.service import Details, Recording, need_recording, recording_of
-from app.formats.csv_text import csv_line
-from app.json_text import canonical_json_text, digest_of
+from app.features.recordings.service import (
+    Details,
+    Recording,
+    build_recording_from_row,
+    require_recording,
+)
+from app.formats.csv_text import format_csv_line
+from app.json_text import canonical_json_text, digest_content
 from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
 from app.wording import plural
@@ -68,10 +73,10 @@ def detect_shots_again(
     """
     before = get_shots(store, recording_id)
     path, sha256 = before.recording.path, before.recording.require_readable()
-    asked = (shots_of, store.settings, sha256)
-    found = in_worker(path, *asked, progress=progress, stop=stop)
+    asked = (detect_shots_in_file, store.settings, sha256)
+    found = run_in_worker(path, *asked, progress=progress, stop=stop)
     shots = [Shot(**one) for one in found]
-    return put_shots(store, recording_id, shots, before.etag, actor=actor)
+    return replace_shots(store, recording_id, shots, before.etag, actor=actor)
 
 
 def get_shots(store: Store, recording_id: int) -> RecordingShots:
@@ -81,21 +86,21 @@ def get_shots(store: Store, recording_id: int) -> RecordingShots:
         NotFoundError: There is no such recording.
     """
     with store.read() as session:
-        row = need_recording(session, recording_id)
-    return _shots(store.settings, row)
+        row = require_recording(session, recording_id)
+    return _build_recording_shots(store.settings, row)
 
 
-def shots_csv(found: RecordingShots) -> str:
+def format_shots_csv(found: RecordingShots) -> str:
     """The shots of a recording as CSV, a row for each."""
     columns = ("first", "last", "start_s", "end_s", "kind", "entered_by", "kept")
-    lines = [csv_line(("recording", "shot", *columns))]
+    lines = [format_csv_line(("recording", "shot", *columns))]
     for number, (shot, times) in enumerate(zip(found.items, found.times, strict=True), 1):
         place = (found.recording.name, number, shot.first, shot.last, *times)
-        lines.append(csv_line((*place, shot.kind, shot.entered_by, shot.kept)))
+        lines.append(format_csv_line((*place, shot.kind, shot.entered_by, shot.kept)))
     return "".join(lines)
 
 
-def put_shots(
+def replace_shots(
     store: Store, recording_id: int, shots: Sequence[Shot], if_match: str | None, *, actor: str
 ) -> RecordingShots:
     """Replace the list of shots: split, merged, of other kinds, kept or dropped.
@@ -112,22 +117,22 @@ def put_shots(
         StaleRevisionError: Somebody else was faster.
     """
     with store.write() as session:
-        row = need_recording(session, recording_id)
+        row = require_recording(session, recording_id)
         if if_match is not None:
-            require_etag(_etag(row), if_match, f'the list of shots of "{row.name}"')
+            require_etag(_make_shots_etag(row), if_match, f'the list of shots of "{row.name}"')
         frames = parse_json_column(row.facts)["frames"] if row.facts else 0
-        _require_sound(shots, frames)
+        _validate_shots(shots, frames)
         text = canonical_json_text([asdict(shot) for shot in shots])
         if text != row.shots:
             update_recording(session, recording_id, shots=text, revision=row.revision + 1)
             what: Details = {"recording": recording_id, "name": row.name, "shots": len(shots)}
             add_audit_event(session, actor, "shots changed", row.dataset_id, **what)
-        found = _shots(store.settings, need_recording(session, recording_id))
+        found = _build_recording_shots(store.settings, require_recording(session, recording_id))
         session.respond(found)
     return found
 
 
-def _require_sound(shots: Sequence[Shot], frames: int) -> None:
+def _validate_shots(shots: Sequence[Shot], frames: int) -> None:
     if len(shots) > MAX_SHOTS:
         raise InputError(f"a recording has at most {MAX_SHOTS:,} shots", pointer="/shots")
     before = -1
@@ -141,16 +146,16 @@ def _require_sound(shots: Sequence[Shot], frames: int) -> None:
         before = shot.last
 
 
-def _shots(settings: Settings, row: RecordingRow) -> RecordingShots:
-    recording = recording_of(row)
+def _build_recording_shots(settings: Settings, row: RecordingRow) -> RecordingShots:
+    recording = build_recording_from_row(row)
     items = tuple(Shot(**shot) for shot in parse_json_column(row.shots))
     times: tuple[tuple[float, float], ...] = ()
     if items and recording.sha256 is not None:
-        seconds = frame_seconds(settings, recording.sha256)
+        seconds = read_frame_times(settings, recording.sha256)
         ends = ((float(seconds[shot.first]), float(seconds[shot.last])) for shot in items)
         times = tuple(ends)
-    return RecordingShots(recording, items, times, _etag(row))
+    return RecordingShots(recording, items, times, _make_shots_etag(row))
 
 
-def _etag(row: RecordingRow) -> str:
-    return f'"{row.revision}-{digest_of(row.shots.encode())[:12]}"'
+def _make_shots_etag(row: RecordingRow) -> str:
+    return f'"{row.revision}-{digest_content(row.shots.encode())[:12]}"'

@@ -15,7 +15,7 @@ from app.features.verdicts import service as reviewers
 from app.features.verdicts.service import Reviewer
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
-from app.http.documents import ListDocument, document, respond_with
+from app.http.documents import ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -56,7 +56,7 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
 
 def _saved_view_response(view: SavedView) -> Response:
     headers = {"Location": f"/api/v1/saved-views/{view.id}"}
-    return document(view, 201, headers)
+    return make_document_response(view, 201, headers)
 
 
 @router.post(
@@ -98,7 +98,7 @@ def get_saved_view(view: Id, store: AppStore) -> SavedView:
     responses=responses(404),
 )
 @may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
-@respond_with(document)
+@respond_with(make_document_response)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
     return saved_views.delete_view(store, view)

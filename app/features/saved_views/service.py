@@ -10,7 +10,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import strip_and_check_title
 from app.features.people.visibility_queries import sees_all_work
 from app.features.queue.fields import query_reveals_hidden_work
-from app.features.queue.queries import Listing
+from app.features.queue.queries import GroupListing
 from app.features.queue.query import parse_query
 from app.features.saved_views.queries import (
     SavedViewModel,
@@ -20,7 +20,7 @@ from app.features.saved_views.queries import (
     list_saved_views_of_dataset,
 )
 from app.json_text import Moment
-from app.soccer.actors import LOCAL_USER, person_of
+from app.soccer.actors import LOCAL_USER, person_of_actor
 
 MAX_VIEWS = 200
 """Of one dataset: a list that people read."""
@@ -77,8 +77,8 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
             raise ConflictError(
                 f"a dataset has at most {MAX_VIEWS} saved views", hint="Delete one first."
             )
-        own = sum(person_of(row.actor) == person_of(actor) for row in rows)
-        if own >= MAX_OWN and person_of(actor) != LOCAL_USER:
+        own = sum(person_of_actor(row.actor) == person_of_actor(actor) for row in rows)
+        if own >= MAX_OWN and person_of_actor(actor) != LOCAL_USER:
             raise ConflictError(
                 f"one person has at most {MAX_OWN} saved views in a dataset",
                 hint="Delete one of your saved views first.",
@@ -126,7 +126,7 @@ def _count_matching_groups(session: Session, row: SavedViewModel) -> int:
         conditions = parse_query(row.query).conditions
     except InputError:
         return 0
-    return Listing(session, row.dataset_id, conditions).count()
+    return GroupListing(session, row.dataset_id, conditions).count()
 
 
 def _saved_view(row: SavedViewModel, groups: int) -> SavedView:

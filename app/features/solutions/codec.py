@@ -39,7 +39,7 @@ def to_json(value: Any) -> Any:
     A field that came later (``metadata``) stands there only where it says something, so that what
     was computed before it came is the same bytes.
     """
-    return _codec_of_type(type(value))[0](value)
+    return _get_codec(type(value))[0](value)
 
 
 def from_json(kind: type[T], value: Any) -> T:
@@ -49,7 +49,7 @@ def from_json(kind: type[T], value: Any) -> T:
         DamagedError: It is not what ``to_json`` makes.
     """
     with report_damaged_values():
-        result: T = _codec_of_type(kind)[1](value)
+        result: T = _get_codec(kind)[1](value)
     return result
 
 
@@ -58,22 +58,28 @@ def solution_json_text(value: Any) -> str:
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False)
     except ValueError:
-        return json.dumps(_name_non_finite(value), separators=(",", ":"), allow_nan=False)
+        return json.dumps(
+            _replace_non_finite_by_name(value), separators=(",", ":"), allow_nan=False
+        )
 
 
-def _name_non_finite(value: Any) -> Any:
+def _replace_non_finite_by_name(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, dict):
-        return {key: _name_non_finite(item) for key, item in value.items()}
-    return [_name_non_finite(item) for item in value] if isinstance(value, list | tuple) else value
+        return {key: _replace_non_finite_by_name(item) for key, item in value.items()}
+    return (
+        [_replace_non_finite_by_name(item) for item in value]
+        if isinstance(value, list | tuple)
+        else value
+    )
 
 
 def _identity(value: Any) -> Any:
     return value
 
 
-def _codec_of_type(hint: Any) -> Codec:
+def _get_codec(hint: Any) -> Codec:
     return _make_codec(hint)
 
 
@@ -102,16 +108,16 @@ def _make_codec(hint: Any) -> Codec:
 
 def _dataclass_codec(kind: Any) -> Codec:
     hints = typing.get_type_hints(kind)
-    codecs = [(item.name, *_codec_of_type(hints[item.name])) for item in dataclasses.fields(kind)]
+    codecs = [(item.name, *_get_codec(hints[item.name])) for item in dataclasses.fields(kind)]
     later = {
         item.name: item.default for item in dataclasses.fields(kind) if "later" in item.metadata
     }
 
-    def whole(value: Any) -> Any:
+    def encode_all_fields(value: Any) -> Any:
         return {name: to(getattr(value, name)) for name, to, _ in codecs}
 
     def encode(value: Any) -> Any:
-        written = whole(value)
+        written = encode_all_fields(value)
         for name, default in later.items():
             if getattr(value, name) == default:
                 del written[name]
@@ -128,9 +134,9 @@ def _dataclass_codec(kind: Any) -> Codec:
             return decode(value)
 
     if not _is_plain_json_type(kind):
-        return encode if later else whole, decode
+        return encode if later else encode_all_fields, decode
     prepare_msgspec_type(kind)
-    return encode if later else whole, decode_plain
+    return encode if later else encode_all_fields, decode_plain
 
 
 def _is_plain_json_type(hint: Any) -> bool:
@@ -143,7 +149,7 @@ def _is_plain_json_type(hint: Any) -> bool:
 
 def _optional_codec(arguments: tuple[Any, ...]) -> Codec:
     (inner,) = (item for item in arguments if item is not type(None))
-    to, back = _codec_of_type(inner)
+    to, back = _get_codec(inner)
     return (
         lambda value: None if value is None else to(value),
         lambda value: None if value is None else back(value),
@@ -152,14 +158,14 @@ def _optional_codec(arguments: tuple[Any, ...]) -> Codec:
 
 def _tuple_codec(arguments: tuple[Any, ...]) -> Codec:
     if len(arguments) == 2 and arguments[1] is Ellipsis:
-        to, back = _codec_of_type(arguments[0])
+        to, back = _get_codec(arguments[0])
         if to is _identity:
             return list, lambda value: tuple(map(back, value))
         return (
             lambda value: [to(item) for item in value],
             lambda value: tuple(map(back, value)),
         )
-    codecs = [_codec_of_type(item) for item in arguments]
+    codecs = [_get_codec(item) for item in arguments]
     return (
         lambda value: [to(item) for (to, _), item in zip(codecs, value, strict=True)],
         lambda value: tuple(back(item) for (_, back), item in zip(codecs, value, strict=True)),
@@ -214,7 +220,7 @@ def summarize_solution(group: Group, solution: Solution) -> SolutionSummary:
     ball = solution.ball
     error_px, error_percent = _reprojection_error(group, solution)
     return SolutionSummary(
-        **_gate_columns(solution),
+        **_summarize_gate_columns(solution),
         min_jac=_smallest_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
@@ -224,19 +230,19 @@ def summarize_solution(group: Group, solution: Solution) -> SolutionSummary:
         height_m=height_above_grass(ball.point[2]) if ball else None,
         findings=tuple(dict.fromkeys(finding.kind for finding in solution.findings)),
         distance_m=_ball_distance(solution),
-        box_px=_box_diameter(group, solution),
+        box_px=_find_box_diameter(group, solution),
         x_m=ball.point[0] if ball else None,
         y_m=ball.point[1] if ball else None,
-        agreement=_paint_agreement(group, solution),
+        agreement=_find_smallest_agreement(group, solution),
     )
 
 
 def summarize_gates(before: SolutionSummary, solution: Solution) -> SolutionSummary:
     """The summary of a solution that is that of ``before`` but for what its gates say."""
-    return replace(before, **_gate_columns(solution))
+    return replace(before, **_summarize_gate_columns(solution))
 
 
-def _gate_columns(solution: Solution) -> dict[str, Any]:
+def _summarize_gate_columns(solution: Solution) -> dict[str, Any]:
     """What a summary says of gates."""
     failing = solution.first_failing
     decisive = failing or _gate_nearest_to_failing(solution.gates)
@@ -271,7 +277,7 @@ def _smallest_jac(solution: Solution) -> float | None:
     return min((jac[0] for jac in measured if jac), default=None)
 
 
-def _paint_agreement(group: Group, solution: Solution) -> float | None:
+def _find_smallest_agreement(group: Group, solution: Solution) -> float | None:
     used = {view.key for view in group.views if view.included}
     found = (view.calibration.agreement for view in solution.views if view.view in used)
     return min((value for value in found if value is not None), default=None)
@@ -314,7 +320,7 @@ def _ball_distance(solution: Solution) -> float | None:
     return math.dist(ball.point, first.calibration.camera.position.tolist())
 
 
-def _box_diameter(group: Group, solution: Solution) -> float | None:
+def _find_box_diameter(group: Group, solution: Solution) -> float | None:
     annotated = {
         view.key: view.ball.box.diameter if view.ball.box is not None else None
         for view in group.views

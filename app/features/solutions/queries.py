@@ -89,7 +89,7 @@ _CALIBRATIONS = select(*_CALIBRATION.columns).where(_CALIBRATION.c.key.in_(_KEYS
 _KEPT = select(_CALIBRATION.c.key).where(_CALIBRATION.c.key.in_(_KEYS))
 
 
-def is_current() -> ColumnElement[bool]:
+def is_current_solution() -> ColumnElement[bool]:
     """Whether a solution is that of its group's present state under its dataset's policy.
 
     To join ``SolutionModel`` with, where ``GroupModel`` and ``DatasetModel`` are joined already.
@@ -102,7 +102,7 @@ def is_current() -> ColumnElement[bool]:
     )
 
 
-def is_solved() -> ColumnElement[bool]:
+def is_group_solved() -> ColumnElement[bool]:
     """Whether this solver has solved a group as it is, in a statement about rows of the queue.
 
     ``QueueModel.solved`` says so of any solver: the numbers of an earlier one stay in the row.
@@ -111,7 +111,7 @@ def is_solved() -> ColumnElement[bool]:
         select(SolutionModel.id)
         .join(GroupModel, GroupModel.id == SolutionModel.group_id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .where(GroupModel.id == QueueModel.group_id, is_current())
+        .where(GroupModel.id == QueueModel.group_id, is_current_solution())
         .correlate(QueueModel)
         .exists()
     )
@@ -191,7 +191,7 @@ def decode_calibration(body: bytes) -> Calibration:
 
 
 @lru_cache(maxsize=256)
-def decode_camera(body: bytes) -> Calibration:
+def decode_calibration_without_markings(body: bytes) -> Calibration:
     """``decode_calibration`` without its markings, which are nine tenths of it."""
     text = decompress(body)
     # Quotes within a text are escaped, so these are the names of members.
@@ -220,7 +220,7 @@ def insert_solutions(
         bodies.update(encoded.calibrations)
     insert_calibrations(session, bodies)
     wanted = {key for _, encoded in solutions for key in encoded.calibration_keys}
-    _require_calibrations(session, wanted - set(bodies))
+    _require_calibrations_stored(session, wanted - set(bodies))
     if solutions:
         session.execute(
             insert(_SOLUTION).on_conflict_do_nothing(),
@@ -228,7 +228,7 @@ def insert_solutions(
         )
 
 
-def _require_calibrations(session: Session, wanted: set[str]) -> None:
+def _require_calibrations_stored(session: Session, wanted: set[str]) -> None:
     """A dataset that is deleted takes its calibrations along, and the solver may have read one."""
     if wanted and wanted - set(session.scalars(_KEPT, {"keys": list(wanted)})):
         raise ConflictError("a calibration was deleted while this was computed", hint="Try again.")
@@ -280,22 +280,22 @@ def read_solutions(
     ]
     with report_damaged_values():
         names = {name for row in rows for name in parse_json_column(row.calibrations)}
-    decode = decode_calibration if markings else decode_camera
+    decode = decode_calibration if markings else decode_calibration_without_markings
     bodies = read_calibration_bodies(session, names)
     calibrations = {key: decode(body) for key, body in bodies.items()}
     with report_damaged_values():
         return {
-            row.group_id: with_calibrations(_solution_without_calibrations(row.body), calibrations)
+            row.group_id: attach_calibrations(_decode_solution_body(row.body), calibrations)
             for row in rows
         }
 
 
 def decode_solution(value: Any, calibrations: Mapping[str, Calibration]) -> Solution:
     """A solution from the JSON value of its body and the calibrations that it names."""
-    return with_calibrations(value_codec.from_json(Solution, value), calibrations)
+    return attach_calibrations(value_codec.from_json(Solution, value), calibrations)
 
 
-def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration]) -> Solution:
+def attach_calibrations(solution: Solution, calibrations: Mapping[str, Calibration]) -> Solution:
     """A solution as it is stored, with the calibrations that it names."""
     views = tuple(
         replace(view, calibration=calibrations[view.calibration_key]) for view in solution.views
@@ -304,7 +304,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 
 @lru_cache(maxsize=128)
-def _solution_without_calibrations(body: bytes) -> Solution:
+def _decode_solution_body(body: bytes) -> Solution:
     return value_codec.from_json(Solution, parse_json_column(decompress(body)))
 
 
@@ -403,7 +403,7 @@ def list_solved_groups(session: Session, dataset_id: int) -> list[int]:
     statement = (
         select(GroupModel.id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .join(SolutionModel, is_current())
+        .join(SolutionModel, is_current_solution())
         .where(GroupModel.dataset_id == dataset_id)
         .order_by(GroupModel.number)
     )
@@ -419,7 +419,7 @@ def list_unsolved_groups(
     statement = (
         select(GroupModel.id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, is_current())
+        .outerjoin(SolutionModel, is_current_solution())
         .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None), *some)
         .order_by(GroupModel.number)
     )

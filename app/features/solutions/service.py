@@ -16,8 +16,8 @@ from app.errors import DamagedError
 from app.features.datasets.service import (
     DatasetHead,
     get_dataset_head,
-    need_dataset,
     read_dataset_head,
+    require_dataset_id,
 )
 from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import list_station_pitches, read_stations
@@ -35,7 +35,7 @@ from app.features.solutions.queries import (
     read_calibration_bodies,
     read_calibrations,
 )
-from app.features.solutions.stored_queries import KeptSolution, list_reusable_solutions
+from app.features.solutions.stored_queries import ReusableSolution, list_reusable_solutions
 from app.progress import ReportProgress
 from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.group import Group, Station
@@ -91,7 +91,7 @@ def describe_contradiction(off: Mapping[str, float], where: str, how: str) -> st
     )
 
 
-def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
+def list_calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
     """Keys of the calibrations that groups need under a policy, or that those start from."""
     part = policy.calibration
     return {
@@ -106,11 +106,11 @@ def read_known_calibrations(
     session: Session, groups: Iterable[Group], policy: Policy
 ) -> dict[str, Calibration]:
     """Those of the calibrations that groups need which are kept already."""
-    return read_calibrations(session, calibration_keys(groups, policy))
+    return read_calibrations(session, list_calibration_keys(groups, policy))
 
 
 Solve = Callable[[Group, Policy, Mapping[str, Calibration]], tuple[Solution, EncodedSolution]]
-"""``solve_encoded``, or who has another process do it."""
+"""``solve_and_encode``, or who has another process do it."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class SolveResult:
     problem: str = ""
 
 
-def solve_encoded(
+def solve_and_encode(
     group: Group, policy: Policy, known: Mapping[str, Calibration]
 ) -> tuple[Solution, EncodedSolution]:
     """The solution of a group, and its bytes; calibrations that are known are not encoded again."""
@@ -140,7 +140,7 @@ RETHRESHOLDED_AT_ONCE = 200
 class RethresholdTask:
     """Groups on their way to a worker: solutions under policies of before, those by their hash."""
 
-    kept: tuple[KeptSolution, ...]
+    kept: tuple[ReusableSolution, ...]
     before: Mapping[str, Policy]
     policy: Policy
 
@@ -173,20 +173,24 @@ def run_rethreshold_task(task: RethresholdTask) -> list[SolveResult]:
     """
     try:
         return [
-            result for kept in _kept_by_policy(task) for result in _apply_thresholds(task, kept)
+            result
+            for kept in _group_solutions_by_policy(task)
+            for result in _apply_thresholds(task, kept)
         ]
     except DamagedError:
         return []
 
 
-def _kept_by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
+def _group_solutions_by_policy(task: RethresholdTask) -> Iterator[list[ReusableSolution]]:
     for digest in task.before:
         kept = [item for item in task.kept if item.policy_hash == digest]
         if kept:
             yield kept
 
 
-def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[SolveResult]:
+def _apply_thresholds(
+    task: RethresholdTask, kept: Sequence[ReusableSolution]
+) -> Iterator[SolveResult]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
     same = has_unchanged_pairs(facts, task.before[kept[0].policy_hash], policy)
@@ -273,7 +277,7 @@ class SolveTask:
 def list_stale_groups(store: Store, dataset: str | int) -> list[int]:
     """Ids of groups without a solution for their present state, policy and solver, in order."""
     with store.read() as session:
-        return list_unsolved_groups(session, need_dataset(session, dataset))
+        return list_unsolved_groups(session, require_dataset_id(session, dataset))
 
 
 def solve_dataset(
@@ -298,16 +302,16 @@ def solve_dataset(
     found, ids = get_dataset_head(store, dataset), chosen(list_stale_groups(store, dataset))
     report = SolveReport(total=len(ids))
 
-    def keep(results: Sequence[SolveResult]) -> None:
+    def save_and_report(results: Sequence[SolveResult]) -> None:
         _save_results(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
 
-    keep([])
+    save_and_report([])
     for results in run_tasks(
         run_rethreshold_task, make_rethreshold_tasks(store, found, ids), executor, stop
     ):
-        keep(results)
+        save_and_report(results)
     if report.solved:
         left = set(list_stale_groups(store, dataset))
         ids = [number for number in ids if number in left]
@@ -315,7 +319,7 @@ def solve_dataset(
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
     tasks = (_make_task(store, found, chunk) for chunk in _split_into_chunks(ids, largest))
     for results in run_tasks(solve_task, tasks, executor, stop):
-        keep(results)
+        save_and_report(results)
     if report.failing["jac"]:
         with store.read() as session:
             off = find_contradicted_cameras(
@@ -337,16 +341,16 @@ def solve_task(task: SolveTask) -> list[SolveResult]:
     """Solve the groups of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.calibrations.items()}
     return [
-        _solve_one(key, group_from_json(decompress_json(body)), task, known)
+        _solve_group(key, group_from_json(decompress_json(body)), task, known)
         for key, body in task.groups
     ]
 
 
-def _solve_one(
+def _solve_group(
     key: SolutionKey, group: Group, task: SolveTask, known: dict[str, Calibration]
 ) -> SolveResult:
     try:
-        solution, encoded = solve_encoded(group, task.policy, known)
+        solution, encoded = solve_and_encode(group, task.policy, known)
     except Exception as error:
         # One broken group must not stop the others; it stays stale and is reported by name.
         return SolveResult(key, group.key, problem=f"{type(error).__name__}: {error}")
@@ -371,7 +375,7 @@ def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> SolveT
     with store.read() as session:
         policy = read_dataset_head(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
-        keys = calibration_keys((item.group for item in stored), policy)
+        keys = list_calibration_keys((item.group for item in stored), policy)
         known = read_calibration_bodies(session, keys)
     groups = tuple(
         (

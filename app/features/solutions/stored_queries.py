@@ -19,7 +19,7 @@ from app.db.json_columns import (
 from app.db.session import Session
 from app.errors import StorageError
 from app.features.datasets.tables import DatasetModel, GroupModel, PaintEvidenceModel
-from app.features.paint.queries import reading_from_row
+from app.features.paint.queries import decode_paint_reading
 from app.features.solutions import codec as value_codec
 from app.features.solutions.codec import summarize_gates
 from app.features.solutions.queries import (
@@ -28,7 +28,7 @@ from app.features.solutions.queries import (
     SolutionModel,
     compress_json,
     decode_solution,
-    is_current,
+    is_current_solution,
     read_calibrations,
     read_summary,
 )
@@ -36,7 +36,7 @@ from app.soccer.solution import SOLVER_VERSION, Solution
 
 
 @dataclass(frozen=True)
-class KeptSolution:
+class ReusableSolution:
     """A solution as it is stored, of its group's present state; ``group`` is the key of that."""
 
     group_id: int
@@ -74,8 +74,10 @@ class KeptSolution:
         with report_damaged_values():
             value = {
                 **self._body_json,
-                "gates": _json_of_changed(self._body_json["gates"], before.gates, solution.gates),
-                "findings": _json_of_changed(
+                "gates": _update_changed_json(
+                    self._body_json["gates"], before.gates, solution.gates
+                ),
+                "findings": _update_changed_json(
                     self._body_json["findings"], before.findings, solution.findings
                 ),
                 "policy_hash": solution.policy_hash,
@@ -85,7 +87,7 @@ class KeptSolution:
         return EncodedSolution({}, keys, summary, compress_json(value), self.facts)
 
 
-def _json_of_changed(
+def _update_changed_json(
     values: Sequence[Json], before: Sequence[object], now: Sequence[object]
 ) -> list[Json]:
     """JSON values of what was before, with those of what is another value now."""
@@ -97,7 +99,7 @@ def _json_of_changed(
 
 def list_reusable_solutions(
     session: Session, group_ids: Sequence[int], policies: Collection[str]
-) -> list[KeptSolution]:
+) -> list[ReusableSolution]:
     """One solution of each group under one of the policies, of those that have facts beside them.
 
     Args:
@@ -122,7 +124,7 @@ def list_reusable_solutions(
         )
         .order_by(model.id)
     )  # fmt: skip
-    rows = (KeptSolution(*row) for row in session.execute(statement))
+    rows = (ReusableSolution(*row) for row in session.execute(statement))
     return list({row.group_id: row for row in rows}.values())
 
 
@@ -132,7 +134,7 @@ _SOLUTIONS = (
         *SolutionModel.__table__.columns,
         GroupModel.dataset_id,
         DatasetModel.policy,
-        is_current().label("current"),
+        is_current_solution().label("current"),
     )
     .join(GroupModel, GroupModel.id == SolutionModel.group_id)
     .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
@@ -161,7 +163,7 @@ def list_calibration_keys_of_row(row: Any) -> list[str]:
         return list(map(str, parse_json_column(row.calibrations)))
 
 
-def decode_row(session: Session, row: Any) -> Solution:
+def decode_solution_row(session: Session, row: Any) -> Solution:
     """The solution of such a row, with its calibrations.
 
     Raises:
@@ -191,7 +193,7 @@ def check_stored_paint_readings(session: Session) -> Iterator[tuple[str, bool]]:
     longer."""
     statement = select(PaintEvidenceModel.digest, PaintEvidenceModel.body)
     for row in _stream_rows(session, statement):
-        yield row.digest, not _is_readable(reading_from_row, row.digest, row.body)
+        yield row.digest, not _is_readable(decode_paint_reading, row.digest, row.body)
 
 
 def _stream_rows(session: Session, statement: Select[*tuple[Any, ...]]) -> Iterator[Any]:

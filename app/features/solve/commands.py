@@ -55,10 +55,10 @@ def solve(
         if workers is not None or cluster is not None:
             raise typer.BadParameter("a server solves with its own processes; leave out --workers")
         chosen = None if policy is None else read_policy_option(policy)
-        _print_solved(*_solve_at(server, dataset, chosen), json_=json_)
+        _print_solve_report(*_solve_on_server(server, dataset, chosen), json_=json_)
         return
     from app.features.policies.service import change_policy
-    from app.features.solve.jobs import count_yield, describe_pending_work, solve_fully
+    from app.features.solve.jobs import describe_pending_work, refresh_yield_table, solve_fully
 
     chosen = None if policy is None else read_policy_option(policy)
     with open_store_to_solve("Solving", workers, cluster) as (store, executor, progress):
@@ -75,20 +75,20 @@ def solve(
                     f" {left}"
                 )
                 raise typer.Exit(INTERRUPTED)
-        count_yield(store, dataset, report, progress)
-    _print_solved(vars(report), report.sentence, json_=json_)
+        refresh_yield_table(store, dataset, report, progress)
+    _print_solve_report(vars(report), report.sentence, json_=json_)
 
 
-def _solve_at(
+def _solve_on_server(
     server: ServerPlace, dataset: str, policy: Policy | None
 ) -> tuple[Mapping[str, Any], str]:
     from app.terminal import remote
 
     with connect_to_server(server) as client, show_progress("Solving") as progress:
-        return remote.solve_values(client, dataset, policy, progress)
+        return remote.solve_on_server(client, dataset, policy, progress)
 
 
-def _print_solved(values: Mapping[str, Any], sentence: str, *, json_: bool) -> None:
+def _print_solve_report(values: Mapping[str, Any], sentence: str, *, json_: bool) -> None:
     if json_:
         print_json(values)
         return

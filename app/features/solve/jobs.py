@@ -12,7 +12,7 @@ from typing import TypeVar
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
-from app.features.datasets.queries import group_ids, read_dataset_name
+from app.features.datasets.queries import list_group_ids, read_dataset_name
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
@@ -24,7 +24,11 @@ from app.features.pitches.service import (
     estimate_pitches,
     list_matches_to_estimate,
 )
-from app.features.policies.noise import choose_noise_sample, follow_noise, is_followed
+from app.features.policies.noise import (
+    choose_noise_sample,
+    is_noise_estimated,
+    update_estimated_noise,
+)
 from app.features.policies.service import PolicyState, apply_policy
 from app.features.solutions.queries import list_unsolved_groups
 from app.features.solutions.service import SolveReport, list_stale_groups, solve_dataset
@@ -46,7 +50,7 @@ def solve_fully(
     actor: str = LOCAL_USER,
     follow: bool = True,
 ) -> SolveReport:
-    """Solve what is stale, and estimate the pitches of matches; ``count_yield`` comes after it.
+    """Solve what is stale, and estimate the pitches of matches; ``refresh_yield_table`` comes after it.
 
     Where the policy says so the noise of clicks is estimated before: from some groups, so that
     the others are solved once.
@@ -62,20 +66,20 @@ def solve_fully(
         follow: Whether noise is estimated; an edit leaves it as it is.
     """
     ahead = SolveReport()
-    if follow and is_followed(store, dataset):
+    if follow and is_noise_estimated(store, dataset):
         ahead = solve_dataset(store, dataset, executor, progress, stop, choose_noise_sample)
-        if not stop() and follow_noise(store, dataset, actor):
+        if not stop() and update_estimated_noise(store, dataset, actor):
             ahead = SolveReport()
     report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
     total = report.total
     if not stop():
 
-        def estimated(done: int, _total: int | None = None, _said: str = "") -> None:
+        def report_estimated(done: int, _total: int | None = None, _said: str = "") -> None:
             report.estimated = done
             # It stays at the groups that are solved, and can be ended all the same.
             progress(total, total)
 
-        found = estimate_pitches(store, dataset, executor, estimated, stop)
+        found = estimate_pitches(store, dataset, executor, report_estimated, stop)
         report.proposed = len(found.proposals)
     return report
 
@@ -92,7 +96,7 @@ def describe_pending_work(store: Store, dataset: str | int) -> str | None:
     return f"the pitch of {many} is left to estimate" if matches else None
 
 
-def count_yield(
+def refresh_yield_table(
     store: Store, dataset: str | int, report: SolveReport, progress: ReportProgress
 ) -> None:
     """Count what a dataset yields where many groups were solved, so that the first look finds it."""
@@ -132,7 +136,7 @@ class PitchJob:
     job: Job
 
 
-def request_solve(
+def request_solve_job(
     jobs: Jobs,
     store: Store,
     dataset_id: int,
@@ -151,7 +155,7 @@ def request_solve(
     return jobs.submit(
         KIND,
         title or f"Solve {name}",
-        partial(solve_work, store, jobs.pool),
+        partial(run_solve_job, store, jobs.pool),
         dataset_id=dataset_id,
         actor=actor,
         request={EDITED: True} if edited else None,
@@ -160,7 +164,7 @@ def request_solve(
     )
 
 
-def solve_after(
+def change_and_request_solve(
     jobs: Jobs,
     store: Store,
     dataset_id: int,
@@ -180,15 +184,15 @@ def solve_after(
     """
     changed: list[Changed] = []
 
-    def both(session: Session, job: Job) -> None:
+    def change_and_pass_job(session: Session, job: Job) -> None:
         changed.append(change(session, job))
         session.respond(changed[0])
 
-    request_solve(jobs, store, dataset_id, actor=actor, then=both)
+    request_solve_job(jobs, store, dataset_id, actor=actor, then=change_and_pass_job)
     return changed[0]
 
 
-def change_and_solve(
+def change_and_return_job(
     jobs: Jobs,
     store: Store,
     dataset: str | int,
@@ -196,20 +200,22 @@ def change_and_solve(
     *,
     actor: str,
 ) -> Job:
-    """``solve_after`` by a dataset's name or id, answered with the job.
+    """``change_and_request_solve`` by a dataset's name or id, answered with the job.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
 
-    def both(session: Session, job: Job) -> Job:
+    def change_and_pass_job(session: Session, job: Job) -> Job:
         change(session)
         return job
 
-    return solve_after(jobs, store, dataset_id(store, dataset), both, actor=actor)
+    return change_and_request_solve(
+        jobs, store, dataset_id(store, dataset), change_and_pass_job, actor=actor
+    )
 
 
-def request_policy(
+def request_policy_change(
     jobs: Jobs, store: Store, dataset_id: int, policy: Policy, *, if_match: str, actor: str
 ) -> PolicyJob:
     """Judge a dataset by another policy, and solve what that leaves stale, soon.
@@ -218,14 +224,14 @@ def request_policy(
         StaleRevisionError: Somebody else was faster.
     """
 
-    def change(session: Session, job: Job) -> PolicyJob:
+    def apply_pitch_change(session: Session, job: Job) -> PolicyJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
         return PolicyJob(state, job, len(list_unsolved_groups(session, dataset_id)))
 
-    return solve_after(jobs, store, dataset_id, change, actor=actor)
+    return change_and_request_solve(jobs, store, dataset_id, apply_pitch_change, actor=actor)
 
 
-def request_pitches(
+def request_pitch_change(
     jobs: Jobs,
     store: Store,
     dataset_id: int,
@@ -241,26 +247,26 @@ def request_pitches(
         StaleRevisionError: Somebody else was faster.
     """
 
-    def change(session: Session, job: Job) -> PitchJob:
+    def apply_pitch_change(session: Session, job: Job) -> PitchJob:
         state = change_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
         return PitchJob(state, job)
 
-    return solve_after(jobs, store, dataset_id, change, actor=actor)
+    return change_and_request_solve(jobs, store, dataset_id, apply_pitch_change, actor=actor)
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
-    jobs.register_resume(KIND, partial(solve_work, store, jobs.pool))
+    jobs.register_resume(KIND, partial(run_solve_job, store, jobs.pool))
 
 
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
     """Solve whatever an earlier run, of the server or of a command, left undone."""
     for dataset in list_datasets(store):
         if list_stale_groups(store, dataset.id):
-            request_solve(jobs, store, dataset.id, actor=actor)
+            request_solve_job(jobs, store, dataset.id, actor=actor)
 
 
-def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
+def run_solve_job(store: Store, pool: Pool, progress: JobProgress) -> Json:
     """The work itself: what to do is found in the data when it starts."""
     actor, edited = progress.job.actor, bool((progress.job.request or {}).get(EDITED))
     found = get_dataset_head(store, progress.dataset_id)
@@ -275,14 +281,14 @@ def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
     with pool() if large else nullcontext() as executor:
         counter = report_counts_in_words(progress, "groups solved")
         report = solve_fully(store, found.id, executor, counter, actor=actor, follow=follow)
-    count_yield(store, found.id, report, progress)
+    refresh_yield_table(store, found.id, report, progress)
     progress(report.total, report.total, report.sentence)
     return {"policy": found.policy.name, **_report_values(report)}
 
 
 def _count_groups(store: Store, dataset_id: int) -> int:
     with store.read() as session:
-        return len(group_ids(session, dataset_id))
+        return len(list_group_ids(session, dataset_id))
 
 
 def _report_values(report: SolveReport) -> Json:

@@ -9,27 +9,27 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
-from app.features.groups.routes import CHANGED, CONFLICTS, load_document
+from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
 from app.features.groups.schemas import (
     DatasetName,
     GroupDocument,
     LineDocuments,
     LinesEdit,
     StationEdit,
-    group_response,
     lines_to_document,
+    make_group_response,
 )
 from app.features.groups.state import GroupState
-from app.features.groups.submit import solve_and_keep
-from app.features.solve.jobs import request_solve
+from app.features.groups.submit import solve_and_store_group
+from app.features.solve.jobs import request_solve_job
 from app.features.stations.service import (
     StationState,
     load_station,
     redo_station,
-    submit_station,
+    submit_station_edit,
     undo_station,
 )
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, Services
@@ -122,7 +122,7 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def patch_lines(
     station: Id,
     lines: LinesEdit,
@@ -136,7 +136,7 @@ def patch_lines(
     The group that is answered is solved at once, the others in the background.
     """
     edit = SetStationLines(lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
-    change = partial(submit_station, edit=edit)
+    change = partial(submit_station_edit, edit=edit)
     return _change_station(services, station, group, change, if_match, actor)
 
 
@@ -147,7 +147,7 @@ def patch_lines(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def patch_station(
     station: Id,
     change: StationEdit,
@@ -157,7 +157,7 @@ def patch_station(
     group: GroupOfStation = None,
 ) -> GroupState:
     """Choose whether the given calibration counts or the lines; If-Match as for lines."""
-    edited = partial(submit_station, edit=SetStationCalibration(change.calibration))
+    edited = partial(submit_station_edit, edit=SetStationCalibration(change.calibration))
     return _change_station(services, station, group, edited, if_match, actor)
 
 
@@ -168,7 +168,7 @@ def patch_station(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def undo(
     station: Id,
     services: AppServices,
@@ -187,7 +187,7 @@ def undo(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def redo(
     station: Id,
     services: AppServices,
@@ -209,15 +209,15 @@ def _change_station(
 ) -> GroupState:
     """Change a station with the group in view, and queue the others."""
     store = services.store
-    shown = _shown_group(load_station(store, station), group)
-    with add_current_state_to_conflicts(lambda: load_document(store, shown)):
+    shown = _choose_shown_group(load_station(store, station), group)
+    with add_current_state_to_conflicts(lambda: load_group_document(store, shown)):
         state = change(store, station, if_match=if_match, actor=actor, shown=shown)
-    with without_response():
-        request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
-    return state.shown or solve_and_keep(store, shown)
+    with without_pending_response():
+        request_solve_job(services.jobs, store, state.dataset_id, actor=actor, edited=True)
+    return state.shown or solve_and_store_group(store, shown)
 
 
-def _shown_group(state: StationState, group: int | None) -> int:
+def _choose_shown_group(state: StationState, group: int | None) -> int:
     """The group to answer with.
 
     Raises:

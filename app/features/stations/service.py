@@ -12,7 +12,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import read_dataset_name
-from app.features.groups.edit import SetStationLines, StationEdit, with_station
+from app.features.groups.edit import SetStationLines, StationEdit, replace_station_in_group
 from app.features.groups.edit_codec import (
     edit_and_inverse_to_json,
     require_point_limits,
@@ -27,7 +27,7 @@ from app.features.groups.state import (
     require_etag,
     station_etag,
 )
-from app.features.groups.undo_stacks import read_station_stacks, undo_entry_body
+from app.features.groups.undo_stacks import make_undo_entry_body, read_station_stacks
 from app.features.groups.view_queries import (
     StoredStation,
     list_groups_of_station,
@@ -36,8 +36,8 @@ from app.features.groups.view_queries import (
 )
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
-from app.features.solutions.service import read_known_calibrations, solve_encoded
-from app.soccer.codec import group_inputs_hash
+from app.features.solutions.service import read_known_calibrations, solve_and_encode
+from app.soccer.codec import hash_group_inputs
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
 
@@ -97,7 +97,7 @@ def load_station(store: Store, station_id: int) -> StationState:
         return _read_state(session, station_id)
 
 
-def submit_station(
+def submit_station_edit(
     store: Store,
     station_id: int,
     edit: StationEdit,
@@ -123,7 +123,7 @@ def submit_station(
     return _change_station(store, station_id, _plan_edit(edit), **how)
 
 
-def submit_stations(
+def submit_station_edits(
     store: Store,
     edits: Sequence[tuple[StationState, StationEdit]],
     *,
@@ -146,20 +146,22 @@ def submit_stations(
     with store.write() as session:
         if check is not None:
             check(session)
-        _save_all(session, steps, actor)
+        _save_planned_changes(session, steps, actor)
 
 
 def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> int:
     """Take the last edit of several static cameras back, of all or none; returns how many."""
-    steps = [(state.id, _plan_step("undo"), state.etag) for state in states]
+    steps = [(state.id, _plan_undo_or_redo("undo"), state.etag) for state in states]
     count = len(steps)
     with store.write() as session:
-        _save_all(session, steps, actor)
+        _save_planned_changes(session, steps, actor)
         session.respond(count)
     return count
 
 
-def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:
+def _save_planned_changes(
+    session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str
+) -> None:
     groups: set[int] = set()
     for station_id, plan, etag in steps:
         state, change = _plan_change(session, station_id, plan, etag)
@@ -171,12 +173,12 @@ def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: 
 
 def undo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    return _change_station(store, station_id, _plan_step("undo"), **how)
+    return _change_station(store, station_id, _plan_undo_or_redo("undo"), **how)
 
 
 def redo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change_station(store, station_id, _plan_step("redo"), **how)
+    return _change_station(store, station_id, _plan_undo_or_redo("redo"), **how)
 
 
 def _change_station(
@@ -192,8 +194,8 @@ def _change_station(
         state, change = _plan_change(session, station_id, plan, if_match)
         if change.station == state.station:
             return state
-        trial = None if shown is None else _trial_group(session, shown, change.station)
-    solutions = [] if trial is None else [_solve_encoded(*trial)]
+        trial = None if shown is None else _make_trial_group(session, shown, change.station)
+    solutions = [] if trial is None else [_solve_trial(*trial)]
     with store.write() as session:
         # Planned once more: others may have edited it while the group was solved.
         state, change = _plan_change(session, station_id, plan, if_match)
@@ -219,19 +221,19 @@ def _plan_change(
     return state, plan(session, state)
 
 
-def _trial_group(session: Session, group_id: int, station: Station) -> _Trial:
+def _make_trial_group(session: Session, group_id: int, station: Station) -> _Trial:
     """A group with another station, and what is known of its calibrations."""
     stored = read_record(session, group_id).stored
     view = next(view for view in stored.group.views if view.station.key == station.key)
-    group = with_station(stored.group, view, station)
+    group = replace_station_in_group(stored.group, view, station)
     return stored, group, read_known_calibrations(session, [group], stored.policy)
 
 
-def _solve_encoded(
+def _solve_trial(
     stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
 ) -> tuple[SolutionKey, EncodedSolution]:
-    key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
-    return key, solve_encoded(group, stored.policy, known)[1]
+    key = SolutionKey(stored.id, hash_group_inputs(group), stored.policy.hash)
+    return key, solve_and_encode(group, stored.policy, known)[1]
 
 
 def _save_change(session: Session, state: StationState, change: _StationChange, actor: str) -> None:
@@ -273,12 +275,12 @@ def _plan_edit(edit: StationEdit) -> _Plan:
     return plan
 
 
-def _plan_step(kind: str) -> _Plan:
+def _plan_undo_or_redo(kind: str) -> _Plan:
     """Undo or redo."""
 
     def plan(session: Session, state: StationState) -> _StationChange:
         stacks = read_station_stacks(session, state.id)
-        body = undo_entry_body(session, stacks, kind, "for this camera")
+        body = make_undo_entry_body(session, stacks, kind, "for this camera")
         station = station_edit_from_json(body["edit"]).apply(state.station)
         return _StationChange(f"station_{kind}", body, station)
 

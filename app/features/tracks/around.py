@@ -13,28 +13,28 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import read_dataset_head
-from app.features.tracks.codec import TrackInputs, make_part
-from app.features.tracks.findings import groups_by_frame
-from app.features.tracks.making import read_records
+from app.features.tracks.codec import TrackInputs, make_partial_track
+from app.features.tracks.findings import map_groups_by_frame
+from app.features.tracks.making import read_export_records
 from app.features.tracks.queries import (
     TrackGroup,
-    find_row,
-    keys_of_match,
-    list_rows,
-    match_groups,
-    match_states,
-    place_of_group,
+    find_group_location,
+    find_track_row,
+    list_group_keys_of_match,
+    list_track_rows,
+    read_group_states_by_match,
+    read_groups_by_match,
 )
-from app.features.tracks.run_measurements import followed_observations, followed_runs
+from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
 from app.features.tracks.service import TrackedFrames
 from app.features.tracks.stored import (
     Track,
-    corrections_of,
-    stored_track,
-    summary_of_row,
-    track_etag,
+    build_track_from_row,
+    make_track_etag,
+    parse_corrections,
+    parse_track_summary,
 )
-from app.features.tracks.stretches import frame_of, gather_stretches
+from app.features.tracks.stretches import gather_stretches, parse_frame_number
 from app.formats.export_record import ExportRecord
 from app.soccer.pitch import Pitch
 from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
@@ -59,32 +59,35 @@ class TrackOfGroup:
     frame: int
 
 
-def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
+def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
     """The tracks that a group is in: at most one, unless stretches have changed.
 
     Raises:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        place = place_of_group(session, group_id)
+        place = find_group_location(session, group_id)
         if place is None:
             raise NotFoundError.group(group_id)
-        frame = frame_of(place.key)
+        frame = parse_frame_number(place.key)
         rows = [
             row
-            for row in list_rows(session, place.dataset_id, [place.match])
+            for row in list_track_rows(session, place.dataset_id, [place.match])
             if frame is not None and row.first <= frame <= row.last
         ]
         if frame is None or not rows:
             return []
         head = read_dataset_head(session, place.dataset_id)
-        groups = match_states(session, head.id, [place.match]).get(place.match, [])
-        runs = followed_runs(session, head.id).get(place.match, ())
-        return [TrackOfGroup(stored_track(row, head.policy, groups, runs), frame) for row in rows]
+        groups = read_group_states_by_match(session, head.id, [place.match]).get(place.match, [])
+        runs = list_followed_runs(session, head.id).get(place.match, ())
+        return [
+            TrackOfGroup(build_track_from_row(row, head.policy, groups, runs), frame)
+            for row in rows
+        ]
 
 
 @dataclass(frozen=True)
-class Around(TrackedFrames):
+class TrackExcerpt(TrackedFrames):
     """What was tracked around a frame: ``ball`` and ``inputs`` have the frames around it alone, and a reason
     where no track comes of them.
 
@@ -95,7 +98,7 @@ class Around(TrackedFrames):
     frame: int
 
 
-def track_around(store: Store, track_id: int, frame: int | None = None) -> Around:
+def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None) -> TrackExcerpt:
     """A track in the frames around one of its own, from its groups as they are now; nothing is stored.
 
     Args:
@@ -108,10 +111,10 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
         InputError: It has no such frame.
     """
     with store.read() as session:
-        row = find_row(session, track_id)
+        row = find_track_row(session, track_id)
         if row is None:
             raise NotFoundError(f"there is no track {track_id}")
-        head, summary = read_dataset_head(session, int(row.dataset_id)), summary_of_row(row)
+        head, summary = read_dataset_head(session, int(row.dataset_id)), parse_track_summary(row)
         if frame is None:
             frame = int(row.first) if summary.worst is None else summary.worst
         if not row.first <= frame <= row.last:
@@ -123,17 +126,17 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
         last = min(int(row.last), frame + AROUND + _MARGIN)
         ids = [
             group.id
-            for group in keys_of_match(session, head.id, row.match)
-            if (number := frame_of(group.key)) is not None and first <= number <= last
+            for group in list_group_keys_of_match(session, head.id, row.match)
+            if (number := parse_frame_number(group.key)) is not None and first <= number <= last
         ]
-        groups = match_groups(session, head.id, [row.match], ids).get(row.match, [])
-        near = groups_by_frame(groups, first, last)
-        records = _records(session, list(near.values()), head.policy.hash)
-        runs = followed_runs(session, head.id).get(row.match, [])
+        groups = read_groups_by_match(session, head.id, [row.match], ids).get(row.match, [])
+        near = map_groups_by_frame(groups, first, last)
+        records = _read_cached_records(session, list(near.values()), head.policy.hash)
+        runs = list_followed_runs(session, head.id).get(row.match, [])
         close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
         followed = {
             match: [one for one in items if first <= one.frame <= last]
-            for match, items in followed_observations(
+            for match, items in collect_followed_observations(
                 session, store.settings, close, head.policy
             ).items()
         }
@@ -141,21 +144,23 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
     shots = {row.match: [(int(row.first), int(row.last))]}
     stretches = gather_stretches(records, head.policy, shots, followed)
     if not stretches:
-        ball, inputs = _nothing(summary.rate, first, last)
+        ball, inputs = _make_empty_track(summary.rate, first, last)
     else:
-        corrections = (item for item in corrections_of(row) if first <= item.frame <= last)
+        corrections = (item for item in parse_corrections(row) if first <= item.frame <= last)
         inputs = TrackInputs.of(stretches[0], corrections)
-        ball = make_part(inputs, ViewErrors(summary.noise, summary.late))
-    return Around(track_etag(row), ball, inputs, near, frame)
+        ball = make_partial_track(inputs, ViewErrors(summary.noise, summary.late))
+    return TrackExcerpt(make_track_etag(row), ball, inputs, near, frame)
 
 
-def _records(session: Session, groups: Sequence[TrackGroup], policy: str) -> list[ExportRecord]:
+def _read_cached_records(
+    session: Session, groups: Sequence[TrackGroup], policy: str
+) -> list[ExportRecord]:
     """Groups with their solutions; those that were read before for a frame near by are not read again."""
     key_of = {group.key: (group.id, group.source, group.state, policy) for group in groups}
     with _lock:
         found = {key: _kept[said] for key, said in key_of.items() if said in _kept}
     missing = [group for group in groups if group.key not in found]
-    new = {record.group.key: record for record in read_records(session, missing)}
+    new = {record.group.key: record for record in read_export_records(session, missing)}
     with _lock:
         # What is not solved by now may be solved without another change.
         solved = {key_of[key]: record for key, record in new.items() if record.solution is not None}
@@ -166,7 +171,7 @@ def _records(session: Session, groups: Sequence[TrackGroup], policy: str) -> lis
     return [found[group.key] for group in groups if group.key in found]
 
 
-def _nothing(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs]:
+def _make_empty_track(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs]:
     """No ball in some frames, whose groups are all rejected."""
     frames = np.arange(first, last + 1)
     times, empty = frames / rate, np.zeros(0)

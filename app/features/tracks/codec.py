@@ -15,20 +15,20 @@ from app.db.json_columns import Json, parse_json_column, report_damaged_values
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.json_text import canonical_json_text, digest_of
+from app.json_text import canonical_json_text, digest_content
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.pitch import Pitch
-from app.tracking.ball_correct import TrackPatch, correct_track, patched
+from app.tracking.ball_correct import TrackPatch, apply_patches, correct_track
 from app.tracking.ball_solve import track_ball
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
     BallTrack,
-    Contradiction,
-    Correction,
+    ContradictingMeasurement,
+    EventCorrection,
     EventKind,
-    LeftOut,
-    Untracked,
+    LeaveOneOutSummary,
+    UntrackedRun,
     ViewErrors,
     ViewJump,
 )
@@ -55,10 +55,10 @@ class TrackInputs:
     times: FloatArray
     pitch: Pitch
     measurements: BallMeasurements
-    corrections: tuple[Correction, ...] = ()
+    corrections: tuple[EventCorrection, ...] = ()
 
     @staticmethod
-    def of(stretch: Stretch, corrections: Iterable[Correction] = ()) -> TrackInputs:
+    def of(stretch: Stretch, corrections: Iterable[EventCorrection] = ()) -> TrackInputs:
         """The inputs of a stretch as it is now."""
         return TrackInputs(
             stretch.frames,
@@ -72,17 +72,17 @@ class TrackInputs:
 def make_track(inputs: TrackInputs) -> BallTrack:
     """The track of inputs, with their corrections."""
     track = track_ball(inputs.measurements, inputs.frames, inputs.times, pitch=inputs.pitch)
-    return corrected(inputs, track, correct(inputs, track))
+    return apply_corrections(inputs, track, solve_corrections(inputs, track))
 
 
-def make_part(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
+def make_partial_track(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
     """The track of a part of a stretch, with corrections, where the whole says how wrong views are."""
     measured, frames, times = inputs.measurements, inputs.frames, inputs.times
     track = track_ball(measured, frames, times, pitch=inputs.pitch, known=known)
-    return corrected(inputs, track, correct(inputs, track))
+    return apply_corrections(inputs, track, solve_corrections(inputs, track))
 
 
-def correct(
+def solve_corrections(
     inputs: TrackInputs, track: BallTrack, known: Sequence[TrackPatch] = ()
 ) -> tuple[TrackPatch, ...]:
     """The parts of a track that corrections change, solved anew.
@@ -95,18 +95,20 @@ def correct(
     return correct_track(track, inputs.measurements, inputs.pitch, inputs.corrections, known)
 
 
-def corrected(inputs: TrackInputs, track: BallTrack, patches: Sequence[TrackPatch]) -> BallTrack:
+def apply_corrections(
+    inputs: TrackInputs, track: BallTrack, patches: Sequence[TrackPatch]
+) -> BallTrack:
     """A track with its corrections.
 
     Args:
         inputs: With the corrections.
         track: Made of them without corrections.
-        patches: As ``correct`` made them.
+        patches: As ``solve_corrections`` made them.
     """
-    return patched(track, inputs.measurements, patches, inputs.corrections)
+    return apply_patches(track, inputs.measurements, patches, inputs.corrections)
 
 
-def frozen_track(match: str, inputs: TrackInputs, track: BallTrack) -> Json:
+def frozen_track_to_json(match: str, inputs: TrackInputs, track: BallTrack) -> Json:
     """A track with all that it was computed from, as versions keep it.
 
     Args:
@@ -117,7 +119,7 @@ def frozen_track(match: str, inputs: TrackInputs, track: BallTrack) -> Json:
     return {"match": match, "inputs": inputs_to_json(inputs), "track": track_to_json(track)}
 
 
-def track_again(frozen: Mapping[str, Any]) -> Json:
+def recompute_frozen_track(frozen: Mapping[str, Any]) -> Json:
     """The track of a frozen one's inputs, computed anew, as ``track_to_json`` has it."""
     return parse_json_column(
         canonical_json_text(track_to_json(make_track(inputs_from_json(frozen["inputs"]))))
@@ -155,32 +157,34 @@ def inputs_to_json(inputs: TrackInputs) -> Json:
             "x": measured.pixels[:, 0].tolist(),
             "y": measured.pixels[:, 1].tolist(),
             "sigma": measured.sigma.tolist(),
-            "size": _missing(measured.sizes),
-            "size_sigma": _missing(measured.size_sigma),
+            "size": _nan_to_none(measured.sizes),
+            "size_sigma": _nan_to_none(measured.size_sigma),
         },
         "corrections": corrections_to_json(inputs.corrections),
     }
 
 
-def corrections_to_json(corrections: Iterable[Correction]) -> Json:
+def corrections_to_json(corrections: Iterable[EventCorrection]) -> Json:
     """Corrections in their order."""
     return [[item.frame, item.kind, item.added] for item in corrections]
 
 
-def corrections_text(corrections: Iterable[Correction]) -> str:
+def corrections_to_text(corrections: Iterable[EventCorrection]) -> str:
     """Corrections as they are stored, each once."""
     whole = sorted(set(corrections), key=lambda item: (item.frame, item.kind, item.added))
     return canonical_json_text(corrections_to_json(whole))
 
 
-def corrections_from_json(value: Sequence[Any]) -> tuple[Correction, ...]:
+def corrections_from_json(value: Sequence[Any]) -> tuple[EventCorrection, ...]:
     """Back from ``corrections_to_json``."""
-    return tuple(Correction(frame, cast(EventKind, kind), added) for frame, kind, added in value)
+    return tuple(
+        EventCorrection(frame, cast(EventKind, kind), added) for frame, kind, added in value
+    )
 
 
-def inputs_digest(inputs: TrackInputs) -> str:
+def digest_inputs(inputs: TrackInputs) -> str:
     """The same digest, the same track."""
-    return digest_of(canonical_json_text(inputs_to_json(inputs)).encode())
+    return digest_content(canonical_json_text(inputs_to_json(inputs)).encode())
 
 
 def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
@@ -204,8 +208,8 @@ def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
                 np.array([found["x"], found["y"]], dtype=float).T.reshape(-1, 2).copy(),
                 np.array(found["sigma"], dtype=float),
                 tuple(cameras[number] for number in found["camera"]),
-                _numbers(found["size"]),
-                _numbers(found["size_sigma"]),
+                _none_to_nan(found["size"]),
+                _none_to_nan(found["size_sigma"]),
             ),
             corrections_from_json(value["corrections"]),
         )
@@ -217,9 +221,9 @@ def track_to_json(track: BallTrack) -> Json:
     return {
         "frames": track.frames.tolist(),
         "times": track.times.tolist(),
-        "position": _rows(track.position),
-        "velocity": _rows(track.velocity),
-        "covariance": _rows(track.covariance[:, _UPPER[0], _UPPER[1]]),
+        "position": _rows_to_json(track.position),
+        "velocity": _rows_to_json(track.velocity),
+        "covariance": _rows_to_json(track.covariance[:, _UPPER[0], _UPPER[1]]),
         "state": list(track.state),
         "mode": list(track.mode),
         "views": [list(names) for names in track.views],
@@ -233,8 +237,8 @@ def track_to_json(track: BallTrack) -> Json:
         "reason": track.reason,
         "left_out": left
         and {
-            "px": _missing(left.px),
-            "by_frame": _missing(left.by_frame),
+            "px": _nan_to_none(left.px),
+            "by_frame": _nan_to_none(left.by_frame),
             "median_px": left.median_px,
             "p95_px": left.p95_px,
             "predicted": left.predicted,
@@ -283,14 +287,14 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
         frames = np.array(value["frames"], dtype=np.int64)
         count, left = len(frames), value["left_out"]
         covariance = np.full((count, 6, 6), np.nan)
-        upper = _matrix(value["covariance"], count, 21)
+        upper = _rows_from_json(value["covariance"], count, 21)
         covariance[:, _UPPER[0], _UPPER[1]] = upper
         covariance[:, _UPPER[1], _UPPER[0]] = upper
         return BallTrack(
             frames,
             np.array(value["times"], dtype=float),
-            _matrix(value["position"], count, 3),
-            _matrix(value["velocity"], count, 3),
+            _rows_from_json(value["position"], count, 3),
+            _rows_from_json(value["velocity"], count, 3),
             covariance,
             tuple(value["state"]),
             tuple(value["mode"]),
@@ -299,12 +303,12 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
                 BallEvent(frame, time, kind, np.array(place, dtype=float), sigma)
                 for frame, time, kind, place, sigma in value["events"]
             ),
-            tuple(Contradiction(*item) for item in value["contradicted"]),
+            tuple(ContradictingMeasurement(*item) for item in value["contradicted"]),
             value["reason"],
             left
-            and LeftOut(
-                _numbers(left["px"]),
-                _numbers(left["by_frame"]),
+            and LeaveOneOutSummary(
+                _none_to_nan(left["px"]),
+                _none_to_nan(left["by_frame"]),
                 left["median_px"],
                 left["p95_px"],
                 left["predicted"],
@@ -312,7 +316,7 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
             tuple((name, offset) for name, offset in value["offsets"]),
             # Tracks of earlier versions do not say these.
             tuple((name, times) for name, times in value.get("noise", ())),
-            tuple(Untracked(*item) for item in value.get("untracked", ())),
+            tuple(UntrackedRun(*item) for item in value.get("untracked", ())),
             tuple(
                 ViewJump(frame, time, metres, tuple(views))
                 for frame, time, metres, views in value.get("jumps", ())
@@ -320,20 +324,20 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
         )
 
 
-def _missing(values: FloatArray) -> list[float | None]:
+def _nan_to_none(values: FloatArray) -> list[float | None]:
     return [None if value != value else value for value in values.tolist()]
 
 
-def _numbers(values: Sequence[float | None]) -> FloatArray:
+def _none_to_nan(values: Sequence[float | None]) -> FloatArray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _rows(values: FloatArray) -> list[list[float] | None]:
+def _rows_to_json(values: FloatArray) -> list[list[float] | None]:
     known = np.atleast_1d(np.isfinite(values).all(axis=1)).tolist()
     return [row if there else None for row, there in zip(values.tolist(), known, strict=True)]
 
 
-def _matrix(rows: Sequence[Sequence[float] | None], count: int, width: int) -> FloatArray:
+def _rows_from_json(rows: Sequence[Sequence[float] | None], count: int, width: int) -> FloatArray:
     nothing = [np.nan] * width
     found = [nothing if row is None else row for row in rows]
     return np.array(found, dtype=float).reshape(count, width)

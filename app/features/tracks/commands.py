@@ -49,7 +49,11 @@ def follow(
     Views that have a ball keep it. Without --accept nothing is changed.
     """
     from app.features.recordings.follow import BallFollower
-    from app.features.tracks.follow import accept_followed, follow_view, take_back_followed
+    from app.features.tracks.follow import (
+        accept_followed_balls,
+        follow_ball_from_view,
+        remove_followed_balls,
+    )
 
     if accept and undo:
         raise typer.BadParameter("place the balls or take them away, one at a time")
@@ -57,18 +61,22 @@ def follow(
         raise typer.BadParameter("--undo removes balls wherever they are: leave --at out")
     place = _parse_place(at)
     with open_store() as store:
-        view = _find(store, dataset, group, camera)
+        view = _find_view_id(store, dataset, group, camera)
         if undo:
-            taken = take_back_followed(store, view, actor=get_current_actor())
+            taken = remove_followed_balls(store, view, actor=get_current_actor())
             gone = {"taken_back": taken.changed, "refused": taken.refused}
-            _print(gone, json_, f"{plural(taken.changed, 'ball')} removed.{_stayed(taken.refused)}")
+            _print_result(
+                gone,
+                json_,
+                f"{plural(taken.changed, 'ball')} removed.{_format_unchanged_groups(taken.refused)}",
+            )
             return
         balls = BallFollower(store.settings)
         try:
-            found = follow_view(store, balls, view, place, frames)
+            found = follow_ball_from_view(store, balls, view, place, frames)
         finally:
             balls.close()
-        placed = accept_followed(store, found, actor=get_current_actor()) if accept else None
+        placed = accept_followed_balls(store, found, actor=get_current_actor()) if accept else None
     items = [
         {
             "group": item.key,
@@ -91,18 +99,18 @@ def follow(
     told = f"Frames {found.first} to {found.last}: {plural(len(items), 'view')} without a ball, {unsure} of them uncertain. "
     told += f"It stops at frame {found.first} because {ENDS[found.before]}, and at frame {found.last} because {ENDS[found.after]}."
     if placed is not None:
-        told += f" {plural(placed.changed, 'ball')} placed.{_stayed(refused)}"
-    _print(values, json_, told)
+        told += f" {plural(placed.changed, 'ball')} placed.{_format_unchanged_groups(refused)}"
+    _print_result(values, json_, told)
 
 
-def _stayed(groups: int) -> str:
+def _format_unchanged_groups(groups: int) -> str:
     """Groups that stay as they are, as a sentence; empty for none."""
     return (
         f" {plural(groups, 'group')} changed meanwhile: nothing was done there." if groups else ""
     )
 
 
-def _print(values: dict[str, Any], as_json: bool, sentence: str) -> None:
+def _print_result(values: dict[str, Any], as_json: bool, sentence: str) -> None:
     if as_json:
         print_json(values)
     else:
@@ -121,7 +129,7 @@ def _parse_place(text: str | None) -> ImagePoint | None:
     return ImagePoint(x, y)
 
 
-def _find(store: Any, dataset: str, group: str, camera: str) -> int:
+def _find_view_id(store: Any, dataset: str, group: str, camera: str) -> int:
     """Id of a view."""
     from app.features.datasets.service import dataset_id
     from app.features.groups.view_queries import find_group_and_view_ids

@@ -12,7 +12,7 @@ import numpy as np
 from app.errors import InputError
 from app.features.tracks.codec import (
     TrackInputs,
-    inputs_digest,
+    digest_inputs,
     inputs_from_json,
     make_track,
     track_from_json,
@@ -24,19 +24,19 @@ from app.features.tracks.stretches import (
     Stretch,
     gather_stretches,
     match_stored_to_stretches,
-    require_stretch,
+    require_any_stretch,
 )
 from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
 from app.geometry.arrays import FloatArray
 from app.soccer.policy import Policy
-from app.tracking.ball_track import BallTrack, Correction
+from app.tracking.ball_track import BallTrack, EventCorrection
 
 _FRAMES = re.compile(r" \d+-\d+$", re.ASCII)
 
 
 @dataclass(frozen=True)
-class KnownTrack:
+class StoredStretchTrack:
     """What is stored of a stretch.
 
     Attributes:
@@ -54,7 +54,7 @@ class KnownTrack:
     digest: str
     track: BallTrack | None
     verdict: str | None
-    corrections: tuple[Correction, ...] = ()
+    corrections: tuple[EventCorrection, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class TrackSource:
     dataset: str
     policy: Policy
     shots: Shots = field(default_factory=dict)
-    known: Sequence[KnownTrack] = ()
+    known: Sequence[StoredStretchTrack] = ()
     frozen: bool = False
     everything: bool = False
     try_only: bool = False
@@ -92,12 +92,12 @@ class TrackSource:
         """
         taken = (item for item in records if self.everything or item.verdict != "rejected")
         stretches = gather_stretches(taken, self.policy, self.shots, self.followed)
-        require_stretch(self.dataset, stretches)
+        require_any_stretch(self.dataset, stretches)
         if self.try_only:
             return
         reasons, known = [], match_stored_to_stretches(stretches, self.known)
         for stretch in stretches:
-            found = self._record(stretch, known.get(stretch.key))
+            found = self._make_record(stretch, known.get(stretch.key))
             if isinstance(found, str):
                 reasons.append(f"{stretch.key}: {found}")
                 self.facts.append({"stretch": stretch.key, "reason": found})
@@ -108,52 +108,56 @@ class TrackSource:
                 f'no stretch of "{self.dataset}" has a track of the ball ({"; ".join(reasons[:5])})'
             )
 
-    def _record(self, stretch: Stretch, known: KnownTrack | None) -> TrackRecord | str:
+    def _make_record(self, stretch: Stretch, known: StoredStretchTrack | None) -> TrackRecord | str:
         """A stretch's track, or why there is none."""
         if self.frozen:
             if known is None or known.track is None:
                 return "its track was not accepted when the version was frozen"
-            return self._made(replace(stretch, key=known.key), known.track, "accepted")
+            return self._build_track_record(
+                replace(stretch, key=known.key), known.track, "accepted"
+            )
         verdict, track = "unreviewed", None
-        if known is not None and known.digest == inputs_digest(TrackInputs.of(stretch)):
+        if known is not None and known.digest == digest_inputs(TrackInputs.of(stretch)):
             if known.verdict == "rejected" and not self.everything:
                 return "its track was rejected"
             verdict = known.verdict or verdict
             track = known.track
         corrections = known.corrections if known is not None else ()
-        return self._made(
+        return self._build_track_record(
             stretch, track or make_track(TrackInputs.of(stretch, corrections)), verdict
         )
 
-    def _made(self, stretch: Stretch, track: BallTrack, verdict: str) -> TrackRecord | str:
+    def _build_track_record(
+        self, stretch: Stretch, track: BallTrack, verdict: str
+    ) -> TrackRecord | str:
         if track.reason is not None:
             return track.reason
-        self.facts.append(_facts(stretch, track, verdict))
+        self.facts.append(_describe_track(stretch, track, verdict))
         return TrackRecord(
             stretch.key, track, stretch.pitch, stretch.rate, stretch.cameras, verdict
         )
 
 
-def frozen_known(key: str, value: Mapping[str, Any]) -> KnownTrack:
+def parse_frozen_track(key: str, value: Mapping[str, Any]) -> StoredStretchTrack:
     """What a frozen version has of a stretch.
 
     Args:
         key: Of the stretch, as it was frozen.
-        value: As ``codec.frozen_track`` made it.
+        value: As ``codec.frozen_track_to_json`` made it.
     """
     track = track_from_json(value["track"])
     # Versions of earlier software do not say the match: a recording's stretches end in their frames.
     match = value.get("match") or _FRAMES.sub("", key)
-    return KnownTrack(
+    return StoredStretchTrack(
         key, match, int(track.frames[0]), int(track.frames[-1]), "", track, "accepted"
     )
 
 
-def frozen_records(frozen: Mapping[str, Mapping[str, Any]]) -> list[TrackRecord]:
+def list_frozen_track_records(frozen: Mapping[str, Mapping[str, Any]]) -> list[TrackRecord]:
     """The tracks of a frozen version as they are, without cameras.
 
     Args:
-        frozen: By stretch, as ``codec.frozen_track`` made them.
+        frozen: By stretch, as ``codec.frozen_track_to_json`` made them.
     """
     found = []
     for key, value in sorted(frozen.items()):
@@ -164,7 +168,7 @@ def frozen_records(frozen: Mapping[str, Mapping[str, Any]]) -> list[TrackRecord]
     return found
 
 
-def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
+def _describe_track(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
     """What a manifest says of a track."""
     left, measured = track.left_out, stretch.measurements
     return {
@@ -182,11 +186,15 @@ def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
         "not_measured": dict(stretch.unused),
         "left_out_median_px": left and left.median_px,
         "left_out_p95_px": left and left.p95_px,
-        "left_out_median_m": None if left is None else _median_metres(stretch, track, left.px),
+        "left_out_median_m": None
+        if left is None
+        else _compute_median_error_metres(stretch, track, left.px),
     }
 
 
-def _median_metres(stretch: Stretch, track: BallTrack, px: FloatArray) -> float | None:
+def _compute_median_error_metres(
+    stretch: Stretch, track: BallTrack, px: FloatArray
+) -> float | None:
     """Median of left-out errors at the ball's distance, metres across the rays; None without one.
 
     Args:

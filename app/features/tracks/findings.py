@@ -11,19 +11,24 @@ import numpy as np
 from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
 from app.db.session import Session
 from app.db.store import Store
-from app.features.findings.queries import BallNotice, replace_track_findings
+from app.features.findings.queries import UnexplainedBall, replace_track_findings
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.tracks.codec import (
     TrackInputs,
-    corrected,
+    apply_corrections,
     inputs_from_json,
     patches_from_json,
     track_from_json,
 )
-from app.features.tracks.queries import TrackGroup, list_rows, match_groups, read_bodies
-from app.features.tracks.stored import corrections_of
-from app.features.tracks.stretches import frame_of, view_name
+from app.features.tracks.queries import (
+    TrackGroup,
+    list_track_rows,
+    read_groups_by_match,
+    read_track_bodies,
+)
+from app.features.tracks.stored import parse_corrections
+from app.features.tracks.stretches import make_view_name, parse_frame_number
 from app.tracking.ball_track import BallTrack
 
 BATCH = 200
@@ -52,7 +57,7 @@ class ContradictingBall:
     reason: str
 
 
-def contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[ContradictingBall]:
+def find_contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[ContradictingBall]:
     """The balls that a track does not explain, in its order."""
     measured, first = inputs.measurements, int(ball.frames[0]) if len(ball.frames) else 0
     found = []
@@ -70,7 +75,7 @@ def contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[Contradict
 
 
 @dataclass(frozen=True)
-class Notices:
+class TrackNotices:
     """What tracks say of groups.
 
     Attributes:
@@ -81,7 +86,7 @@ class Notices:
 
     matches: Collection[str]
     scope: set[int] | None
-    items: list[BallNotice]
+    items: list[UnexplainedBall]
 
 
 def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]) -> None:
@@ -92,22 +97,22 @@ def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]
     """
     for _ in range(TRIES):
         with store.read() as session:
-            before = _states(session, dataset_id, matches)
+            before = _read_track_states(session, dataset_id, matches)
             found = _read_notices(session, dataset_id, matches)
         with store.write() as session:
-            if _states(session, dataset_id, matches) == before:
+            if _read_track_states(session, dataset_id, matches) == before:
                 save_notices(session, dataset_id, found)
                 return
     with store.write() as session:
         save_notices(session, dataset_id, _read_notices(session, dataset_id, matches))
 
 
-def track_notices(
+def make_track_notices(
     session: Session,
     match: str,
     groups: Mapping[int, TrackGroup],
     track: tuple[BallTrack, TrackInputs] | None,
-) -> Notices:
+) -> TrackNotices:
     """What one track says of its groups.
 
     Args:
@@ -117,55 +122,59 @@ def track_notices(
         track: Itself, and what it was computed from; None where it was rejected.
     """
     scope = {group.id for group in groups.values()}
-    beside = [] if track is None else contradicting_balls(*track)
-    return Notices([match], scope, _notices(session, beside, groups))
+    beside = [] if track is None else find_contradicting_balls(*track)
+    return TrackNotices([match], scope, _make_ball_notices(session, beside, groups))
 
 
-def save_notices(session: Session, dataset_id: int, found: Notices) -> None:
+def save_notices(session: Session, dataset_id: int, found: TrackNotices) -> None:
     """Store what tracks say of groups, in a write; groups that are no more are passed over."""
     changed = replace_track_findings(session, dataset_id, found.matches, found.scope, found.items)
     refresh_queue(session, changed)
 
 
-def _states(session: Session, dataset_id: int, matches: Collection[str]) -> list[tuple[Any, ...]]:
+def _read_track_states(
+    session: Session, dataset_id: int, matches: Collection[str]
+) -> list[tuple[Any, ...]]:
     """What the findings of tracks depend on beside groups, of which notices say in which state they hold."""
-    rows = list_rows(session, dataset_id, matches)
+    rows = list_track_rows(session, dataset_id, matches)
     return [(row.id, row.digest, row.revision, row.verdict) for row in rows]
 
 
-def _read_notices(session: Session, dataset_id: int, matches: Collection[str]) -> Notices:
-    groups = match_groups(session, dataset_id, matches)
-    found: list[BallNotice] = []
-    for row in list_rows(session, dataset_id, groups.keys()):
-        if row.verdict == "rejected" or not _contradicted(row):
+def _read_notices(session: Session, dataset_id: int, matches: Collection[str]) -> TrackNotices:
+    groups = read_groups_by_match(session, dataset_id, matches)
+    found: list[UnexplainedBall] = []
+    for row in list_track_rows(session, dataset_id, groups.keys()):
+        if row.verdict == "rejected" or not _count_contradicted(row):
             continue
-        body = read_bodies(session, [row.id])[row.id]
+        body = read_track_bodies(session, [row.id])[row.id]
         inputs = replace(
-            inputs_from_json(decompress_json(body.inputs)), corrections=corrections_of(row)
+            inputs_from_json(decompress_json(body.inputs)), corrections=parse_corrections(row)
         )
         patches = () if body.patches is None else patches_from_json(decompress_json(body.patches))
-        ball = corrected(inputs, track_from_json(decompress_json(body.body)), patches)
-        near = groups_by_frame(groups[row.match], row.first, row.last)
-        found += _notices(session, contradicting_balls(ball, inputs), near)
-    return Notices(groups.keys(), None, found)
+        ball = apply_corrections(inputs, track_from_json(decompress_json(body.body)), patches)
+        near = map_groups_by_frame(groups[row.match], row.first, row.last)
+        found += _make_ball_notices(session, find_contradicting_balls(ball, inputs), near)
+    return TrackNotices(groups.keys(), None, found)
 
 
-def groups_by_frame(groups: Iterable[TrackGroup], first: int, last: int) -> dict[int, TrackGroup]:
+def map_groups_by_frame(
+    groups: Iterable[TrackGroup], first: int, last: int
+) -> dict[int, TrackGroup]:
     """The group of each frame of a stretch that has one."""
-    numbered = ((frame_of(group.key), group) for group in groups)
+    numbered = ((parse_frame_number(group.key), group) for group in groups)
     return {
         frame: group for frame, group in numbered if frame is not None and first <= frame <= last
     }
 
 
-def _contradicted(row: Any) -> int:
+def _count_contradicted(row: Any) -> int:
     with report_damaged_values():
         return int(parse_json_column(row.summary)["contradicted"])
 
 
-def _notices(
+def _make_ball_notices(
     session: Session, beside: Sequence[ContradictingBall], groups: Mapping[int, TrackGroup]
-) -> list[BallNotice]:
+) -> list[UnexplainedBall]:
     ids = sorted({groups[item.frame].id for item in beside if item.frame in groups})
     stored: dict[int, StoredGroup] = {}
     for start in range(0, len(ids), BATCH):
@@ -174,23 +183,23 @@ def _notices(
     for item in beside:
         group = groups.get(item.frame)
         known = None if group is None else stored.get(group.id)
-        key = None if known is None else _view_of(known, item)
+        key = None if known is None else _find_view_with_ball(known, item)
         if known is not None and key is not None:
             sentence = (
                 f"It lies {item.px:.0f} px from the track of the ball over time: "
                 "another ball, or a wrong click."
             )
             found.append(
-                BallNotice(known.id, key, sentence, item.px, item.place, known.inputs_hash)
+                UnexplainedBall(known.id, key, sentence, item.px, item.place, known.inputs_hash)
             )
     return found
 
 
-def _view_of(stored: StoredGroup, item: ContradictingBall) -> str | None:
+def _find_view_with_ball(stored: StoredGroup, item: ContradictingBall) -> str | None:
     """Key of the view that still shows the ball where the track met it; None: none does."""
     for view in stored.group.views:
         center = None if view.ball is None or not view.included else view.ball.center
-        if center is None or view_name(view) != item.view:
+        if center is None or make_view_name(view) != item.view:
             continue
         if (center.x, center.y) == item.at:
             return view.key

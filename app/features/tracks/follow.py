@@ -18,19 +18,19 @@ from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
 from app.features.groups.bulk_edits import ViewEdits, edit_views
 from app.features.groups.edit import set_ball
 from app.features.groups.state import GroupState, read_etags, read_states
-from app.features.groups.view_queries import StoredView, find_view, views_of_camera
+from app.features.groups.view_queries import StoredView, find_view, list_views_of_camera
 from app.features.people.visibility_queries import COPIES
 from app.features.recordings.follow import BallFollower
-from app.features.tracks.queries import place_of_group
-from app.features.tracks.stretches import UNSURE, frame_of
+from app.features.tracks.queries import find_group_location
+from app.features.tracks.stretches import UNSURE, parse_frame_number
 from app.geometry.camera import Camera
-from app.media.camera_frames import CameraFrames, Image, ViewFrame, frames_between
-from app.media.frames import picture_error_of_ended_process
-from app.soccer.annotation import BallAnnotation, followed_source
+from app.media.camera_frames import CameraFrames, Image, ViewFrame, map_frames_by_number
+from app.media.frames import make_picture_error
+from app.soccer.annotation import BallAnnotation, make_followed_source
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Media
 from app.soccer.solution import ViewSolution
-from app.tracking.ball_expected import place_of, segment_of
+from app.tracking.ball_expected import make_expected_place, project_ray_segment
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, ExpectedPlace, FollowedBall, FollowHints
 from app.worker_pool import PoolTask
@@ -69,7 +69,7 @@ class CameraSequence:
 
 
 @dataclass(frozen=True)
-class FollowQuestion:
+class FollowTask:
     """A ball that is to be followed, and the views into which it may be.
 
     Attributes:
@@ -118,7 +118,7 @@ class FollowedViews:
         frame: Number of its frame.
         first, last: Frames through which it was followed.
         before, after: Why no further: it is ``lost``, it ``left`` the picture, a ball is ``known`` there, the
-            sequence is at its ``end``, or no more was asked for (``limit``).
+            sequence is at its ``find_end_reason``, or no more was asked for (``limit``).
         sized: Whether the camera is known, and with it how large the ball is.
         items: By frame.
     """
@@ -144,9 +144,9 @@ class FollowedSequence:
     after: FollowEnd = "lost"
 
 
-def plan_follow(
+def plan_ball_following(
     store: Store, view_id: int, at: ImagePoint | None = None, each_way: int = EACH_WAY
-) -> FollowQuestion:
+) -> FollowTask:
     """What has to be known to follow the ball of a view.
 
     Args:
@@ -161,32 +161,33 @@ def plan_follow(
         ConflictError: It is of an independent annotation.
     """
     with store.read() as session:
-        view, dataset = _need_view(session, view_id)
+        view, dataset = _require_view(session, view_id)
         if dataset > COPIES:
             raise ConflictError(
                 "in an independent annotation no ball is followed: it has to be one person's work alone",
                 hint="Place each ball by hand.",
             )
-        media, frame = view.media, _require_sequence(view)
+        media, frame = view.media, _require_sequence_frame(view)
         if media is None:
             raise NotFoundError(f"view {view.key} has no frame in which a ball could be followed")
-        others = views_of_camera(session, dataset, view.match, view.station_id)
+        others = list_views_of_camera(session, dataset, view.match, view.station_id)
         # Groups whose keys begin otherwise are of another sequence.
-        own_start = _start_of_key(view.group)
+        own_start = _get_group_key_prefix(view.group)
         numbered = {
             number: one
             for one in others
-            if (number := frame_of(one.group)) is not None and _start_of_key(one.group) == own_start
+            if (number := parse_frame_number(one.group)) is not None
+            and _get_group_key_prefix(one.group) == own_start
         }
-        near, ends = _near({**numbered, frame: view}, frame)
+        near, ends = _select_nearest_views({**numbered, frame: view}, frame)
         if len(near) < 2:
             raise InputError(
                 f"no other group of this match has a frame of {view.station}",
                 hint="A ball is followed from group to group through the frames of one camera.",
             )
-        states = _states(session, near)
+        states = _read_group_states(session, near)
     own = states[frame][1]
-    click = at or _ball_of(own, view.key)
+    click = at or _find_visible_ball(own, view.key)
     if click is None:
         shown = own.group.view(view.key)
         several = shown is not None and len(shown.balls) > 1
@@ -194,13 +195,13 @@ def plan_follow(
             f"view {view.key} has {'several balls' if several else 'no ball'}",
             hint="Say which place is meant." if several else "Place it first, or say where it is.",
         )
-    sequence = _sequence(view, frame, click, states, each_way, ends)
-    return FollowQuestion(view, media, sequence, states)
+    sequence = _build_camera_sequence(view, frame, click, states, each_way, ends)
+    return FollowTask(view, media, sequence, states)
 
 
-def _require_sequence(view: StoredView) -> int:
+def _require_sequence_frame(view: StoredView) -> int:
     """The number of a view's frame in its sequence."""
-    frame = frame_of(view.group)
+    frame = parse_frame_number(view.group)
     if not view.shared:
         raise InputError(
             f"{view.station} is not a camera that stands still",
@@ -215,12 +216,12 @@ def _require_sequence(view: StoredView) -> int:
     return frame
 
 
-def _start_of_key(group: str) -> str:
+def _get_group_key_prefix(group: str) -> str:
     """What stands before the number of a group's frame in its key."""
     return group[: group.rfind("/") + 1]
 
 
-def _near(
+def _select_nearest_views(
     views: Mapping[int, StoredView], frame: int
 ) -> tuple[dict[int, StoredView], tuple[FollowEnd, FollowEnd]]:
     """The views with frames that are nearest to one, by frame, and why there are no more on either side."""
@@ -234,7 +235,7 @@ def _near(
     return {number: views[number] for number in wanted}, ends
 
 
-def _states(
+def _read_group_states(
     session: Session, views: Mapping[int, StoredView]
 ) -> dict[int, tuple[StoredView, GroupState]]:
     found = read_states(session, [view.group_id for view in views.values()], markings=False)
@@ -242,7 +243,7 @@ def _states(
     return {number: (view, by_id[view.group_id]) for number, view in views.items()}
 
 
-def _ball_of(state: GroupState, key: str) -> ImagePoint | None:
+def _find_visible_ball(state: GroupState, key: str) -> ImagePoint | None:
     """Where the one ball of a view is that somebody saw; a view that is left out says nothing."""
     view = state.group.view(key)
     if view is None or view.ball is None or view.ball.inferred or not view.included:
@@ -250,7 +251,7 @@ def _ball_of(state: GroupState, key: str) -> ImagePoint | None:
     return view.ball.center
 
 
-def _sequence(
+def _build_camera_sequence(
     view: StoredView,
     frame: int,
     click: ImagePoint,
@@ -258,12 +259,12 @@ def _sequence(
     each_way: int,
     ends: tuple[FollowEnd, FollowEnd],
 ) -> CameraSequence:
-    first, last = _bounds(states, frame)
+    first, last = _find_follow_bounds(states, frame)
     ends = (
         "known" if first > min(states) else ends[0],
         "known" if last < max(states) else ends[1],
     )
-    camera = _camera_of(states[frame][1], view.key)
+    camera = _get_reliable_camera(states[frame][1], view.key)
     views, clicks = [], []
     expected: dict[int, list[ExpectedPlace]] = {}
     size = ImageSize(view.width, view.height)
@@ -273,23 +274,25 @@ def _sequence(
         views.append(ViewFrame(number, one.group, one.media))
         if number == frame:
             continue
-        known = _ball_of(state, one.key)
+        known = _find_visible_ball(state, one.key)
         if known is not None:
             clicks.append(BallClick(number, known.x, known.y))
         elif camera is not None:
-            expected[number] = _expected(state, one.key, camera, size)
+            expected[number] = _compute_expected_places(state, one.key, camera, size)
     at = BallClick(frame, click.x, click.y)
     return CameraSequence(tuple(views), at, tuple(clicks), camera, expected, size, each_way, ends)
 
 
-def _bounds(states: Mapping[int, tuple[StoredView, GroupState]], frame: int) -> tuple[int, int]:
+def _find_follow_bounds(
+    states: Mapping[int, tuple[StoredView, GroupState]], frame: int
+) -> tuple[int, int]:
     """The frames up to the next ball that somebody placed on either side, or said to be out of view."""
     first, last = min(states), max(states)
     for number, (view, state) in states.items():
         shown = state.group.view(view.key)
         if shown is None or not shown.balls or number == frame:
             continue
-        hidden = _ball_of(state, view.key) is None
+        hidden = _find_visible_ball(state, view.key) is None
         if number < frame:
             first = max(first, number + hidden)
         else:
@@ -297,47 +300,54 @@ def _bounds(states: Mapping[int, tuple[StoredView, GroupState]], frame: int) -> 
     return first, last
 
 
-def _camera_of(state: GroupState, key: str) -> Camera | None:
-    solved = _solved(state, key)
+def _get_reliable_camera(state: GroupState, key: str) -> Camera | None:
+    solved = _find_view_solution(state, key)
     if solved is None or solved.failed in UNSURE:
         return None
     return solved.calibration.camera
 
 
-def _solved(state: GroupState, key: str) -> ViewSolution | None:
+def _find_view_solution(state: GroupState, key: str) -> ViewSolution | None:
     views = () if state.solution is None else state.solution.views
     return next((one for one in views if one.view == key), None)
 
 
-def _expected(state: GroupState, key: str, camera: Camera, size: ImageSize) -> list[ExpectedPlace]:
+def _compute_expected_places(
+    state: GroupState, key: str, camera: Camera, size: ImageSize
+) -> list[ExpectedPlace]:
     """Where the other views of a group say that the ball is: one place, else the segments of their rays."""
-    solved = _solved(state, key)
+    solved = _find_view_solution(state, key)
     if solved is not None and solved.expected is not None:
-        return [place_of(solved.expected)]
+        return [make_expected_place(solved.expected)]
     found = []
     for other in state.group.views:
-        ball, source = _ball_of(state, other.key), _camera_of(state, other.key)
+        ball, source = _find_visible_ball(state, other.key), _get_reliable_camera(state, other.key)
         if other.key == key or ball is None or source is None:
             continue
-        segment = segment_of(source, ball, camera, size)
+        segment = project_ray_segment(source, ball, camera, size)
         found += [] if segment is None else [segment]
     return found
 
 
-def ask_follow(settings: Settings, balls: BallFollower, question: FollowQuestion) -> PoolTask:
-    """Have a ball followed in a worker process; ``followed_views`` makes of its result what is told."""
+def submit_follow_task(settings: Settings, balls: BallFollower, question: FollowTask) -> PoolTask:
+    """Have a ball followed in a worker process; ``build_followed_views`` makes of its result what is told."""
     view = question.view
 
     def explain(error: WorkerEnded) -> Exception:
         what = f"the frames of {view.station} around group {view.group}"
-        return picture_error_of_ended_process(what, error)
+        return make_picture_error(what, error)
 
     return balls.submit(
-        follow_through, question.media, view.flipped, settings, question.sequence, explain=explain
+        follow_ball_in_sequence,
+        question.media,
+        view.flipped,
+        settings,
+        question.sequence,
+        explain=explain,
     )
 
 
-def followed_views(question: FollowQuestion, found: FollowedSequence) -> FollowedViews:
+def build_followed_views(question: FollowTask, found: FollowedSequence) -> FollowedViews:
     """What came of a question.
 
     Raises:
@@ -375,7 +385,7 @@ def followed_views(question: FollowQuestion, found: FollowedSequence) -> Followe
     )
 
 
-def follow_view(
+def follow_ball_from_view(
     store: Store,
     balls: BallFollower,
     view_id: int,
@@ -385,19 +395,19 @@ def follow_view(
     """Follow the ball of a view through the frames of its camera; waits for the process.
 
     Raises:
-        NotFoundError, InputError, ConflictError: As ``plan_follow`` and ``followed_views``.
+        NotFoundError, InputError, ConflictError: As ``plan_ball_following`` and ``build_followed_views``.
         ImageError: The frame of the view cannot be read.
         OverloadedError: Too many wait, or the server is shutting down.
     """
-    question = plan_follow(store, view_id, at, each_way)
+    question = plan_ball_following(store, view_id, at, each_way)
     try:
-        task = ask_follow(store.settings, balls, question)
+        task = submit_follow_task(store.settings, balls, question)
         found: FollowedSequence = task.future.result()
     except CancelledError as error:
         raise OverloadedError(
             "the server is shutting down", hint="Try again in a moment."
         ) from error
-    return followed_views(question, found)
+    return build_followed_views(question, found)
 
 
 @dataclass(frozen=True)
@@ -408,83 +418,85 @@ class FollowedEdits:
     refused: int
 
 
-def accept_followed(store: Store, found: FollowedViews, *, actor: str) -> FollowedEdits:
+def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> FollowedEdits:
     """Make the followed balls that are not uncertain those of their views."""
-    source = followed_source(found.group)
+    source = make_followed_source(found.group)
 
-    def item(one: FollowedView) -> ViewEdits:
+    def make_view_edits(one: FollowedView) -> ViewEdits:
         ball, half = one.ball, one.ball.diameter / 2
         box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
         annotation = BallAnnotation(box=box, predicted_by=source)
         return ViewEdits(one.view, None, one.etag, lambda key: [set_ball(key, annotation)])
 
-    items = [item(one) for one in found.items if one.ball.state == "followed"]
-    return _edit(store, found.view, items, actor)
+    items = [make_view_edits(one) for one in found.items if one.ball.state == "followed"]
+    return _apply_edits(store, found.view, items, actor)
 
 
-def take_back_followed(store: Store, view_id: int, *, actor: str) -> FollowedEdits:
+def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> FollowedEdits:
     """Take away the balls that were followed from that of a view, as far as nobody changed them.
 
     Raises:
         NotFoundError: There is no such view.
     """
     with store.read() as session:
-        view, dataset = _need_view(session, view_id)
-        source = followed_source(view.group)
-        others = views_of_camera(session, dataset, view.match, view.station_id)
+        view, dataset = _require_view(session, view_id)
+        source = make_followed_source(view.group)
+        others = list_views_of_camera(session, dataset, view.match, view.station_id)
         mine = [one for one in others if [ball.predicted_by for ball in one.balls] == [source]]
         etags = read_etags(session, [one.group_id for one in mine])
     items = [
         ViewEdits(one.id, None, etags[one.group_id], lambda key: [set_ball(key, None)])
         for one in mine
     ]
-    return _edit(store, view_id, items, actor)
+    return _apply_edits(store, view_id, items, actor)
 
 
-def _edit(store: Store, view_id: int, items: Sequence[ViewEdits], actor: str) -> FollowedEdits:
+def _apply_edits(
+    store: Store, view_id: int, items: Sequence[ViewEdits], actor: str
+) -> FollowedEdits:
     with store.read() as session:
-        _, dataset = _need_view(session, view_id)
+        _, dataset = _require_view(session, view_id)
     report = edit_views(store, dataset, items, actor=actor)
     outcomes = [one.outcome for one in report.items]
     return FollowedEdits(outcomes.count("changed"), outcomes.count("refused"))
 
 
-def _need_view(session: Session, view_id: int) -> tuple[StoredView, int]:
+def _require_view(session: Session, view_id: int) -> tuple[StoredView, int]:
     """A view, and the id of its dataset."""
     view = find_view(session, view_id)
     if view is None:
         raise NotFoundError(f"there is no view {view_id}")
-    place = place_of_group(session, view.group_id)
+    place = find_group_location(session, view.group_id)
     assert place is not None
     return view, int(place.dataset_id)
 
 
-def follow_through(
+def follow_ball_in_sequence(
     _: Media, flipped: bool, settings: Settings, asked: CameraSequence
 ) -> FollowedSequence:
     """The work of the process."""
-    media = frames_between(asked.views, settings)
+    media = map_frames_by_number(asked.views, settings)
     frames = CameraFrames(media, flipped, asked.size, settings)
-    click, numbers = asked.click, _with_gaps(sorted(media))
+    click, numbers = asked.click, _fill_frame_gaps(sorted(media))
     before = [number for number in reversed(numbers) if number < click.frame]
     after = [number for number in numbers if number > click.frame]
     ways = before[: asked.each_way], after[: asked.each_way]
     cameras = {} if asked.camera is None else dict.fromkeys(numbers, asked.camera)
     hints = FollowHints(cameras, expected=asked.expected, still=True, clicks=asked.clicks)
 
-    def read(number: int) -> Image | None:
+    def read_frame(number: int) -> Image | None:
         # Without the clicked frame there is nothing to follow, and it is said why.
         return frames.read(number) if number == click.frame else frames.read_or_none(number)
 
     try:
-        run = follow_ball(read, click, *ways, hints)
+        run = follow_ball(read_frame, click, *ways, hints)
     finally:
         frames.close()
     if run is None:
         return FollowedSequence(None)
     clicked = {one.frame for one in asked.clicks}
 
-    def end(
+    def find_end_reason(
         why: FollowEnd, way: Sequence[int], every: Sequence[int], further: FollowEnd
     ) -> FollowEnd:
         if why != "limit":
@@ -496,12 +508,12 @@ def follow_through(
     ends = asked.ends
     return FollowedSequence(
         run,
-        end(run.before, ways[0], before, ends[0]),
-        end(run.after, ways[1], after, ends[1]),
+        find_end_reason(run.before, ways[0], before, ends[0]),
+        find_end_reason(run.after, ways[1], after, ends[1]),
     )
 
 
-def _with_gaps(numbers: Sequence[int]) -> list[int]:
+def _fill_frame_gaps(numbers: Sequence[int]) -> list[int]:
     """Numbers of frames, and between them, in the usual step, those that nobody has: the ball goes on there, too."""
     step = min((b - a for a, b in pairwise(numbers)), default=1)
     found = set(numbers)

@@ -16,9 +16,9 @@ from app.features.tracks.follow import (
     FollowedView,
     FollowedViews,
     FollowEnd,
-    ask_follow,
-    followed_views,
-    plan_follow,
+    build_followed_views,
+    plan_ball_following,
+    submit_follow_task,
 )
 from app.http.deps import AppServices, Id
 from app.http.documents import Document
@@ -136,9 +136,11 @@ async def follow_ball_of_view(
     right to `POST /datasets/{dataset}/edits`, each `box` with `followed_from`.
     """
     at = None if wanted.at is None else ImagePoint(*wanted.at)
-    question = await to_thread.run_sync(plan_follow, services.store, view, at, wanted.frames)
-    task = await to_thread.run_sync(ask_follow, services.settings, services.balls, question)
+    question = await to_thread.run_sync(
+        plan_ball_following, services.store, view, at, wanted.frames
+    )
+    task = await to_thread.run_sync(submit_follow_task, services.settings, services.balls, question)
     found: FollowedSequence | None = await task.result_unless_client_gone(request.is_disconnected)
     if found is None:
         return Response(status_code=CLIENT_GONE)
-    return FollowedBallDocument.of(followed_views(question, found))
+    return FollowedBallDocument.of(build_followed_views(question, found))

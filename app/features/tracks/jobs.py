@@ -6,32 +6,32 @@ from collections.abc import Collection
 from dataclasses import asdict
 from typing import Any
 
-from app.db.database_worker import CallingServer
+from app.db.database_worker import ServerProxy
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
-from app.features.match_estimates.jobs import MatchCall, MatchJob
+from app.features.match_estimates.jobs import MatchJob, MatchJobContext
 from app.features.tracks.service import make_tracks
 
 
-def _make(
+def _make_tracks_in_worker(
     store: Store,
     dataset_id: int,
     matches: Collection[str] | None,
     actor: str,
-    caller: CallingServer,
+    caller: ServerProxy,
 ) -> dict[str, Any]:
     """``make_tracks`` in a worker process."""
     return asdict(make_tracks(store, dataset_id, matches, actor, caller))
 
 
-def _track(call: MatchCall, progress: JobProgress) -> Json:
+def _run_track_job(call: MatchJobContext, progress: JobProgress) -> Json:
     progress(0, None, "Reading what views measured of the ball.")
     return run_job_in_worker(
         call.store,
         "tracks",
         "tracking the ball",
-        _make,
+        _make_tracks_in_worker,
         call.dataset_id,
         call.matches,
         call.job.actor,
@@ -41,4 +41,4 @@ def _track(call: MatchCall, progress: JobProgress) -> Json:
     )
 
 
-TRACKS = MatchJob("ball", "Track the ball of {}", _track)
+TRACKS = MatchJob("ball", "Track the ball of {}", _run_track_job)

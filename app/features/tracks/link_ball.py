@@ -18,38 +18,38 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
-from app.features.file_tools.shots import read_ball
+from app.features.file_tools.shots import read_ball_rows
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
-from app.features.recordings.cameras import cameras_at
+from app.features.recordings.cameras import read_cameras_of_frames
 from app.features.recordings.link_values import (
     LinkedShot,
     LinkMap,
     RayMiss,
-    described,
-    etag_of,
-    shots_of_link,
+    make_link_etag,
+    make_link_map,
+    parse_linked_shots,
 )
 from app.features.recordings.links import (
+    compute_instant_times,
+    compute_link_residuals,
     get_link,
-    instant_seconds,
-    link_seconds,
-    need_link,
-    note_link,
-    residuals_of,
-    save_map,
+    log_link_event,
+    read_link_times,
+    require_link,
+    save_link_map,
 )
-from app.features.recordings.service import Recording, get_recording, groups_taken
+from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
 from app.features.tracks.service import list_tracks, read_track
 from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.progress import ReportProgress
-from app.tracking.ball_rays import BallRays, ball_rays
-from app.tracking.link import map_of_ball, or_turned, ray_misses
+from app.tracking.ball_rays import BallRays, build_ball_rays
+from app.tracking.link import check_half_turn, fit_time_map, measure_ray_distances
 from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
 
@@ -62,7 +62,7 @@ _Seen = tuple[tuple[float, float], Camera | None]
 
 
 @dataclass(frozen=True)
-class BallLink:
+class BallLinkResult:
     """What became of a link that was sought from the ball.
 
     Attributes:
@@ -111,14 +111,14 @@ def request_ball_link(
     return jobs.submit(
         KIND,
         f"Link frames {link.replay.first} to {link.replay.last} of {link.replay.name} by the ball",
-        partial(ball_link_work, store),
+        partial(run_ball_link_job, store),
         dataset_id=link.dataset_id,
         actor=actor,
         request={"recording": recording_id, "link": link_id, "uploads": dict(uploads)},
     )
 
 
-def ball_link_work(store: Store, progress: JobProgress) -> Json:
+def run_ball_link_job(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result says what the ball told."""
     asked, settings = progress.job.request, store.settings
     limits = WorkerLimits(settings.import_memory, settings.import_seconds, SILENCE)
@@ -144,7 +144,7 @@ def ball_link_work(store: Store, progress: JobProgress) -> Json:
 
 def resume_ball_links(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at begin again."""
-    jobs.register_resume(KIND, partial(ball_link_work, store))
+    jobs.register_resume(KIND, partial(run_ball_link_job, store))
 
 
 def link_by_ball(
@@ -154,7 +154,7 @@ def link_by_ball(
     uploads: Mapping[str, str | None],
     actor: str,
     _progress: ReportProgress,
-) -> BallLink:
+) -> BallLinkResult:
     """Find the map of a link from the ball, near its instants, and keep it; in a worker process.
 
     Where the ball does not tell it, a map of instants stays, with the reason beside it.
@@ -166,23 +166,23 @@ def link_by_ball(
         NotFoundError: There is no such link or upload.
     """
     with store.read() as session:
-        row = need_link(session, recording_id, link_id)
-    live, replay = shots_of_link(row)
-    live_times, times = link_seconds(store.settings, row)
+        row = require_link(session, recording_id, link_id)
+    live, replay = parse_linked_shots(row)
+    live_times, times = read_link_times(store.settings, row)
     report = ReaderReport()
     sides = [
-        _rays(store, shot, seconds, (live, replay), uploads.get(name), report, link_id)
+        _collect_ball_rays(store, shot, seconds, (live, replay), uploads.get(name), report, link_id)
         for name, shot, seconds in (("live", live, live_times), ("replay", replay, times))
     ]
     (live_rays, live_left), (rays, replay_left) = sides
     before = get_link(store, recording_id, link_id)
     pairs = [(one.live, one.replay) for one in before.instants]
-    given = instant_seconds(row, pairs, live_times, times)
-    found = or_turned(map_of_ball(live_rays, rays, given), live_rays, rays, given)
+    given = compute_instant_times(row, pairs, live_times, times)
+    found = check_half_turn(fit_time_map(live_rays, rays, given), live_rays, rays, given)
     reason = None if found.pieces else found.reason
     if reason is None:
-        made = described(found, replay, times, "ball")
-        at, misses = ray_misses(live_rays, rays, found)
+        made = make_link_map(found, replay, times, "ball")
+        at, misses = measure_ray_distances(live_rays, rays, found)
         frames = replay.first + np.searchsorted(times, at)
         each = zip(frames.tolist(), misses.tolist(), strict=True)
         made = replace(made, misses=tuple(RayMiss(*one) for one in each))
@@ -191,22 +191,22 @@ def link_by_ball(
     else:
         made = LinkMap("unobservable", "ball", reason, miss_m=found.miss, turned=found.turned)
     with store.write() as session:
-        present = need_link(session, recording_id, link_id)
-        if etag_of(present) != etag_of(row):
+        present = require_link(session, recording_id, link_id)
+        if make_link_etag(present) != make_link_etag(row):
             raise ConflictError(
                 "somebody changed this link while its time map was computed",
                 hint="Start it again: it uses the link as it is now.",
             )
-        residuals = residuals_of(made, given, live_times)
-        if save_map(session, present, pairs, made, residuals):
-            note_link(session, actor, "link found from the ball", present)
+        residuals = compute_link_residuals(made, given, live_times)
+        if save_link_map(session, present, pairs, made, residuals):
+            log_link_event(session, actor, "link found from the ball", present)
     left = live_left + replay_left + len(report.problems)
-    return BallLink(
+    return BallLinkResult(
         link_id, live.recording, made.outcome, reason, (len(live_rays), len(rays)), left
     )
 
 
-def _rays(
+def _collect_ball_rays(
     store: Store,
     shot: LinkedShot,
     seconds: FloatArray,
@@ -217,13 +217,15 @@ def _rays(
 ) -> tuple[BallRays, int]:
     """The rays of the ball in a shot, and how many frames with a ball have no camera, or are of another shot."""
     if upload is None:
-        seen = dict(_of_groups(store, shot, shots))
+        seen = dict(_iterate_balls_of_groups(store, shot, shots))
     else:
-        seen = _of_file(store.settings, upload, report)
+        seen = _read_balls_from_file(store.settings, upload, report)
     inside = {number: one for number, one in seen.items() if number in shot.frames}
     recording = get_recording(store, shot.recording)
-    places = {} if upload or shot != shots[0] else ball_places(store, recording, shot, link_id)
-    tracked = cameras_at(store, recording, inside.keys() | places.keys())
+    places = (
+        {} if upload or shot != shots[0] else read_ball_positions(store, recording, shot, link_id)
+    )
+    tracked = read_cameras_of_frames(store, recording, inside.keys() | places.keys())
     for number in places.keys() - inside.keys():
         frame = tracked.get(number)
         if frame is not None and frame.camera is not None:
@@ -248,11 +250,11 @@ def _rays(
             hint="Track the camera of the shot, and mark the ball in frames of it or send a ball.csv.",
         )
     left_out = len(seen) - sum(number in seen for number in inside)
-    rays_found = ball_rays(*(list(column) for column in zip(*rays, strict=True)))
+    rays_found = build_ball_rays(*(list(column) for column in zip(*rays, strict=True)))
     return rays_found, left_out + len(inside) - len(rays)
 
 
-def ball_places(
+def read_ball_positions(
     store: Store, recording: Recording, shot: LinkedShot, link_id: int
 ) -> dict[int, FloatArray]:
     """Where tracks put the ball in frames of a shot, pitch frame, metres, shape (3,), by frame.
@@ -279,20 +281,22 @@ def ball_places(
     return found
 
 
-def _of_file(settings: Settings, upload: str, report: ReaderReport) -> dict[int, _Seen]:
+def _read_balls_from_file(
+    settings: Settings, upload: str, report: ReaderReport
+) -> dict[int, _Seen]:
     """Where a ``ball.csv`` says that the ball is, by frame of its recording."""
-    rows = read_ball(upload_path(settings, upload), get_upload(settings, upload).name, report)
+    rows = read_ball_rows(upload_path(settings, upload), get_upload(settings, upload).name, report)
     return {frame: (pixel, None) for frame, _, pixel in rows}
 
 
-def _of_groups(
+def _iterate_balls_of_groups(
     store: Store, shot: LinkedShot, shots: Sequence[LinkedShot]
 ) -> Iterator[tuple[int, _Seen]]:
     """Where groups that were taken from either shot have the ball in frames of one, with given cameras."""
     sha256 = get_recording(store, shot.recording).require_readable()
     ids: set[int] = set()
     for number in {one.recording for one in shots}:
-        ids |= set(groups_taken(store, get_recording(store, number)).values())
+        ids |= set(find_groups_of_recording(store, get_recording(store, number)).values())
     wanted = sorted(ids)
     for start in range(0, len(wanted), _BATCH):
         with store.read() as session:

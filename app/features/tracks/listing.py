@@ -19,7 +19,7 @@ class TrackChoice:
     """Which tracks of a dataset, and in which order; None: all.
 
     Attributes:
-        verdict: ``none``: nobody judged them.
+        verdict: ``make_empty_track``: nobody judged them.
         stale: Whether their groups have changed since.
         assigned: Name of a person in whose open batches they are.
         batch: Id of an open batch that they are in.
@@ -67,7 +67,9 @@ def choose_tracks(store: Store, dataset: str | int, choice: TrackChoice) -> list
         people: dict[int, list[str]] = {batch: [] for batch in ids}
         for row in list_batch_people(session, sorted(ids)):
             people[row.batch_id].append(row.name)
-    listed = [_listed(track, dict(given.get(track.id, ())), people, choice) for track in tracks]
+    listed = [
+        _make_listed_track(track, dict(given.get(track.id, ())), people, choice) for track in tracks
+    ]
     found = [one for one in listed if _is_chosen(one, choice)]
     if choice.sort == "worst":
         found.sort(key=lambda one: -(one.track.summary.p95_px or 0.0))
@@ -78,7 +80,7 @@ def choose_tracks(store: Store, dataset: str | int, choice: TrackChoice) -> list
     return found
 
 
-def _listed(
+def _make_listed_track(
     track: Track, places: Mapping[int, int], people: Mapping[int, list[str]], choice: TrackChoice
 ) -> ListedTrack:
     names = sorted({name for batch in places for name in people[batch]})

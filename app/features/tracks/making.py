@@ -14,14 +14,14 @@ from app.features.groups.queries import read_groups
 from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.tracks.codec import (
     TrackInputs,
-    correct,
-    corrected,
+    apply_corrections,
     corrections_from_json,
-    corrections_text,
-    inputs_digest,
+    corrections_to_text,
+    digest_inputs,
     inputs_to_json,
     make_track,
     patches_to_json,
+    solve_corrections,
     track_from_json,
     track_to_json,
 )
@@ -29,28 +29,28 @@ from app.features.tracks.findings import TRIES, refresh_all_findings
 from app.features.tracks.queries import (
     TrackGroup,
     delete_tracks,
-    find_row,
+    find_track_row,
     insert_track,
-    list_rows,
-    match_groups,
-    read_bodies,
-    recording_shots,
+    list_track_rows,
+    read_groups_by_match,
+    read_recording_shots,
+    read_track_bodies,
     update_track,
 )
-from app.features.tracks.run_measurements import followed_observations, followed_runs
+from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
 from app.features.tracks.stored import (
     UNJUDGED,
     TrackSummary,
-    corrections_of,
-    summary_of,
-    track_stamp,
+    compute_track_stamp,
+    parse_corrections,
+    summarize_track,
 )
 from app.features.tracks.stretches import (
     Stretch,
+    find_group_instant,
     gather_stretches,
-    instant_of,
     match_stored_to_stretches,
-    require_stretch,
+    require_any_stretch,
 )
 from app.formats.export_record import ExportRecord
 from app.json_text import canonical_json_text
@@ -94,44 +94,46 @@ def make_tracks(
     made = MadeTracks()
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        shots = recording_shots(session, found.id)
-        groups = match_groups(session, found.id, matches)
-        runs = followed_runs(session, found.id)
-        followed = followed_observations(
+        shots = read_recording_shots(session, found.id)
+        groups = read_groups_by_match(session, found.id, matches)
+        runs = list_followed_runs(session, found.id)
+        followed = collect_followed_observations(
             session,
             store.settings,
             {match: items for match, items in runs.items() if match in groups},
             found.policy,
         )
-        timed = {name: items for name, items in groups.items() if _says_time(session, items)}
+        timed = {name: items for name, items in groups.items() if _has_frame_times(session, items)}
         total, done = sum(map(len, timed.values())), 0
         stretches: list[Stretch] = []
         for items in timed.values():
             records = []
-            for record in read_records(session, items):
+            for record in read_export_records(session, items):
                 records.append(record)
                 if len(records) % BATCH == 0:
                     progress(done + len(records), total)
             done += len(items)
             stretches += gather_stretches(records, found.policy, shots, followed)
-        stored = match_stored_to_stretches(stretches, list_rows(session, found.id))
-    require_stretch(found.name, stretches)
+        stored = match_stored_to_stretches(stretches, list_track_rows(session, found.id))
+    require_any_stretch(found.name, stretches)
     for tracked, stretch in enumerate(stretches, 1):
-        stamp = track_stamp(
+        stamp = compute_track_stamp(
             found.policy, groups[stretch.match], stretch, runs.get(stretch.match, ())
         )
-        is_new, reason = _make(store, found, stretch, stored.get(stretch.key), stamp, actor)
+        is_new, reason = _track_stretch(
+            store, found, stretch, stored.get(stretch.key), stamp, actor
+        )
         made.made += is_new
         made.unchanged += not is_new
         if reason is not None:
             made.without.append({"stretch": stretch.key, "reason": reason})
         progress(done, total, f"{tracked} of {len(stretches)} stretches tracked.")
-    _forget(store, found, stretches, matches)
+    _delete_obsolete_tracks(store, found, stretches, matches)
     refresh_all_findings(store, found.id, groups.keys())
     return made
 
 
-def read_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+def read_export_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
     """Groups with their solutions; those that people rejected measure nothing."""
     ids = [group.id for group in groups if not group.rejected]
     for start in range(0, len(ids), BATCH):
@@ -142,58 +144,62 @@ def read_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[Exp
             yield ExportRecord(one.group, solutions.get(one.id))
 
 
-def _says_time(session: Session, groups: Sequence[TrackGroup]) -> bool:
+def _has_frame_times(session: Session, groups: Sequence[TrackGroup]) -> bool:
     """Whether a match's groups follow each other in time, by the first of them."""
-    first = next(iter(read_records(session, groups[:1])), None)
-    return first is None or instant_of(first.group) is not None
+    first = next(iter(read_export_records(session, groups[:1])), None)
+    return first is None or find_group_instant(first.group) is not None
 
 
-def _make(
+def _track_stretch(
     store: Store, dataset: DatasetHead, stretch: Stretch, row: Any | None, stamp: str, actor: str
 ) -> tuple[bool, str | None]:
     """Track a stretch, if its measurements are others than those of its row; whether they are, and why
     there is no track."""
     inputs = TrackInputs.of(stretch)
-    known: dict[str, Any] = {"key": stretch.key, "stamp": stamp, "digest": inputs_digest(inputs)}
+    known: dict[str, Any] = {"key": stretch.key, "stamp": stamp, "digest": digest_inputs(inputs)}
     is_new = row is None or row.digest != known["digest"]
     base = make_track(inputs) if is_new else None
     if is_new:
         known |= UNJUDGED | {"actor": actor, "created": now()}
 
-    def columns(session: Session) -> dict[str, Any]:
+    def build_columns(session: Session) -> dict[str, Any]:
         """All that is stored, with what is said of its events as a session sees it."""
         nonlocal base
-        said = _said(session, dataset, stretch, row)
-        own = None if row is None else find_row(session, row.id)
+        said = _collect_corrections(session, dataset, stretch, row)
+        own = None if row is None else find_track_row(session, row.id)
         if base is None and own is None:
             # Somebody deleted it meanwhile.
             base = make_track(inputs)
             known.update(UNJUDGED | {"actor": actor, "created": now()})
         elif base is None and own is not None and said != own.corrections:
-            base = track_from_json(decompress_json(read_bodies(session, [own.id])[own.id].body))
+            base = track_from_json(
+                decompress_json(read_track_bodies(session, [own.id])[own.id].body)
+            )
         if base is not None:
-            return known | _computed(stretch, inputs, base, said) | {"corrections": said}
+            return known | _compute_columns(stretch, inputs, base, said) | {"corrections": said}
         return known | {"corrections": said} | ({} if own is None else {"summary": own.summary})
 
     for turn in range(TRIES):
         with store.read() as session:
-            values = columns(session)
+            values = build_columns(session)
         with store.write() as session:
             if turn == TRIES - 1:
-                values = columns(session)
-            if _save(session, dataset, stretch, row, values):
+                values = build_columns(session)
+            if _save_track(session, dataset, stretch, row, values):
                 break
     return is_new, parse_json_column(values["summary"])["reason"]
 
 
-def _computed(stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str) -> dict[str, Any]:
+def _compute_columns(
+    stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str
+) -> dict[str, Any]:
     """The columns of a track with what was said of its events."""
     whole = replace(inputs, corrections=corrections_from_json(parse_json_column(said)))
-    patches = correct(whole, base)
-    track = corrected(whole, base, patches)
-    told = unused_sentence(stretch.unused), jumps_sentence(track.jumps)
+    patches = solve_corrections(whole, base)
+    track = apply_corrections(whole, base, patches)
+    told = format_unused_balls(stretch.unused), format_view_jumps(track.jumps)
     warnings = [*filter(None, told), *(item.sentence for item in track.untracked)]
-    summary = summary_of(
+    summary = summarize_track(
         track,
         TrackSummary(
             *(0, {}, {}, len(inputs.measurements), 0, None, None, None, None),
@@ -213,13 +219,13 @@ def _computed(stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str)
     }
 
 
-def unused_sentence(unused: Mapping[str, int]) -> str | None:
+def format_unused_balls(unused: Mapping[str, int]) -> str | None:
     """Which balls took no part, a sentence; None: all did."""
     parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
     return f"Not measured: {', '.join(parts)}." if parts else None
 
 
-def jumps_sentence(jumps: Sequence[ViewJump]) -> str | None:
+def format_view_jumps(jumps: Sequence[ViewJump]) -> str | None:
     """Where views that take over put the ball elsewhere, a sentence; None: nowhere."""
     if not jumps:
         return None
@@ -230,17 +236,19 @@ def jumps_sentence(jumps: Sequence[ViewJump]) -> str | None:
     )
 
 
-def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | None) -> str:
+def _collect_corrections(
+    session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | None
+) -> str:
     """What was said of the events of a stretch, wherever it was stored."""
-    return corrections_text(
+    return corrections_to_text(
         item
-        for row in list_rows(session, dataset.id, [stretch.match])
-        for item in corrections_of(row)
+        for row in list_track_rows(session, dataset.id, [stretch.match])
+        for item in parse_corrections(row)
         if (own is not None and row.id == own.id) or stretch.first <= item.frame <= stretch.last
     )
 
 
-def _save(
+def _save_track(
     session: Session,
     dataset: DatasetHead,
     stretch: Stretch,
@@ -248,9 +256,9 @@ def _save(
     values: Mapping[str, Any],
 ) -> bool:
     """Store a track; not if somebody has said more of its events meanwhile, or deleted it."""
-    if _said(session, dataset, stretch, row) != values["corrections"]:
+    if _collect_corrections(session, dataset, stretch, row) != values["corrections"]:
         return False
-    own = None if row is None else find_row(session, row.id)
+    own = None if row is None else find_track_row(session, row.id)
     if own is None and "body" not in values:
         return False
     if own is None:
@@ -261,7 +269,7 @@ def _save(
     return True
 
 
-def _forget(
+def _delete_obsolete_tracks(
     store: Store,
     dataset: DatasetHead,
     stretches: Sequence[Stretch],
@@ -271,13 +279,13 @@ def _forget(
     that are no more, unless a person said something of them that none of today's stretches holds."""
     with store.write() as session:
         gone = []
-        for row in list_rows(session, dataset.id):
+        for row in list_track_rows(session, dataset.id):
             if matches is not None and row.match not in matches:
                 continue
             own = [item for item in stretches if item.match == row.match]
             home = next((item for item in own if item.key == row.key), None)
             elsewhere = [item for item in own if item is not home]
-            said = corrections_of(row)
+            said = parse_corrections(row)
             kept = [
                 item
                 for item in said
@@ -287,7 +295,7 @@ def _forget(
             if home is None and not kept and (row.verdict is None or now_in):
                 gone.append(row.id)
             elif len(kept) < len(said):
-                text = corrections_text(kept)
+                text = corrections_to_text(kept)
                 update_track(session, row.id, corrections=text, revision=row.revision + 1)
         if gone:
             delete_tracks(session, gone)

@@ -19,7 +19,7 @@ from app.features.tracks.tables import TrackModel
 _LARGE = ("inputs", "body", "patches")
 
 
-class GroupState(NamedTuple):
+class TrackGroupState(NamedTuple):
     """A group as far as a track depends on it, of which there are thousands."""
 
     key: str
@@ -60,7 +60,7 @@ class TrackBody:
     patches: bytes | None
 
 
-def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[int, int]]]:
+def read_recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[int, int]]]:
     """First and last frames of the shots of a dataset's recordings, by name."""
     statement = select(RecordingModel.name, RecordingModel.shots).where(
         RecordingModel.dataset_id == dataset_id
@@ -72,7 +72,7 @@ def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[i
         }
 
 
-def accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
+def list_accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
     """The accepted ball runs of a dataset whose video is still the same, without their frames, with ``name`` and
     ``video`` (sha256) of their recordings."""
     run, recording = BallRunModel, RecordingModel
@@ -94,36 +94,36 @@ def accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def place_of_group(session: Session, group_id: int) -> Any | None:
+def find_group_location(session: Session, group_id: int) -> Any | None:
     """Dataset, match and key of a group; None where there is none."""
     columns = GroupModel.dataset_id, GroupModel.match, GroupModel.key
     return session.execute(select(*columns).where(GroupModel.id == group_id)).one_or_none()
 
 
-def _heads() -> Select[Any]:
+def _select_without_bodies() -> Select[Any]:
     columns = [item for item in TrackModel.__table__.columns if item.name not in _LARGE]
     return select(*columns, DatasetModel.name.label("dataset")).join_from(
         TrackModel, DatasetModel, DatasetModel.id == TrackModel.dataset_id
     )
 
 
-def list_rows(
+def list_track_rows(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> Sequence[Any]:
     """The tracks of a dataset, or of some of its matches, by match and frame, without what is large."""
     order = TrackModel.match, TrackModel.first, TrackModel.id
-    statement = _heads().where(TrackModel.dataset_id == dataset_id).order_by(*order)
+    statement = _select_without_bodies().where(TrackModel.dataset_id == dataset_id).order_by(*order)
     if matches is not None:
         statement = statement.where(TrackModel.match.in_(list(matches)))
     return session.execute(statement).all()
 
 
-def find_row(session: Session, track_id: int) -> Any | None:
+def find_track_row(session: Session, track_id: int) -> Any | None:
     """A track by its id, without what is large."""
-    return session.execute(_heads().where(TrackModel.id == track_id)).one_or_none()
+    return session.execute(_select_without_bodies().where(TrackModel.id == track_id)).one_or_none()
 
 
-def read_bodies(session: Session, track_ids: Collection[int]) -> dict[int, TrackBody]:
+def read_track_bodies(session: Session, track_ids: Collection[int]) -> dict[int, TrackBody]:
     """What is large of tracks, by id."""
     model = TrackModel
     statement = select(model.id, model.inputs, model.body, model.patches).where(
@@ -151,7 +151,7 @@ def delete_tracks(session: Session, track_ids: Collection[int]) -> None:
     session.execute(delete(TrackModel).where(TrackModel.id.in_(list(track_ids))))
 
 
-def keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any]:
+def list_group_keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any]:
     """Ids and keys of the groups of a match, in the order of the dataset."""
     statement = (
         select(GroupModel.id, GroupModel.key)
@@ -161,10 +161,10 @@ def keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any
     return session.execute(statement).all()
 
 
-def match_states(
+def read_group_states_by_match(
     session: Session, dataset_id: int, matches: Collection[str]
-) -> dict[str, list[GroupState]]:
-    """What tracks of matches depend on, as ``match_groups`` has it, and nothing else: a third of its work."""
+) -> dict[str, list[TrackGroupState]]:
+    """What tracks of matches depend on, as ``read_groups_by_match`` has it, and nothing else: a third of its work."""
     statement = (
         select(
             GroupModel.match,
@@ -177,14 +177,14 @@ def match_states(
         .where(GroupModel.dataset_id == dataset_id, GroupModel.match.in_(list(matches)))
         .order_by(GroupModel.number)
     )
-    found: dict[str, list[GroupState]] = {}
+    found: dict[str, list[TrackGroupState]] = {}
     for match, key, inputs, solved, status in session.execute(statement):
-        state = GroupState(key, (inputs, bool(solved), status == "rejected"))
+        state = TrackGroupState(key, (inputs, bool(solved), status == "rejected"))
         found.setdefault(match, []).append(state)
     return found
 
 
-def match_groups(
+def read_groups_by_match(
     session: Session,
     dataset_id: int,
     matches: Collection[str] | None = None,

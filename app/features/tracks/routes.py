@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import make_job_response, openapi_of_job_response
+from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.match_estimates.routes import MatchRequest
 from app.features.tracks import service as tracks
-from app.features.tracks.around import track_around, tracks_of_group
+from app.features.tracks.around import compute_track_excerpt, find_tracks_of_group
 from app.features.tracks.jobs import TRACKS
 from app.features.tracks.listing import TrackChoice, TrackOrder, choose_tracks
 from app.features.tracks.schemas import (
@@ -25,7 +25,7 @@ from app.features.tracks.schemas import (
 from app.features.tracks.service import Track
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
-from app.http.documents import document, respond_with
+from app.http.documents import make_document_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -74,7 +74,7 @@ def list_tracks(
 @router.post(
     "/datasets/{dataset}/tracks",
     operation_id="makeTracks",
-    **openapi_of_job_response(404, 409, 413, 415),
+    **describe_job_response_for_openapi(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
@@ -140,7 +140,7 @@ def get_track_around(
 
     What an edit makes of the ball is known at once; the track is stale until it is made again.
     """
-    return TrackAround.around(track_around(store, track, frame))
+    return TrackAround.around(compute_track_excerpt(store, track, frame))
 
 
 @router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
@@ -148,12 +148,12 @@ def get_track_around(
 @paged()
 def list_tracks_of_group(group: Id, store: AppStore) -> GroupTrackList:
     """The track that a group is in, and its frame there."""
-    return GroupTrackList.model_validate({"items": tracks_of_group(store, group)})
+    return GroupTrackList.model_validate({"items": find_tracks_of_group(store, group)})
 
 
-def _tagged(track: Track) -> Response:
+def _make_track_response(track: Track) -> Response:
     found = TrackDocument.model_validate(track)
-    return document(found, 200, {"ETag": found.etag})
+    return make_document_response(found, 200, {"ETag": found.etag})
 
 
 @router.patch(
@@ -163,7 +163,7 @@ def _tagged(track: Track) -> Response:
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.REVIEW, track=OwnedKind.TRACK)
-@respond_with(_tagged)
+@respond_with(_make_track_response)
 def change_track(
     track: Id, edit: TrackEdit, store: AppStore, actor: Actor, if_match: IfMatch
 ) -> Track:

@@ -16,19 +16,19 @@ import numpy as np
 from app.config import Settings
 from app.db.session import Session
 from app.errors import ConflictError
-from app.features.recordings.ball_run_values import run_of_row
+from app.features.recordings.ball_run_values import build_run_from_row
 from app.features.recordings.cameras import read_cameras
-from app.features.recordings.index import frame_seconds
-from app.features.recordings.link_frames import unsound_frames
-from app.features.recordings.link_values import ShotLink, link_of
-from app.features.recordings.links import link_seconds
+from app.features.recordings.index import read_frame_times
+from app.features.recordings.link_frames import find_repeated_or_blended_frames
+from app.features.recordings.link_values import ShotLink, build_link_from_row
+from app.features.recordings.links import read_link_times
 from app.features.recordings.queries import (
-    find_run,
+    find_ball_run,
     list_link_rows,
     list_tracked_stretches,
-    views_of_video,
+    list_views_of_video,
 )
-from app.features.tracks.queries import accepted_run_rows, recording_shots
+from app.features.tracks.queries import list_accepted_run_rows, read_recording_shots
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
@@ -79,16 +79,19 @@ class FollowedObservation:
     ball: BallObservation
 
 
-def linked_view(recording: str, link: int) -> str:
+def format_linked_view_name(recording: str, link: int) -> str:
     """What the view of a linked replay is called in a stretch."""
     return f"{recording} link {link}"
 
 
-def followed_runs(session: Session, dataset_id: int) -> dict[str, list[FollowedRun]]:
+def list_followed_runs(session: Session, dataset_id: int) -> dict[str, list[FollowedRun]]:
     """The accepted runs of a dataset by the match whose ball they show: recordings name their matches."""
-    rows = accepted_run_rows(session, dataset_id)
-    shots = recording_shots(session, dataset_id) if rows else {}
-    cameras = {number: _cameras(session, number) for number in {row.recording_id for row in rows}}
+    rows = list_accepted_run_rows(session, dataset_id)
+    shots = read_recording_shots(session, dataset_id) if rows else {}
+    cameras = {
+        number: _list_stretch_cameras(session, number)
+        for number in {row.recording_id for row in rows}
+    }
     links = {
         number: [row for row in list_link_rows(session, number) if row.replay_id == number]
         for number in cameras
@@ -105,7 +108,7 @@ def followed_runs(session: Session, dataset_id: int) -> dict[str, list[FollowedR
         live = FollowedRun(first, last, said, row, None, None, mine)
         found.setdefault(row.name, []).append(live)
         for other in links[row.recording_id]:
-            link = link_of(other)
+            link = build_link_from_row(other)
             overlaps = row.first <= link.replay.last and link.replay.first <= row.last
             if overlaps and link.map.outcome == "linked":
                 ends, state = (link.live.first, link.live.last), (*said, link.id, link.etag)
@@ -114,12 +117,12 @@ def followed_runs(session: Session, dataset_id: int) -> dict[str, list[FollowedR
     return found
 
 
-def followed_states(runs: Sequence[FollowedRun], first: int, last: int) -> list[list[Any]]:
+def list_run_states(runs: Sequence[FollowedRun], first: int, last: int) -> list[list[Any]]:
     """What a track from one frame to another depends on of runs: those of its shot."""
     return [list(run.state) for run in runs if run.first <= last and first <= run.last]
 
 
-def followed_observations(
+def collect_followed_observations(
     session: Session,
     settings: Settings,
     runs: Mapping[str, Sequence[FollowedRun]],
@@ -140,23 +143,25 @@ def followed_observations(
         for run in items:
             video = run.row.video
             if video not in grouped:
-                shown = views_of_video(session, int(run.row.dataset_id), video)
+                shown = list_views_of_video(session, int(run.row.dataset_id), video)
                 grouped[video] = {view.number for view in shown}
             with suppress(ConflictError):
-                balls = run_of_row(find_run(session, run.row.id), video).trusted
-                for number, one in _observations(settings, run, balls, grouped[video], policy):
+                balls = build_run_from_row(find_ball_run(session, run.row.id), video).trusted
+                for number, one in _iterate_observations(
+                    settings, run, balls, grouped[video], policy
+                ):
                     if (one.view, number) not in seen:
                         seen.add((one.view, number))
                         found.setdefault(match, []).append(one)
     return found
 
 
-def _cameras(session: Session, recording_id: int) -> list[tuple[str, int, int]]:
+def _list_stretch_cameras(session: Session, recording_id: int) -> list[tuple[str, int, int]]:
     rows = list_tracked_stretches(session, recording_id)
     return [(row.digest, row.first, row.last) for row in rows]
 
 
-def _observations(
+def _iterate_observations(
     settings: Settings,
     run: FollowedRun,
     trusted: Mapping[int, FollowedBall],
@@ -178,16 +183,16 @@ def _observations(
         for each in read_cameras(settings, digest)
     }
     if link is None:
-        view, seconds = row.name, frame_seconds(settings, row.video)
+        view, seconds = row.name, read_frame_times(settings, row.video)
         times = {number: float(seconds[number]) for number in balls}
     else:
         view, seconds = (
-            linked_view(row.name, link.id),
-            frame_seconds(settings, run.link_row.live_sha256),
+            format_linked_view_name(row.name, link.id),
+            read_frame_times(settings, run.link_row.live_sha256),
         )
-        _, replay = link_seconds(settings, run.link_row)
+        _, replay = read_link_times(settings, run.link_row)
         live = seconds[link.live.first] + link.map.live(replay)
-        unsound = unsound_frames(settings, row.video, link.replay)
+        unsound = find_repeated_or_blended_frames(settings, row.video, link.replay)
         times = {
             number: float(live[number - link.replay.first])
             for number in balls
@@ -200,12 +205,12 @@ def _observations(
         near = int(np.abs(of_shot - time).argmin())
         if frame is None or frame.camera is None or abs(of_shot[near] - time) > half + 1e-9:
             continue
-        ball = _observation(view, balls[number], frame, policy)
+        ball = _make_observation(view, balls[number], frame, policy)
         at = float(of_shot[near])
         yield number, FollowedObservation(run.first + near, at, time, view, ball)
 
 
-def _observation(
+def _make_observation(
     view: str, ball: FollowedBall, frame: FrameCamera, policy: Policy
 ) -> BallObservation:
     calibration = Calibration("given", frame.camera, covariance=frame.covariance)

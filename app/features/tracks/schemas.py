@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.tracks.around import AROUND, Around
-from app.features.tracks.findings import contradicting_balls
+from app.features.tracks.around import AROUND, TrackExcerpt
+from app.features.tracks.findings import find_contradicting_balls
 from app.features.tracks.listing import ListedTrack
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
@@ -22,8 +22,8 @@ from app.formats.tracks_writer import position_sigma
 from app.geometry.arrays import FloatArray
 from app.http.documents import Document, ListDocument
 from app.json_text import MAX_ID, replace_non_finite
-from app.tracking.ball_correct import near_correction
-from app.tracking.ball_track import BallMode, BallState, Correction, EventKind
+from app.tracking.ball_correct import is_near_correction
+from app.tracking.ball_track import BallMode, BallState, EventCorrection, EventKind
 
 MOST_FRAMES = 5000
 """Of one answer."""
@@ -205,13 +205,16 @@ class TrackFrames(Document):
             y=replace_non_finite(position[:, 1].tolist()),
             z=replace_non_finite(position[:, 2].tolist()),
             sigma=replace_non_finite(position_sigma(spread).tolist()),
-            covariance=_rows(upper),
-            velocity=_rows(ball.velocity[rows]),
+            covariance=_rows_to_lists(upper),
+            velocity=_rows_to_lists(ball.velocity[rows]),
             state=[ball.state[row] for row in rows],
             mode=[ball.mode[row] for row in rows],
             views=[list(ball.views[row]) for row in rows],
             left_out_px=replace_non_finite(left[rows].tolist()),
-            raw=[_place(groups[number].place) if number in groups else None for number in numbers],
+            raw=[
+                _place_to_list(groups[number].place) if number in groups else None
+                for number in numbers
+            ],
             group=[groups[number].id if number in groups else None for number in numbers],
             events=[
                 TrackEventDocument(
@@ -220,7 +223,7 @@ class TrackFrames(Document):
                     kind=event.kind,
                     position=[float(value) for value in event.position],
                     sigma_s=event.sigma_s,
-                    added=near_correction(event, detail.inputs.corrections, added=True),
+                    added=is_near_correction(event, detail.inputs.corrections, added=True),
                 )
                 for event in ball.events
                 if event.frame in inside
@@ -228,7 +231,7 @@ class TrackFrames(Document):
             jumps=[
                 JumpDocument.model_validate(jump) for jump in ball.jumps if jump.frame in inside
             ],
-            contradicted=[item for item in _contradictions(detail) if item.frame in inside],
+            contradicted=[item for item in _build_contradictions(detail) if item.frame in inside],
         )
 
 
@@ -238,7 +241,7 @@ class TrackAround(TrackFrames):
     reason: str | None = Field(description="Why no track comes of them; null: one does.")
 
     @staticmethod
-    def around(found: Around) -> TrackAround:
+    def around(found: TrackExcerpt) -> TrackAround:
         """The document of what was tracked around a frame."""
         frames = TrackFrames.of(found, found.frame - AROUND, found.frame + AROUND)
         return TrackAround(**vars(frames), reason=found.ball.reason)
@@ -273,13 +276,15 @@ class TrackEdit(BaseModel):
     def change(self) -> TrackChange:
         """The change."""
         found = self.corrections
-        corrections = None if found is None else tuple(Correction(**vars(item)) for item in found)
+        corrections = (
+            None if found is None else tuple(EventCorrection(**vars(item)) for item in found)
+        )
         return TrackChange(self.verdict, self.note, corrections)
 
 
-def _contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:
+def _build_contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:
     found = []
-    for item in contradicting_balls(detail.ball, detail.inputs):
+    for item in find_contradicting_balls(detail.ball, detail.inputs):
         group = detail.groups.get(item.frame)
         x, y = item.place or (None, None)
         fix = (
@@ -305,10 +310,10 @@ def _contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:
     return found
 
 
-def _rows(values: FloatArray) -> list[list[float] | None]:
+def _rows_to_lists(values: FloatArray) -> list[list[float] | None]:
     known = np.asarray(np.isfinite(values).all(axis=1))
     return [row if there else None for row, there in zip(values.tolist(), known, strict=True)]
 
 
-def _place(place: Sequence[float] | None) -> list[float] | None:
+def _place_to_list(place: Sequence[float] | None) -> list[float] | None:
     return None if place is None else list(place)

@@ -16,40 +16,50 @@ from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.state import require_etag
 from app.features.tracks.codec import (
     TrackInputs,
-    correct,
-    corrected,
+    apply_corrections,
     corrections_from_json,
-    corrections_text,
-    frozen_track,
+    corrections_to_text,
+    frozen_track_to_json,
     inputs_from_json,
     patches_from_json,
     patches_to_json,
+    solve_corrections,
     track_from_json,
 )
-from app.features.tracks.export import KnownTrack, TrackSource, frozen_known
-from app.features.tracks.findings import Notices, groups_by_frame, save_notices, track_notices
+from app.features.tracks.export import StoredStretchTrack, TrackSource, parse_frozen_track
+from app.features.tracks.findings import (
+    TrackNotices,
+    make_track_notices,
+    map_groups_by_frame,
+    save_notices,
+)
 from app.features.tracks.making import MadeTracks as MadeTracks
 from app.features.tracks.making import make_tracks as make_tracks
 from app.features.tracks.queries import (
     TrackBody,
     TrackGroup,
-    find_row,
-    list_rows,
-    match_groups,
-    match_states,
-    read_bodies,
-    recording_shots,
+    find_track_row,
+    list_track_rows,
+    read_group_states_by_match,
+    read_groups_by_match,
+    read_recording_shots,
+    read_track_bodies,
     update_track,
 )
-from app.features.tracks.run_measurements import followed_observations, followed_runs
-from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, summary_of
+from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
+from app.features.tracks.stored import (
+    UNJUDGED,
+    build_track_from_row,
+    parse_corrections,
+    summarize_track,
+)
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
 from app.json_text import canonical_json_text
 from app.soccer.group import strip_and_check_note
 from app.soccer.policy import Policy
 from app.tracking.ball_correct import TrackPatch
-from app.tracking.ball_track import BallTrack, Correction
+from app.tracking.ball_track import BallTrack, EventCorrection
 
 MOST_CORRECTIONS = 2000
 
@@ -83,25 +93,31 @@ class TrackChange:
     """What a person says of a track; what is None stays as it is.
 
     Attributes:
-        verdict: ``none`` takes a verdict back.
+        verdict: ``make_empty_track`` takes a verdict back.
         note: Why.
         corrections: All of them.
     """
 
     verdict: Literal["accepted", "rejected", "none"] | None = None
     note: str | None = None
-    corrections: tuple[Correction, ...] | None = None
+    corrections: tuple[EventCorrection, ...] | None = None
 
 
 def list_tracks(store: Store, dataset: str | int) -> list[Track]:
     """The tracks of a dataset, by match and frame."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        rows = list_rows(session, found.id)
-        groups = match_states(session, found.id, {row.match for row in rows}) if rows else {}
-        runs = followed_runs(session, found.id) if rows else {}
+        rows = list_track_rows(session, found.id)
+        groups = (
+            read_group_states_by_match(session, found.id, {row.match for row in rows})
+            if rows
+            else {}
+        )
+        runs = list_followed_runs(session, found.id) if rows else {}
         return [
-            stored_track(row, found.policy, groups.get(row.match, ()), runs.get(row.match, ()))
+            build_track_from_row(
+                row, found.policy, groups.get(row.match, ()), runs.get(row.match, ())
+            )
             for row in rows
         ]
 
@@ -113,7 +129,7 @@ def get_track(store: Store, track_id: int) -> Track:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        return _read(session, track_id)[0]
+        return _read_track_and_groups(session, track_id)[0]
 
 
 def read_track(store: Store, track_id: int) -> TrackDetail:
@@ -123,10 +139,10 @@ def read_track(store: Store, track_id: int) -> TrackDetail:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        track, groups = _read(session, track_id)
-        body = read_bodies(session, [track_id])[track_id]
-    inputs, ball = _ball(body, track.corrections)
-    near = groups_by_frame(groups, track.first, track.last)
+        track, groups = _read_track_and_groups(session, track_id)
+        body = read_track_bodies(session, [track_id])[track_id]
+    inputs, ball = _build_ball_track(body, track.corrections)
+    near = map_groups_by_frame(groups, track.first, track.last)
     return TrackDetail(track.etag, ball, inputs, near, track)
 
 
@@ -153,9 +169,9 @@ def change_track(
             "this request changes nothing",
             hint="Send a verdict, with a note where there is something to say, or corrections.",
         )
-    solved, notices = _solved_change(store, track_id, change, if_match)
+    solved, notices = _solve_track_change(store, track_id, change, if_match)
     with store.write() as session:
-        track, _ = _read(session, track_id)
+        track, _ = _read_track_and_groups(session, track_id)
         require_etag(track.etag, if_match, f'the track "{track.key}"')
         values: dict[str, Any] = {"revision": track.revision + 1, **solved}
         if change.verdict is not None:
@@ -172,50 +188,54 @@ def change_track(
             save_notices(session, track.dataset_id, notices)
         did = f"track {change.verdict}" if change.verdict else "track corrected"
         add_audit_event(session, actor, did, track.dataset_id, track=track_id, name=track.key)
-        found, _ = _read(session, track_id)
+        found, _ = _read_track_and_groups(session, track_id)
         session.respond(found)
     return found
 
 
-def _solved_change(
+def _solve_track_change(
     store: Store, track_id: int, change: TrackChange, if_match: str
-) -> tuple[dict[str, Any], Notices | None]:
+) -> tuple[dict[str, Any], TrackNotices | None]:
     """Columns that come of corrections, and what the track says of its groups then where that may differ; all
     that takes time is done before the write."""
     with store.read() as session:
-        track, groups = _read(session, track_id)
+        track, groups = _read_track_and_groups(session, track_id)
         require_etag(track.etag, if_match, f'the track "{track.key}"')
         if change.corrections is None and "rejected" not in (track.verdict, change.verdict):
             return {}, None
-        body = read_bodies(session, [track_id])[track_id]
+        body = read_track_bodies(session, [track_id])[track_id]
         solved: dict[str, Any] = {}
         if change.corrections is None:
-            inputs, ball = _ball(body, track.corrections)
+            inputs, ball = _build_ball_track(body, track.corrections)
         else:
-            solved, inputs, ball = _corrected(body, track, change.corrections)
-        near = groups_by_frame(groups, track.first, track.last)
+            solved, inputs, ball = _recompute_corrected_track(body, track, change.corrections)
+        near = map_groups_by_frame(groups, track.first, track.last)
         told = None if change.verdict == "rejected" else (ball, inputs)
-        return solved, track_notices(session, track.match, near, told)
+        return solved, make_track_notices(session, track.match, near, told)
 
 
-def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
+def collect_accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
     """The tracks of a dataset that people accepted as its groups are now, by stretch, each with all that it
-    was computed from (``codec.frozen_track``)."""
-    rows = [row for row in list_rows(session, dataset.id) if row.verdict == "accepted"]
-    groups = match_states(session, dataset.id, {row.match for row in rows}) if rows else {}
-    runs = followed_runs(session, dataset.id) if rows else {}
+    was computed from (``codec.frozen_track_to_json``)."""
+    rows = [row for row in list_track_rows(session, dataset.id) if row.verdict == "accepted"]
+    groups = (
+        read_group_states_by_match(session, dataset.id, {row.match for row in rows}) if rows else {}
+    )
+    runs = list_followed_runs(session, dataset.id) if rows else {}
     found = {}
     for row in rows:
         of_match = groups.get(row.match, ()), runs.get(row.match, ())
-        track = stored_track(row, dataset.policy, *of_match)
+        track = build_track_from_row(row, dataset.policy, *of_match)
         if track.stale:
             continue
-        whole, ball = _ball(read_bodies(session, [row.id])[row.id], track.corrections)
-        found[row.key] = frozen_track(row.match, whole, ball)
+        whole, ball = _build_ball_track(
+            read_track_bodies(session, [row.id])[row.id], track.corrections
+        )
+        found[row.key] = frozen_track_to_json(row.match, whole, ball)
     return found
 
 
-def track_source(
+def make_track_source(
     session: Session,
     settings: Settings,
     dataset_id: int,
@@ -231,60 +251,66 @@ def track_source(
         dataset_id: Of the dataset.
         dataset: Its name.
         policy: Says how noisy clicks and cameras are.
-        frozen: The tracks of a frozen version by stretch (``codec.frozen_track``); None: the dataset
+        frozen: The tracks of a frozen version by stretch (``codec.frozen_track_to_json``); None: the dataset
             is exported as it is.
     """
-    shots = recording_shots(session, dataset_id)
+    shots = read_recording_shots(session, dataset_id)
     if frozen:
-        tracks = [frozen_known(key, value) for key, value in frozen.items()]
+        tracks = [parse_frozen_track(key, value) for key, value in frozen.items()]
         return TrackSource(dataset, policy, shots, tracks, frozen=True)
     if frozen is not None:
         return TrackSource(dataset, policy, shots)
-    rows = list_rows(session, dataset_id)
-    bodies = read_bodies(session, [row.id for row in rows if row.verdict == "accepted"])
+    rows = list_track_rows(session, dataset_id)
+    bodies = read_track_bodies(session, [row.id for row in rows if row.verdict == "accepted"])
     known = []
     for row in rows:
-        said, body = corrections_of(row), bodies.get(row.id)
-        track = None if body is None else _ball(body, said)[1]
+        said, body = parse_corrections(row), bodies.get(row.id)
+        track = None if body is None else _build_ball_track(body, said)[1]
         place = row.key, row.match, row.first, row.last
-        known.append(KnownTrack(*place, row.digest, track, row.verdict, said))
-    followed = followed_observations(session, settings, followed_runs(session, dataset_id), policy)
+        known.append(StoredStretchTrack(*place, row.digest, track, row.verdict, said))
+    followed = collect_followed_observations(
+        session, settings, list_followed_runs(session, dataset_id), policy
+    )
     return TrackSource(dataset, policy, shots, known, followed=followed)
 
 
-def _read(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
-    row = find_row(session, track_id)
+def _read_track_and_groups(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
+    row = find_track_row(session, track_id)
     if row is None:
         raise NotFoundError(f"there is no track {track_id}")
     found = read_dataset_head(session, int(row.dataset_id))
-    groups = match_groups(session, found.id, [row.match]).get(row.match, [])
-    runs = followed_runs(session, found.id).get(row.match, ())
-    return stored_track(row, found.policy, groups, runs), groups
+    groups = read_groups_by_match(session, found.id, [row.match]).get(row.match, [])
+    runs = list_followed_runs(session, found.id).get(row.match, ())
+    return build_track_from_row(row, found.policy, groups, runs), groups
 
 
-def _ball(body: TrackBody, said: tuple[Correction, ...]) -> tuple[TrackInputs, BallTrack]:
+def _build_ball_track(
+    body: TrackBody, said: tuple[EventCorrection, ...]
+) -> tuple[TrackInputs, BallTrack]:
     """A stored track with its corrections, and all that it was computed from."""
     inputs = replace(inputs_from_json(decompress_json(body.inputs)), corrections=said)
-    return inputs, corrected(inputs, track_from_json(decompress_json(body.body)), _patches(body))
+    return inputs, apply_corrections(
+        inputs, track_from_json(decompress_json(body.body)), _parse_patches(body)
+    )
 
 
-def _patches(body: TrackBody) -> tuple[TrackPatch, ...]:
+def _parse_patches(body: TrackBody) -> tuple[TrackPatch, ...]:
     return () if body.patches is None else patches_from_json(decompress_json(body.patches))
 
 
-def _corrected(
-    body: TrackBody, track: Track, corrections: Sequence[Correction]
+def _recompute_corrected_track(
+    body: TrackBody, track: Track, corrections: Sequence[EventCorrection]
 ) -> tuple[dict[str, Any], TrackInputs, BallTrack]:
     """The columns of a track whose events are corrected, and itself; it is solved anew around what is new."""
-    text = _checked(track, corrections)
+    text = _validate_corrections(track, corrections)
     inputs = replace(
         inputs_from_json(decompress_json(body.inputs)),
         corrections=corrections_from_json(parse_json_column(text)),
     )
     base = track_from_json(decompress_json(body.body))
-    patches = correct(inputs, base, _patches(body))
-    ball = corrected(inputs, base, patches)
-    summary = summary_of(ball, track.summary)
+    patches = solve_corrections(inputs, base, _parse_patches(body))
+    ball = apply_corrections(inputs, base, patches)
+    summary = summarize_track(ball, track.summary)
     columns = {
         "corrections": text,
         "patches": compress_json(patches_to_json(patches)) if patches else None,
@@ -308,7 +334,7 @@ def _require_acceptable(track: Track) -> None:
         )
 
 
-def _checked(track: Track, corrections: Sequence[Correction]) -> str:
+def _validate_corrections(track: Track, corrections: Sequence[EventCorrection]) -> str:
     """Corrections as they are stored.
 
     Raises:
@@ -325,4 +351,4 @@ def _checked(track: Track, corrections: Sequence[Correction]) -> str:
                 f" {track.first} to {track.last}",
                 pointer=f"/corrections/{number}/frame",
             )
-    return corrections_text(corrections)
+    return corrections_to_text(corrections)

@@ -10,13 +10,13 @@ import numpy as np
 
 from app.db.json_columns import parse_json_column, report_damaged_values
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
-from app.features.tracks.queries import GroupState, TrackGroup
-from app.features.tracks.run_measurements import FollowedRun, followed_states
-from app.features.tracks.stretches import StoredStretch, frame_of
-from app.soccer.codec import digest
+from app.features.tracks.queries import TrackGroup, TrackGroupState
+from app.features.tracks.run_measurements import FollowedRun, list_run_states
+from app.features.tracks.stretches import StoredStretch, parse_frame_number
+from app.soccer.codec import digest_json
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
-from app.tracking.ball_track import BallTrack, Correction
+from app.tracking.ball_track import BallTrack, EventCorrection
 
 Verdict = Literal["accepted", "rejected"]
 UNJUDGED: dict[str, None] = dict.fromkeys(("verdict", "note", "judged_by", "judged_at"))
@@ -86,7 +86,7 @@ class Track:
     note: str | None
     judged_by: str | None
     judged_at: str | None
-    corrections: tuple[Correction, ...]
+    corrections: tuple[EventCorrection, ...]
     summary: TrackSummary
     actor: str
     created: str
@@ -94,7 +94,7 @@ class Track:
     etag: str
 
 
-def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
+def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
     """What a list says of a track.
 
     Args:
@@ -120,10 +120,10 @@ def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
     )
 
 
-def stored_track(
+def build_track_from_row(
     row: Any,
     policy: Policy,
-    groups: Iterable[TrackGroup | GroupState],
+    groups: Iterable[TrackGroup | TrackGroupState],
     runs: Sequence[FollowedRun] = (),
 ) -> Track:
     """A row of the table without what is large, with the groups and accepted ball runs of its match."""
@@ -135,40 +135,40 @@ def stored_track(
         match=row.match,
         first=row.first,
         last=row.last,
-        stale=row.stamp != track_stamp(policy, groups, row, runs),
+        stale=row.stamp != compute_track_stamp(policy, groups, row, runs),
         verdict=row.verdict,
         note=row.note,
         judged_by=row.judged_by,
         judged_at=row.judged_at,
-        corrections=corrections_of(row),
-        summary=summary_of_row(row),
+        corrections=parse_corrections(row),
+        summary=parse_track_summary(row),
         actor=row.actor,
         created=row.created,
         revision=row.revision,
-        etag=track_etag(row),
+        etag=make_track_etag(row),
     )
 
 
-def summary_of_row(row: Any) -> TrackSummary:
+def parse_track_summary(row: Any) -> TrackSummary:
     """What a list says of a row's track."""
     with report_damaged_values():
         return TrackSummary(**parse_json_column(row.summary))
 
 
-def track_etag(row: Any) -> str:
+def make_track_etag(row: Any) -> str:
     """The ETag of a row's track, quoted."""
-    return f'"{digest([row.digest, row.revision])[:16]}"'
+    return f'"{digest_json([row.digest, row.revision])[:16]}"'
 
 
-def corrections_of(row: Any) -> tuple[Correction, ...]:
+def parse_corrections(row: Any) -> tuple[EventCorrection, ...]:
     """What people said of the events of a row's track."""
     with report_damaged_values():
         return corrections_from_json(parse_json_column(row.corrections))
 
 
-def track_stamp(
+def compute_track_stamp(
     policy: Policy,
-    groups: Iterable[TrackGroup | GroupState],
+    groups: Iterable[TrackGroup | TrackGroupState],
     place: StoredStretch,
     runs: Sequence[FollowedRun] = (),
 ) -> str:
@@ -184,9 +184,9 @@ def track_stamp(
     states = [
         [group.key, *group.state]
         for group in groups
-        if (frame := frame_of(group.key)) is not None
+        if (frame := parse_frame_number(group.key)) is not None
         and (whole or place.first <= frame <= place.last)
     ]
-    followed = followed_states(runs, place.first, place.last)
+    followed = list_run_states(runs, place.first, place.last)
     said = [followed] if followed else []
-    return digest([TRACK_VERSION, SOLVER_VERSION, policy.hash, states, *said])
+    return digest_json([TRACK_VERSION, SOLVER_VERSION, policy.hash, states, *said])

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from app.errors import InputError
-from app.features.tracks.run_measurements import FollowedObservation, linked_view
+from app.features.tracks.run_measurements import FollowedObservation, format_linked_view_name
 from app.formats.export_record import ExportRecord
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
@@ -115,29 +115,29 @@ Stored = TypeVar("Stored", bound=StoredStretch)
 
 
 @lru_cache(maxsize=2**16)
-def frame_of(key: str) -> int | None:
+def parse_frame_number(key: str) -> int | None:
     """The number of a group's frame, which ends its key; None where none does."""
     number = _NUMBER.fullmatch(key)
     return None if number is None else int(number[1])
 
 
-def instant_of(group: Group) -> tuple[Instant, bool] | None:
+def find_group_instant(group: Group) -> tuple[Instant, bool] | None:
     """When a group was, and whether a recording says so; None where nothing does."""
     for view in group.views:
-        if (found := _taken_from(view)) and "link" not in found:
+        if (found := _get_recording_metadata(view)) and "link" not in found:
             try:
                 frame, seconds = int(found["frame"]), float(found["seconds"])
             except (KeyError, TypeError, ValueError):
                 continue
             return Instant(frame, seconds, group.key), True
-    number = frame_of(group.key)
+    number = parse_frame_number(group.key)
     if number is None or not all(view.station.shared for view in group.views):
         return None
     return Instant(number, number / RATE, group.key), False
 
 
 @dataclass
-class _Row:
+class _GroupMeasurements:
     """What one group gives.
 
     Attributes:
@@ -153,9 +153,9 @@ class _Row:
 
 
 @dataclass
-class _Match:
+class _MatchRows:
     recorded: bool
-    rows: list[_Row] = field(default_factory=list)
+    rows: list[_GroupMeasurements] = field(default_factory=list)
 
 
 def gather_stretches(
@@ -173,28 +173,28 @@ def gather_stretches(
         followed: Balls of accepted runs in frames that are of no group, by match: of the frames of a stretch,
             and beyond its groups of those of its shot.
     """
-    matches: dict[str, _Match] = {}
+    matches: dict[str, _MatchRows] = {}
     known: dict[bytes, Camera] = {}
     for record in records:
-        found = instant_of(record.group)
+        found = find_group_instant(record.group)
         if found is None:
             continue
         instant, recorded = found
-        match = matches.setdefault(record.group.match, _Match(recorded))
-        match.rows.append(_row(record, instant, known))
+        match = matches.setdefault(record.group.match, _MatchRows(recorded))
+        match.rows.append(_measure_group(record, instant, known))
     stretches = []
     for name, match in sorted(matches.items()):
         match.rows.sort(key=lambda row: row.instant.frame)
         of_match = (shots or {}).get(name)
-        for rows in _parts(match, of_match):
+        for rows in _split_into_stretches(match, of_match):
             key, beside = name, list[FollowedObservation]()
             if match.recorded:
                 first, last = rows[0].instant.frame, rows[-1].instant.frame
-                first, last = _shot_at(first, of_match) or (first, last)
+                first, last = _find_shot_at_frame(first, of_match) or (first, last)
                 key = f"{name} {first}-{last}"
                 every = (followed or {}).get(name, ())
                 beside = [one for one in every if first <= one.frame <= last]
-            stretches.append(_stretch(key, name, rows, beside, match, policy))
+            stretches.append(_build_stretch(key, name, rows, beside, match, policy))
     return stretches
 
 
@@ -225,7 +225,7 @@ def match_stored_to_stretches(
     return found
 
 
-def require_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
+def require_any_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
     """Raises InputError where no groups follow each other in time."""
     if not stretches:
         raise InputError(
@@ -235,7 +235,9 @@ def require_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
         )
 
 
-def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> _Row:
+def _measure_group(
+    record: ExportRecord, instant: Instant, known: dict[bytes, Camera]
+) -> _GroupMeasurements:
     group, solution, unused = record.group, record.solution, Counter[str]()
     views, calibrations = [], []
     cameras = {}
@@ -246,12 +248,12 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
         if solved is None or camera is None or solved.failed in UNSURE:
             unused["no camera that passes its gates" if solution else "not solved"] += ball
             continue
-        camera = known.setdefault(_bytes_of(camera), camera)
-        cameras[view_name(view)] = camera
+        camera = known.setdefault(_camera_to_bytes(camera), camera)
+        cameras[make_view_name(view)] = camera
         if not view.included:
             unused["view left out"] += ball
             continue
-        if _taken_from(view).get("repeated"):
+        if _get_recording_metadata(view).get("repeated"):
             unused["frame that repeats the one before"] += ball
             continue
         views.append(view)
@@ -259,47 +261,57 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
         calibrations.append(replace(solved.calibration, camera=camera))
     by_key = {view.key: view for view in views}
     observations = [
-        (view_name(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
+        (
+            make_view_name(by_key[item.view]),
+            instant.time + _get_replay_time_offset(by_key[item.view]),
+            item,
+        )
         for item in collect_clicked_balls(views, calibrations)
     ]
-    return _Row(instant, group.pitch, observations, record.point, cameras, unused)
+    return _GroupMeasurements(instant, group.pitch, observations, record.point, cameras, unused)
 
 
-def _taken_from(view: View) -> Mapping[str, Any]:
+def _get_recording_metadata(view: View) -> Mapping[str, Any]:
     """Which frame of which recording a view shows; empty where it is of none."""
     found = view.extras.metadata.get("recording")
     return found if isinstance(found, Mapping) else {}
 
 
-def view_name(view: View) -> str:
+def make_view_name(view: View) -> str:
     """What a view is called through a stretch: its recording, of a replay with its link, or its camera."""
-    found = _taken_from(view)
+    found = _get_recording_metadata(view)
     if "name" not in found:
         return view.key
-    return linked_view(found["name"], found["link"]) if "link" in found else str(found["name"])
+    return (
+        format_linked_view_name(found["name"], found["link"])
+        if "link" in found
+        else str(found["name"])
+    )
 
 
-def _later(view: View) -> float:
+def _get_replay_time_offset(view: View) -> float:
     """Live seconds by which a frame of a replay is later than the instant that it was taken for."""
-    off = _taken_from(view).get("off_s")
+    off = _get_recording_metadata(view).get("off_s")
     return float(off) if isinstance(off, (int, float)) else 0.0
 
 
-def _bytes_of(camera: Camera) -> bytes:
+def _camera_to_bytes(camera: Camera) -> bytes:
     numbers = (*camera.focal_length, *camera.principal_point, camera.skew)
     parts = camera.rotation, camera.position, np.array(numbers), camera.distortion
     return b"".join(np.asarray(part).tobytes() for part in parts) + camera.lens.encode()
 
 
-def _parts(match: _Match, shots: Sequence[tuple[int, int]] | None) -> list[list[_Row]]:
+def _split_into_stretches(
+    match: _MatchRows, shots: Sequence[tuple[int, int]] | None
+) -> list[list[_GroupMeasurements]]:
     """Rows that belong together: a whole rig, or the shots of a recording."""
-    parts: list[list[_Row]] = []
-    last: _Row | None = None
+    parts: list[list[_GroupMeasurements]] = []
+    last: _GroupMeasurements | None = None
     place: object = None
     for row in match.rows:
         frame = row.instant.frame
         if match.recorded and shots:
-            here: object = _shot_at(frame, shots)
+            here: object = _find_shot_at_frame(frame, shots)
             new = here is None or here != place
             place = here
         else:
@@ -318,17 +330,19 @@ def _parts(match: _Match, shots: Sequence[tuple[int, int]] | None) -> list[list[
     return parts
 
 
-def _shot_at(frame: int, shots: Sequence[tuple[int, int]] | None) -> tuple[int, int] | None:
+def _find_shot_at_frame(
+    frame: int, shots: Sequence[tuple[int, int]] | None
+) -> tuple[int, int] | None:
     """The shot that a frame is of; None: none, as in a transition."""
     return next((shot for shot in shots or () if shot[0] <= frame <= shot[1]), None)
 
 
-def _stretch(
+def _build_stretch(
     key: str,
     name: str,
-    rows: Sequence[_Row],
+    rows: Sequence[_GroupMeasurements],
     beside: Sequence[FollowedObservation],
-    match: _Match,
+    match: _MatchRows,
     policy: Policy,
 ) -> Stretch:
     shown = {one.frame: one.frame_time for one in beside}
@@ -357,15 +371,15 @@ def _stretch(
         # Time stamps of frames without a group lie between those of their neighbours.
         times=np.interp(frames, numbers, seconds),
         pitch=rows[0].pitch,
-        measurements=_measurements(rows, beside, policy),
+        measurements=_build_measurements(rows, beside, policy),
         groups={row.instant.frame: row.instant.key for row in rows},
         cameras=cameras,
         unused={reason: number for reason, number in unused.items() if number},
     )
 
 
-def _measurements(
-    rows: Sequence[_Row], beside: Sequence[FollowedObservation], policy: Policy
+def _build_measurements(
+    rows: Sequence[_GroupMeasurements], beside: Sequence[FollowedObservation], policy: Policy
 ) -> BallMeasurements:
     found = [
         (row.instant.frame, name, time, item, row.point)
@@ -373,12 +387,12 @@ def _measurements(
         for name, time, item in row.observations
     ]
     found += [(one.frame, one.view, one.time, one.ball, None) for one in beside]
-    rays = _rays([item for *_, item, _ in found])
+    rays = _compute_unit_rays([item for *_, item, _ in found])
     # Beyond the radius where a lens folds the picture there is no ray.
     good = np.flatnonzero(np.isfinite(rays).all(axis=1)).tolist()
     found, rays = [found[row] for row in good], rays[good]
     observations = [item for *_, item, _ in found]
-    points = _rough(observations, rays, [place for *_, place in found])
+    points = _estimate_ball_positions(observations, rays, [place for *_, place in found])
     spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
     sizes = np.array([item.diameter_px or np.nan for item in observations])
     share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
@@ -394,7 +408,7 @@ def _measurements(
     )
 
 
-def _rays(observations: Sequence[BallObservation]) -> FloatArray:
+def _compute_unit_rays(observations: Sequence[BallObservation]) -> FloatArray:
     """Unit directions in the pitch frame, NaN where a pixel has none, shape (N, 3)."""
     by_camera: dict[int, list[int]] = {}
     for row, item in enumerate(observations):
@@ -407,7 +421,7 @@ def _rays(observations: Sequence[BallObservation]) -> FloatArray:
     return unit
 
 
-def _rough(
+def _estimate_ball_positions(
     observations: Sequence[BallObservation],
     rays: FloatArray,
     places: Sequence[tuple[float, float, float] | None],

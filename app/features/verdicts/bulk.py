@@ -20,7 +20,7 @@ from app.errors import ConflictError
 from app.features.independent_annotations.queries import list_closed_copies
 from app.features.people.visibility_queries import COPIES, sees_all_work
 from app.features.queue.fields import query_reveals_hidden_work
-from app.features.queue.queries import Listing, read_columns
+from app.features.queue.queries import GroupListing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.queue.refresh_queries import filter_edited_groups, refresh_verdicts
 from app.features.solutions.queries import list_unsolved_groups, read_current_solution_keys
@@ -123,8 +123,8 @@ def plan_verdicts(
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-        sorted_out = select_groups(session, dataset_id, rows, verdict)
+        rows = GroupListing(session, dataset_id, conditions).columns(ASKED, by_number=True)
+        sorted_out = select_groups_for_verdict(session, dataset_id, rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
@@ -170,15 +170,15 @@ def give_verdicts(
     run = BatchRun(dataset_id, query, verdict, actor)
     with store.read() as session:
         begun = run.resume(session)
-        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-        found = select_groups(session, dataset_id, rows, verdict)
+        rows = GroupListing(session, dataset_id, conditions).columns(ASKED, by_number=True)
+        found = select_groups_for_verdict(session, dataset_id, rows, verdict)
     if begun is None:
-        _require_expected(found, expected)
+        _require_expected_count(found, expected)
         left, refused = found.change, found.refused
         if not left:
             return BatchReport(None, 0, refused)
     else:
-        left = _remaining_rows(found.change, begun)
+        left = _filter_remaining_rows(found.change, begun)
         refused = tuple(Refusal(*item) for item in begun["refused"])
     places = [(row.number, row.group_id) for row in left]
     # Of a million groups, what the queue says of each is much.
@@ -188,10 +188,10 @@ def give_verdicts(
         chunk = places[start : start + CHUNK]
         with store.write() as session:
             rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
-            run.save(session, select_groups(session, dataset_id, rows, verdict).change)
+            run.save(session, select_groups_for_verdict(session, dataset_id, rows, verdict).change)
             if start + CHUNK < len(places):
                 here, end = chunk[-1][0], places[-1][0]
-                run.interrupt(session, {"after": here, "until": end, "refused": counts})
+                run.save_remaining(session, {"after": here, "until": end, "refused": counts})
             else:
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, refused)
@@ -199,7 +199,7 @@ def give_verdicts(
     return report
 
 
-def _remaining_rows(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
+def _filter_remaining_rows(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
     """Those of some groups that a run which was stopped had left.
 
     It remembers the numbers between which they lie, so that whatever was imported since is not
@@ -211,7 +211,7 @@ def _remaining_rows(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
     return [row for row in rows if begun["after"] < row.number <= begun["until"]]
 
 
-def _require_expected(found: VerdictSelection, expected: int | None) -> None:
+def _require_expected_count(found: VerdictSelection, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{plural(len(found.change), 'group')} would change, not {expected}",
@@ -255,7 +255,7 @@ class VerdictSelection:
     refused: tuple[Refusal, ...]
 
 
-def select_groups(
+def select_groups_for_verdict(
     session: Session, dataset_id: int, rows: Sequence[Any], verdict: Verdict
 ) -> VerdictSelection:
     """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
@@ -272,7 +272,7 @@ def select_groups(
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
-        elif verdict.state == "accepted" and verdict.note is None and _is_unusable(row):
+        elif verdict.state == "accepted" and verdict.note is None and _is_ball_unusable(row):
             refused[UNUSABLE_BALL] += 1
         elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
             refused[NO_PICTURE] += 1
@@ -288,7 +288,7 @@ def _unsolved_groups(session: Session, dataset_id: int, rows: Sequence[Any]) -> 
     return set(list_unsolved_groups(session, dataset_id, few))
 
 
-def _is_unusable(row: Any) -> bool:
+def _is_ball_unusable(row: Any) -> bool:
     """Whether a finding says that nobody can use the ball; the number of sigma's is sigma.
 
     One that was dismissed says it, too: a verdict needs the note all the same.
@@ -335,7 +335,7 @@ class BatchRun:
         self._stored_batch(session)
         return self._left
 
-    def interrupt(self, session: Session, left: dict[str, Any]) -> None:
+    def save_remaining(self, session: Session, left: dict[str, Any]) -> None:
         """Say in the transaction of a chunk what is left once it is saved."""
         if session.idempotency_key is None:
             return

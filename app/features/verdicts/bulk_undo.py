@@ -17,7 +17,7 @@ from app.features.verdicts.bulk import (
     BatchRun,
     Refusal,
     save_verdicts,
-    select_groups,
+    select_groups_for_verdict,
     split_for_transactions,
 )
 from app.features.verdicts.queries import (
@@ -62,10 +62,10 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     with store.read() as session:
         before = read_batch(session, batch_id).undo_spans or ()
         restored = _count_groups(session, before)
-    known, number = _read_verdicts(before), 0
+    known, number = _count_verdicts(before), 0
     while True:
         with store.write() as session:
-            batch = _active_batch(session, batch_id)
+            batch = _read_active_batch(session, batch_id)
             left = split_for_transactions(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore_chunk(session, batch, *left[0], actor) if left else []
@@ -75,7 +75,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
             known += len(verdicts)
             number += 1
             if len(left) <= 1:
-                if _read_verdicts(spans) != known:
+                if _count_verdicts(spans) != known:
                     # Another run has been at it meanwhile.
                     restored = _count_groups(session, spans)
                 report = UndoReport(batch_id, restored, batch.changed - restored)
@@ -89,11 +89,11 @@ def _count_groups(session: Session, spans: Spans) -> int:
     return len({group for span in spans for group in list_groups_judged_between(session, *span)})
 
 
-def _read_verdicts(spans: Spans) -> int:
+def _count_verdicts(spans: Spans) -> int:
     return sum(last - first + 1 for first, last in spans)
 
 
-def _active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
+def _read_active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     """A batch that was not taken back, or not wholly.
 
     Raises:
@@ -138,14 +138,14 @@ def _restore_chunk(
         session, list_groups_judged_between(session, first, last)
     ).values():
         if first <= verdicts[0].id <= last:
-            again += _earlier_verdicts(verdicts, batch.actor, at)
+            again += _make_restoring_verdicts(verdicts, batch.actor, at)
     numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
     if numbered:
         save_verdicts(session, batch.dataset_id, numbered, actor=actor, at=at)
     return numbered
 
 
-def _earlier_verdicts(
+def _make_restoring_verdicts(
     verdicts: Sequence[StoredVerdict], judge: str, at: str
 ) -> list[StoredVerdict]:
     """Verdicts that put a group back: its judge's own last one, then the one that counted.
@@ -197,23 +197,23 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
         verdict = check_verdict(batch.state, batch.reason, batch.note)
         run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
         begun = run.resume(session)
-    spans = _undo_spans(batch) if begun is None else begun["left"]
+    spans = _read_undo_spans(batch) if begun is None else begun["left"]
     refused: Counter[str] = Counter({} if begun is None else begun["refused"])
     if not spans:
         return _redo_report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
             run.batch = _unfinished_redo(session, batch_id, actor)
-            ids = _groups_unchanged_since(session, batch.spans, first, last)
+            ids = _list_unchanged_groups(session, batch.spans, first, last)
             rows = read_columns(session, ids, (), ASKED)
-            found = select_groups(session, batch.dataset_id, rows, verdict)
+            found = select_groups_for_verdict(session, batch.dataset_id, rows, verdict)
             run.save(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
                 update_batch(session, batch_id, redone=run.batch)
             if number < len(spans):
                 left = [list(span) for span in spans[number:]]
-                run.interrupt(session, {"left": left, "refused": dict(refused)})
+                run.save_remaining(session, {"left": left, "refused": dict(refused)})
             else:
                 run.close(session)
                 report = _redo_report(batch, run, refused)
@@ -227,7 +227,7 @@ def _redo_report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str])
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 
-def _undo_spans(batch: StoredBulkVerdict) -> Spans:
+def _read_undo_spans(batch: StoredBulkVerdict) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not undone, so there is nothing to redo")
@@ -256,7 +256,7 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
     return again.id
 
 
-def _groups_unchanged_since(session: Session, given: Spans, first: int, last: int) -> list[int]:
+def _list_unchanged_groups(session: Session, given: Spans, first: int, last: int) -> list[int]:
     """Groups of one chunk that nobody has judged since it was taken back, or edited."""
     ids = list_groups_with_newest_verdict_between(session, first, last)
     judged: dict[int, str] = {}

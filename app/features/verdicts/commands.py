@@ -56,7 +56,7 @@ def verdict(
             plan, report = remote.plan_or_give_verdicts(client, dataset, body, dry_run=dry_run)
     else:
         arguments = (query, state, reason, note)
-        plan, report = _judge_here(dataset, arguments, expected, dry_run=dry_run)
+        plan, report = _give_verdicts_in_home(dataset, arguments, expected, dry_run=dry_run)
     done = plan if report is None else report
     values: dict[str, Any] = {"matches": plan["matches"]}
     if report is None:
@@ -77,7 +77,7 @@ def verdict(
         raise typer.Exit(1)
 
 
-def _judge_here(
+def _give_verdicts_in_home(
     dataset: str,
     values: tuple[str, str, str | None, str | None],
     expected: int | None,

@@ -120,7 +120,7 @@ class JudgeCount(NamedTuple):
     groups: int
 
 
-def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[JudgeCount]:
+def count_groups_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[JudgeCount]:
     """Everybody who judged a group of a dataset, with the groups that they judged since some time."""
     recent = case((VerdictModel.at >= since, VerdictModel.group_id))
     actor = shown_actor_column(VerdictModel.actor, VerdictModel.at)

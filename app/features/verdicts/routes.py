@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool
 
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.datasets.service import dataset_id
-from app.features.findings.service import FindingName, set_dismissal
-from app.features.groups.routes import CHANGED, CONFLICTS, load_document
-from app.features.groups.schemas import GroupDocument, group_response
+from app.features.findings.service import FindingReference, set_dismissal
+from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
+from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
@@ -21,7 +21,13 @@ from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import set_verdict
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.http.documents import Document, ListDocument, document, respond_with, respond_with_document
+from app.http.documents import (
+    Document,
+    ListDocument,
+    make_document_responder,
+    make_document_response,
+    respond_with,
+)
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
@@ -163,7 +169,7 @@ class BatchList(ListDocument[BatchDocument]):
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def put_verdict(
     group: Id,
     verdict: VerdictEdit,
@@ -174,7 +180,7 @@ def put_verdict(
 ) -> GroupState:
     """Accept, reject with a reason, defer, or take a verdict back."""
     store, values = services.store, (verdict.state, verdict.reason, verdict.note)
-    with add_current_state_to_conflicts(lambda: load_document(store, group)):
+    with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
         state = set_verdict(store, group, *values, if_match=if_match, actor=actor)
     # A verdict on an independent annotation of a group, and on nothing else, submits that.
     if state.is_copy:
@@ -190,7 +196,7 @@ def put_verdict(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@respond_with(group_response)
+@respond_with(make_group_response)
 def put_dismissal(
     group: Id, body: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
@@ -200,8 +206,8 @@ def put_dismissal(
     says something else: its number has moved by more than 5 %, or, without one, its sentence is
     another.
     """
-    named = FindingName(body.kind, body.view, body.marking, body.suggested, body.number)
-    with add_current_state_to_conflicts(lambda: load_document(services.store, group)):
+    named = FindingReference(body.kind, body.view, body.marking, body.suggested, body.number)
+    with add_current_state_to_conflicts(lambda: load_group_document(services.store, group)):
         return set_dismissal(
             services.store,
             group,
@@ -221,7 +227,7 @@ def put_dismissal(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET)
-@respond_with(respond_with_document(BulkResult.done))
+@respond_with(make_document_responder(BulkResult.done))
 def post_verdicts(
     dataset: DatasetPath,
     verdict: BulkVerdict,
@@ -238,7 +244,7 @@ def post_verdicts(
     found = dataset_id(store, dataset)
     values = (verdict.q, verdict.state, verdict.reason, verdict.note)
     if dry_run:
-        return document(BulkResult.planned(bulk.plan_verdicts(store, found, *values)))
+        return make_document_response(BulkResult.planned(bulk.plan_verdicts(store, found, *values)))
     return bulk.give_verdicts(store, found, *values, actor=actor, expected=verdict.expected)
 
 
@@ -270,7 +276,7 @@ def list_batches(
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@respond_with(document)
+@respond_with(make_document_response)
 def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
@@ -288,7 +294,7 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@respond_with(document)
+@respond_with(make_document_response)
 def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 

@@ -9,19 +9,19 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.queries import StoredGroup
-from app.features.groups.state import GroupState, require_content, require_unchanged
-from app.features.groups.submit import read_solved
+from app.features.groups.state import GroupState, require_unchanged, require_unchanged_content
+from app.features.groups.submit import read_solved_group
 from app.features.queue.queries import count_reviewed
 from app.features.queue.refresh_queries import update_verdict
 from app.features.verdicts.queries import (
     StoredVerdict,
-    count_by_judge,
+    count_groups_by_judge,
     find_next_verdict_id,
     insert_verdicts,
 )
 from app.json_text import Moment
 from app.soccer.choices import VerdictState
-from app.soccer.group import REASONS, Group, require_explanation, strip_and_check_note
+from app.soccer.group import REASONS, Group, require_exclusion_note, strip_and_check_note
 from app.soccer.solution import Solution
 
 STATES: tuple[str, ...] = get_args(VerdictState)
@@ -61,14 +61,14 @@ def set_verdict(
     verdict = check_verdict(state, reason, note)
     while True:
         # Accepting weighs the gates, so they must be known.
-        record, solution = read_solved(store, group_id, needed=state == "accepted")
+        record, solution = read_solved_group(store, group_id, needed=state == "accepted")
         stored, what = record.stored, f"group {record.stored.group.key}"
         override = _overridden_gate(solution, verdict)
         _require_usable_ball(solution, verdict)
         _require_visible_group(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_content(session, group_id, record.content, if_match, what)
+            require_unchanged_content(session, group_id, record.content, if_match, what)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
                 given = _make_verdict(session, stored, verdict, override, actor)
@@ -95,7 +95,7 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     if state == "rejected" and reason not in REASONS:
         known = ", ".join(REASONS)
         raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
-    require_explanation(reason, note)
+    require_exclusion_note(reason, note)
     return Verdict(state, reason, note)
 
 
@@ -176,7 +176,7 @@ class Reviewer:
 def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:
     """Everybody who has judged a group of a dataset, the most active first."""
     with store.read() as session:
-        people = count_by_judge(session, dataset_id, since=now()[:10])
+        people = count_groups_by_judge(session, dataset_id, since=now()[:10])
         counts = count_reviewed(session, dataset_id)
     reviewers = [
         Reviewer(

@@ -92,7 +92,7 @@ def freeze(
             "split": vars(chosen),
         }
         with connect_to_server(server) as client, show_progress("Freezing") as progress:
-            found = remote.freeze_values(client, dataset, body, progress, dry_run=dry_run)
+            found = remote.freeze_on_server(client, dataset, body, progress, dry_run=dry_run)
         print_values(found, json_)
         return
     with open_store() as store, show_progress("Freezing") as progress:
@@ -161,18 +161,20 @@ def verify(
 ) -> None:
     """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
     from app.features.versions.service import find_version, get_newest_version
-    from app.features.versions.verify import verify_and_keep
+    from app.features.versions.verify import verify_and_save_report
 
     with open_store_to_solve("Verifying", workers, cluster) as (store, executor, progress):
         if version is None:
             chosen = get_newest_version(store, dataset)
         else:
             chosen = find_version(store, dataset, version)
-        report = verify_and_keep(store, chosen.id, executor, progress, actor=get_current_actor())
+        report = verify_and_save_report(
+            store, chosen.id, executor, progress, actor=get_current_actor()
+        )
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:
-            _print_first_lines([f"  {_difference_sentence(item)}" for item in report.differences])
+            _print_first_lines([f"  {_format_difference(item)}" for item in report.differences])
         print_error(report.sentence)
         raise typer.Exit(1)
 
@@ -185,7 +187,7 @@ def version_to_values(version: Version) -> dict[str, Any]:
     return {name: values[name] for name in VERSION}
 
 
-def _difference_sentence(item: Any) -> str:
+def _format_difference(item: Any) -> str:
     return f"{item.group or 'version'}, {item.place}: {item.frozen} frozen, {item.now} now"
 
 

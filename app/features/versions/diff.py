@@ -42,7 +42,7 @@ class BallMove:
 
 @dataclass(frozen=True)
 class ChangedGroup:
-    """A group of both versions: ``what`` of annotations, verdict, split and ball is another."""
+    """A group of both versions: ``classify_entry`` of annotations, verdict, split and ball is another."""
 
     group: str
     what: tuple[str, ...]
@@ -107,18 +107,20 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
         for item in (older, newer)
     )
     both = [key for key, row in after.items() if row.member and _is_member(before, key)]
-    changes = (_change_of_group(before[key], after[key]) for key in both)
+    changes = (_compare_group(before[key], after[key]) for key in both)
     changed = [change for change in changes if change.what]
-    moved = [move for key in both if (move := _ball_move(before[key], after[key])) is not None]
+    moved = [
+        move for key in both if (move := _compute_ball_move(before[key], after[key])) is not None
+    ]
     touched = {item.group for item in changed} | {item.group for item in moved}
     return VersionDiff(
         older=older,
         newer=newer,
-        added=_membership_changes(after, before, NEW),
-        dropped=_membership_changes(before, after, GONE),
+        added=_find_membership_changes(after, before, NEW),
+        dropped=_find_membership_changes(before, after, GONE),
         moved=tuple(sorted(moved, key=lambda item: -item.metres)),
         changed=tuple(changed),
-        settings=tuple(_changed_settings(older, newer)),
+        settings=tuple(_iterate_changed_settings(older, newer)),
         unchanged=len(both) - len(touched),
     )
 
@@ -133,7 +135,7 @@ def read_changelog(session: Session, version: Version) -> list[str]:
     """``make_version_changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
-        groups, balls = _count_of_groups(counts["groups"]), plural(counts["balls"], "ball")
+        groups, balls = _format_group_count(counts["groups"]), plural(counts["balls"], "ball")
         return [f"First version: {groups}, {balls} in views."]
     return describe_diff(read_diff(session, read_version(session, version.previous), version))
 
@@ -144,10 +146,10 @@ def describe_diff(diff: VersionDiff) -> list[str]:
     for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):
         if items:
             lines.append(
-                f"{_count_of_groups(len(items))} {verb} ({when}: {_reasons_sentence(items)})."
+                f"{_format_group_count(len(items))} {verb} ({when}: {_format_reasons(items)})."
             )
     for what, count in sorted(Counter(w for item in diff.changed for w in item.what).items()):
-        lines.append(f"{_count_of_groups(count)} with {_CHANGES[what]}.")
+        lines.append(f"{_format_group_count(count)} with {_CHANGES[what]}.")
     if diff.moved:
         metres = [item.metres for item in diff.moved]
         lines.append(
@@ -155,7 +157,7 @@ def describe_diff(diff: VersionDiff) -> list[str]:
             f"{metres[0]:.3f} m at most."
         )
     lines += [
-        f"{item.name}: {_setting_text(item.before)} before, {_setting_text(item.after)} now."
+        f"{item.name}: {_format_setting(item.before)} before, {_format_setting(item.after)} now."
         for item in diff.settings
     ]
     return lines if len(lines) > 1 else [f"Nothing changed since {diff.older.name}."]
@@ -173,7 +175,7 @@ def _is_member(rows: dict[str, Any], key: str) -> bool:
     return key in rows and bool(rows[key].member)
 
 
-def _membership_changes(
+def _find_membership_changes(
     there: dict[str, Any], elsewhere: dict[str, Any], absent: str
 ) -> tuple[MembershipChange, ...]:
     """Members of one version that are none of the other."""
@@ -184,7 +186,7 @@ def _membership_changes(
     )
 
 
-def _setting_text(value: Any) -> str:
+def _format_setting(value: Any) -> str:
     """A setting as people write it: in words, and by name where it holds several values."""
     if value is None:
         return "not set"
@@ -192,7 +194,7 @@ def _setting_text(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, dict):
         rest = [
-            f"{name.replace('_', ' ')} {_setting_text(value[name])}"
+            f"{name.replace('_', ' ')} {_format_setting(value[name])}"
             for name in value
             if name != "kind"
         ]
@@ -200,11 +202,11 @@ def _setting_text(value: Any) -> str:
         kind_name = str(kind or "")
         return (f"{kind_name} ({named})" if kind_name and rest else kind_name or named) or "none"
     if isinstance(value, list):
-        return ", ".join(map(_setting_text, value)) or "none"
+        return ", ".join(map(_format_setting, value)) or "none"
     return str(value)
 
 
-def _change_of_group(before: Any, after: Any) -> ChangedGroup:
+def _compare_group(before: Any, after: Any) -> ChangedGroup:
     differ = {
         "annotations": before.said != after.said,
         "verdict": before.verdict != after.verdict,
@@ -214,7 +216,7 @@ def _change_of_group(before: Any, after: Any) -> ChangedGroup:
     return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
 
 
-def _ball_move(before: Any, after: Any) -> BallMove | None:
+def _compute_ball_move(before: Any, after: Any) -> BallMove | None:
     if before.ball is None or after.ball is None or before.ball == after.ball:
         return None
     then, now = _parse_point(before.ball), _parse_point(after.ball)
@@ -226,7 +228,7 @@ def _parse_point(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _changed_settings(older: Version, newer: Version) -> Iterable[Setting]:
+def _iterate_changed_settings(older: Version, newer: Version) -> Iterable[Setting]:
     pairs = [
         (
             _flatten_policy(policy_to_json(older.policy)),
@@ -248,10 +250,10 @@ def _flatten_policy(policy: Json) -> dict[str, Json]:
     return {f"policy {name}": value for name, value in {**rest, **part}.items()}
 
 
-def _reasons_sentence(items: Sequence[MembershipChange]) -> str:
+def _format_reasons(items: Sequence[MembershipChange]) -> str:
     counts = Counter(item.why for item in items)
     return ", ".join(f"{count} {why}" for why, count in sorted(counts.items()))
 
 
-def _count_of_groups(count: int) -> str:
+def _format_group_count(count: int) -> str:
     return plural(count, "group")

@@ -20,7 +20,7 @@ from app.features.datasets.service import (
     DatasetHead,
     join_licences,
     read_dataset_head,
-    require_name,
+    require_valid_name,
 )
 from app.features.findings.queries import GroupDismissals, findings_from_rows, read_import_findings
 from app.features.groups.queries import read_groups
@@ -29,17 +29,17 @@ from app.features.solutions.queries import (
     read_calibration_bodies,
     read_current_solution_bodies,
 )
-from app.features.tracks.service import accepted_tracks
+from app.features.tracks.service import collect_accepted_tracks
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     SOLUTION,
     TRACK,
     compress_text,
+    decode_frozen_json,
     filter_stored_frozen_keys,
     find_frame_files,
     freeze_annotations,
     insert_frozen,
-    read_json,
 )
 from app.features.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.features.versions.queries import BATCH, has_version, insert_version
@@ -51,7 +51,7 @@ from app.features.versions.service import (
     read_version,
 )
 from app.formats.manifest import read_software_version
-from app.json_text import canonical_json_text, digest_of, quoted
+from app.json_text import canonical_json_text, digest_content, quote_text
 from app.media.files import read_media_facts
 from app.progress import ReportProgress
 from app.soccer.codec import policy_to_json
@@ -87,10 +87,10 @@ class FreezeRequest:
         """Raise InputError where it says something impossible."""
         self.split.check()
         if self.name is not None:
-            require_name(self.name, "a version")
+            require_valid_name(self.name, "a version")
         if self.groups not in RULES:
             raise InputError(
-                f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quoted(self.groups)}',
+                f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quote_text(self.groups)}',
                 pointer="/groups",
             )
         strip_and_check_note(self.note)
@@ -103,7 +103,7 @@ class FreezePlan:
     """What a freeze would do: how many groups enter, in which split, and why the others do not.
 
     Attributes:
-        splits: How many of the groups would be in each split; ``none``: in no split, or in two.
+        splits: How many of the groups would be in each split; ``make_empty_track``: in no split, or in two.
         left_out: Why the other groups do not enter.
         unsolved: How many of the groups that enter have to be solved first.
     """
@@ -128,11 +128,11 @@ def plan_freeze(
     request.check()
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        _require_free(session, found, request.name)
+        _require_unused_name(session, found, request.name)
         candidates = read_candidates(session, found.id, request.groups)
     if strict:
         require_solved(candidates, found.name)
-        _require_some(found, candidates, request.groups)
+        _require_any_member(found, candidates, request.groups)
     splitter = Splitter.of(request.split, {item.match for item in candidates})
     members = [item for item in candidates if item.why is None]
     sides = Counter(
@@ -170,16 +170,16 @@ def freeze_dataset(
     request.check()
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        _require_free(session, found, request.name)
+        _require_unused_name(session, found, request.name)
         candidates = read_candidates(session, found.id, request.groups)
         require_solved(candidates, found.name)
-        _require_some(found, candidates, request.groups)
+        _require_any_member(found, candidates, request.groups)
         run = _FreezeRun(store, session, found, request, candidates, progress)
         rows = run.rows()
         run.freeze_tracks()
     values = run.values(rows, actor)
     with store.write() as session:
-        _require_free(session, found, request.name)
+        _require_unused_name(session, found, request.name)
         name = request.name or find_next_version_name(session, found.id)
         return _save_version(session, {**values, "name": name}, rows)
 
@@ -209,11 +209,11 @@ class _FreezeRun:
         rows: list[dict[str, Any]] = []
         for start in range(0, len(self._candidates), BATCH):
             batch = self._candidates[start : start + BATCH]
-            members = self._members([item.id for item in batch if item.why is None])
+            members = self._freeze_members([item.id for item in batch if item.why is None])
             for position, item in enumerate(batch, start):
                 member = members.get(item.id, {})
                 dismissed = member.pop("dismissed", [])
-                rows.append({**_version_row(item, position, dismissed), **member})
+                rows.append({**_build_version_row(item, position, dismissed), **member})
             if self._progress is not None:
                 self._progress(start + len(batch), len(self._candidates))
         self._require_cameras()
@@ -222,10 +222,10 @@ class _FreezeRun:
     def freeze_tracks(self) -> None:
         """Freeze the tracks that people accepted and whose groups have not changed since, each with all
         that it was computed from."""
-        found = accepted_tracks(self._session, self._dataset)
+        found = collect_accepted_tracks(self._session, self._dataset)
         texts = {stretch: canonical_json_text(value) for stretch, value in found.items()}
-        self._tracks = {key: TRACK + digest_of(text.encode()) for key, text in texts.items()}
-        self._freeze_new({self._tracks[key]: text for key, text in texts.items()}, {}, set())
+        self._tracks = {key: TRACK + digest_content(text.encode()) for key, text in texts.items()}
+        self._store_new_content({self._tracks[key]: text for key, text in texts.items()}, {}, set())
 
     def values(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
         """Columns of the version itself."""
@@ -233,7 +233,7 @@ class _FreezeRun:
         return {
             "dataset_id": dataset.id,
             "note": strip_and_check_note(request.note) or "",
-            "licence": request.licence.strip() or join_licences(self._matches(rows)),
+            "licence": request.licence.strip() or join_licences(self._collect_matches(rows)),
             "created": now(),
             "actor": actor,
             "hash": hash_version(dataset.policy, SOLVER_VERSION, rows, self._tracks),
@@ -244,13 +244,13 @@ class _FreezeRun:
             "solver_version": SOLVER_VERSION,
             "software_version": read_software_version(),
             "split": canonical_json_text(request.split.values()),
-            "counts": canonical_json_text(self._counts(rows)),
+            "counts": canonical_json_text(self._make_counts(rows)),
         }
 
-    def _matches(self, rows: Sequence[Mapping[str, Any]]) -> set[str]:
+    def _collect_matches(self, rows: Sequence[Mapping[str, Any]]) -> set[str]:
         return {row["match"] for row in rows if row["member"]}
 
-    def _members(self, ids: Sequence[int]) -> dict[int, dict[str, Any]]:
+    def _freeze_members(self, ids: Sequence[int]) -> dict[int, dict[str, Any]]:
         """What the rows of members hold besides what every row has."""
         if not ids:
             return {}
@@ -263,19 +263,19 @@ class _FreezeRun:
         rows = {}
         for number, item in stored.items():
             annotations, body = freeze_annotations(item.group), solutions[number]
-            key, solved = SOLUTION + digest_of(body), read_json(body)
+            key, solved = SOLUTION + digest_content(body), decode_frozen_json(body)
             texts.update(annotations.texts)
             bodies[key] = body
             names |= collect_calibration_keys(solved)
-            rows[number] = self._member(item.group, annotations.key, key, solved)
+            rows[number] = self._build_member_columns(item.group, annotations.key, key, solved)
             if number in dismissals:
                 own = findings_from_rows(noticed[number], item.inputs_hash)
                 found = [*(_finding_from_json(value) for value in solved["findings"]), *own]
-                rows[number]["dismissed"] = _dismissed_findings(found, dismissals[number])
-        self._freeze_new(texts, bodies, names)
+                rows[number]["dismissed"] = _select_dismissed_findings(found, dismissals[number])
+        self._store_new_content(texts, bodies, names)
         return rows
 
-    def _member(
+    def _build_member_columns(
         self, group: Group, annotations: str, solution: str, solved: Json
     ) -> dict[str, Any]:
         views = [view.key for view in group.views]
@@ -288,7 +288,7 @@ class _FreezeRun:
             # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
             ball = solved["ball"] is not None and view["included"]
             self._balls[side] = self._balls.get(side, 0) + bool(ball)
-        frames = find_frame_files(group, _media_facts_by_view(group))
+        frames = find_frame_files(group, _collect_media_facts_by_view(group))
         return {
             "split": split,
             "splits": None if splits is None else canonical_json_text(splits),
@@ -298,7 +298,7 @@ class _FreezeRun:
             "frames": None if frames is None else compress_json(frames),
         }
 
-    def _freeze_new(
+    def _store_new_content(
         self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]
     ) -> None:
         """Bring what is not frozen yet into the database, in a transaction of its own."""
@@ -310,10 +310,10 @@ class _FreezeRun:
         fresh |= {key: compress_text(text) for key, text in texts.items() if key not in known}
         if fresh:
             with self._store.write() as session:
-                gone = self._deleted_calibrations(session, names - known)
+                gone = self._read_deleted_calibrations(session, names - known)
                 insert_frozen(session, self._dataset.id, {**fresh, **gone})
 
-    def _deleted_calibrations(self, session: Session, names: set[str]) -> dict[str, bytes]:
+    def _read_deleted_calibrations(self, session: Session, names: set[str]) -> dict[str, bytes]:
         """Calibrations that somebody deleted since the snapshot, as they are in it."""
         keys = {name.removeprefix(CALIBRATION) for name in names}
         gone = keys - filter_stored_calibration_keys(session, keys)
@@ -329,7 +329,7 @@ class _FreezeRun:
                 pointer="/split/test_cameras",
             )
 
-    def _counts(self, rows: Sequence[Mapping[str, Any]]) -> Json:
+    def _make_counts(self, rows: Sequence[Mapping[str, Any]]) -> Json:
         members = [row for row in rows if row["member"]]
         groups: dict[str, int] = {}
         for row in members:
@@ -354,7 +354,7 @@ class _FreezeRun:
         }
 
 
-def _version_row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
+def _build_version_row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
     """What every row has; that of a member is completed.
 
     Findings that people dismissed are a part of what they decided; a group without any has the
@@ -384,7 +384,7 @@ def _finding_from_json(value: Json) -> Finding:
     return Finding(**{name: value.get(name) for name in names})
 
 
-def _dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
+def _select_dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
     """What of a group's findings was dismissed, without people and times."""
     pairs = zip(findings, dismissals.of(findings), strict=True)
     return [
@@ -401,7 +401,7 @@ def _dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals
     ]
 
 
-def _media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
+def _collect_media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
     return {
         view.key: read_media_facts(view.media) for view in group.views if view.media is not None
     }
@@ -415,7 +415,7 @@ def _count_reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
     return dict(sorted(counts.items()))
 
 
-def _require_free(session: Session, dataset: DatasetHead, name: str | None) -> None:
+def _require_unused_name(session: Session, dataset: DatasetHead, name: str | None) -> None:
     if name is not None and has_version(session, dataset.id, name):
         raise ConflictError(
             f'"{dataset.name}" has a version "{name}" already',
@@ -423,7 +423,7 @@ def _require_free(session: Session, dataset: DatasetHead, name: str | None) -> N
         )
 
 
-def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: str) -> None:
+def _require_any_member(dataset: DatasetHead, candidates: Sequence[Candidate], rule: str) -> None:
     if any(item.why is None for item in candidates):
         return
     reasons = ", ".join(f"{count} {reason}" for reason, count in _count_reasons(candidates).items())

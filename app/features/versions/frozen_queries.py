@@ -14,7 +14,7 @@ from app.db.json_columns import Json, decompress, parse_json_column
 from app.db.session import Session
 from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
 from app.features.versions.queries import FrozenModel, VersionGroupModel, VersionModel
-from app.json_text import canonical_json_text, digest_of, prepare_msgspec_type
+from app.json_text import canonical_json_text, digest_content, prepare_msgspec_type
 from app.soccer.codec import (
     group_without_views_to_json,
     positions_from_json,
@@ -50,20 +50,20 @@ def freeze_annotations(group: Group) -> FrozenAnnotations:
     texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
     views = []
     for view in group.views:
-        station = _station_json_without_mirroring(view.station)
+        station = _station_to_json_without_mirroring(view.station)
         if view.station.shared:
             text = canonical_json_text(station)
-            station = STATION + digest_of(text.encode())
+            station = STATION + digest_content(text.encode())
             texts[station] = text
         value = view_to_json(view, station)
         del value["media"]
         views.append(value)
     text = canonical_json_text({**group_without_views_to_json(group), "views": views})
-    key = SAID + digest_of(text.encode())
+    key = SAID + digest_content(text.encode())
     return FrozenAnnotations(key, {**texts, key: text})
 
 
-def _station_json_without_mirroring(station: Station) -> Json:
+def _station_to_json_without_mirroring(station: Station) -> Json:
     # Whether the frames are mirrored is about the frames, not about what was said.
     return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
 
@@ -218,15 +218,15 @@ def compute_content_key(key: str, body: bytes) -> str:
     if prefix == CALIBRATION:
         return key
     # A solution is frozen as it was stored, everything else under the digest of its text.
-    return prefix + digest_of(body if prefix == SOLUTION else decompress(body))
+    return prefix + digest_content(body if prefix == SOLUTION else decompress(body))
 
 
-def read_text(body: bytes) -> str:
+def decode_frozen_text(body: bytes) -> str:
     """The text of frozen JSON."""
     return decompress(body).decode()
 
 
-def read_json(body: bytes) -> Json:
+def decode_frozen_json(body: bytes) -> Json:
     """The value of frozen JSON."""
     return parse_json_column(decompress(body))
 

@@ -14,7 +14,7 @@ from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.service import FREEZE, Version, get_version, list_versions
-from app.features.versions.verify import keep_failure, verify_and_keep
+from app.features.versions.verify import save_verify_failure, verify_and_save_report
 from app.progress import ReportProgress
 from app.soccer.split import Split
 from app.worker_process import WorkerEnded
@@ -36,8 +36,8 @@ def request_freeze(
     plan_freeze(store, found.id, request, strict=True)
     return jobs.submit(
         FREEZE,
-        f"Freeze {found.name} as {_version_title(request)}",
-        partial(freeze_work, store),
+        f"Freeze {found.name} as {_make_job_title(request)}",
+        partial(run_freeze_job, store),
         dataset_id=found.id,
         actor=actor,
         request={**vars(request), "split": request.split.values()},
@@ -50,7 +50,7 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
     return jobs.submit(
         VERIFY,
         f"Verify {version.name} of {version.dataset}",
-        partial(verify_work, store),
+        partial(run_verify_job, store),
         dataset_id=version.dataset_id,
         actor=actor,
         request={"version": version_id},
@@ -60,19 +60,19 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
 def resume_versions(jobs: Jobs, store: Store) -> None:
     """Let freezing and verifying that an earlier server was at go on."""
 
-    def freezing(progress: JobProgress) -> Json:
+    def resume_freeze(progress: JobProgress) -> Json:
         # The server may have stopped between the version and the record of its job.
         done = _find_version_of_job(jobs, store, progress.job, _request_from_job(progress.job))
-        return freeze_work(store, progress) if done is None else make_version_result(done)
+        return run_freeze_job(store, progress) if done is None else make_version_result(done)
 
-    jobs.register_resume(FREEZE, freezing)
-    jobs.register_resume(VERIFY, partial(verify_work, store))
+    jobs.register_resume(FREEZE, resume_freeze)
+    jobs.register_resume(VERIFY, partial(run_verify_job, store))
 
 
-def freeze_work(store: Store, progress: JobProgress) -> Json:
+def run_freeze_job(store: Store, progress: JobProgress) -> Json:
     """The work of freezing; its result names the version."""
     job, request = progress.job, _request_from_job(progress.job)
-    progress(0, None, f"Freezing {_version_title(request)}.")
+    progress(0, None, f"Freezing {_make_job_title(request)}.")
     return run_job_in_worker(
         store,
         "freezing",
@@ -86,7 +86,7 @@ def freeze_work(store: Store, progress: JobProgress) -> Json:
     )
 
 
-def verify_work(store: Store, progress: JobProgress) -> Json:
+def run_verify_job(store: Store, progress: JobProgress) -> Json:
     """The work of verifying; its result is the report, which the version keeps, too."""
     version, actor = get_version(store, progress.job.request["version"]), progress.job.actor
     progress(0, None, f"Verifying {version.name}.")
@@ -104,7 +104,7 @@ def verify_work(store: Store, progress: JobProgress) -> Json:
     except OverloadedError as error:
         # A process that ended did not come to keeping it; one that never began says nothing.
         if isinstance(error.__cause__, WorkerEnded):
-            keep_failure(store, version.id, error.message, actor=actor)
+            save_verify_failure(store, version.id, error.message, actor=actor)
         raise
 
 
@@ -127,7 +127,7 @@ def _freeze_in_worker(
 
 
 def _verify_in_worker(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:
-    report = verify_and_keep(store, version_id, progress=progress, actor=actor)
+    report = verify_and_save_report(store, version_id, progress=progress, actor=actor)
     return {"version_id": version_id, **report.values()}
 
 
@@ -135,7 +135,7 @@ def _request_from_job(job: Job) -> FreezeRequest:
     return FreezeRequest(**{**job.request, "split": Split.of(job.request["split"])})
 
 
-def _version_title(request: FreezeRequest) -> str:
+def _make_job_title(request: FreezeRequest) -> str:
     return request.name or "the next version"
 
 

@@ -90,12 +90,12 @@ def _candidate_from_row(row: CandidateRow, rule: str) -> Candidate:
         split=row.split,
         views=tuple(row.view_keys.strip(",").split(",")),
         why=why,
-        verdict=_verdict_json(row),
+        verdict=_verdict_to_json(row),
         unsolved=why == UNSOLVED,
     )
 
 
-def _verdict_json(row: CandidateRow) -> Json:
+def _verdict_to_json(row: CandidateRow) -> Json:
     if row.status == "unreviewed":
         return None
     return {

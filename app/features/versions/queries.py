@@ -22,7 +22,7 @@ from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.people.visibility_queries import list_columns_with_shown_actor
 from app.features.queue.tables import QueueModel
-from app.features.solutions.queries import is_solved
+from app.features.solutions.queries import is_group_solved
 from app.features.verdicts.tables import VerdictModel
 from app.json_text import canonical_json_text
 from app.soccer.solution import SOLVER_VERSION
@@ -267,7 +267,7 @@ def read_page(
         .order_by(model.position)
         .limit(limit)
     )
-    return [_version_group(row) for row in session.execute(statement)]
+    return [_version_group_from_row(row) for row in session.execute(statement)]
 
 
 def iterate_annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow]:
@@ -322,7 +322,7 @@ def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[Candidate
     statement = (
         select(
             *(getattr(QueueModel, name) for name in names),
-            is_solved().label("solved"),
+            is_group_solved().label("solved"),
             VerdictModel.reason,
             VerdictModel.note,
             VerdictModel.override,
@@ -334,7 +334,7 @@ def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[Candidate
     return session.rows(CandidateRow, statement)
 
 
-def _version_group(row: Any) -> VersionGroup:
+def _version_group_from_row(row: Any) -> VersionGroup:
     ball = None if row.ball is None else parse_json_column(row.ball)
     return VersionGroup(
         position=row.position,
@@ -371,7 +371,7 @@ class Verification:
     problem: str | None
 
 
-def keep_verification(
+def save_verification(
     store: Store, version_id: int, *, actor: str, report: Json = None, problem: str | None = None
 ) -> None:
     """Keep what came of verifying a version, in the place of what came of it before."""

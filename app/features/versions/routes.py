@@ -20,8 +20,8 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import (
     ACCEPTED,
     JobDocument,
+    describe_job_response_for_openapi,
     make_job_response,
-    openapi_of_job_response,
 )
 from app.features.policies.schemas import PolicyDocument
 from app.features.versions import jobs as version_jobs
@@ -39,7 +39,7 @@ from app.features.versions.queries import Verification
 from app.features.versions.verify import VersionDifference
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
-from app.http.documents import Document, ListDocument, document, respond_with
+from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -126,7 +126,7 @@ class VerificationDocument(Document):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_report(cls, found: Any) -> Any:
+    def _merge_report_fields(cls, found: Any) -> Any:
         if not isinstance(found, Verification):
             return found
         report = found.report or {}
@@ -141,7 +141,7 @@ class VerificationDocument(Document):
         }
 
 
-def _split_values(split: Any) -> Any:
+def _split_to_dict(split: Any) -> Any:
     return split.values() if isinstance(split, Split) else split
 
 
@@ -163,7 +163,7 @@ class VersionDocument(Document):
     counts: dict[str, Any] = Field(
         description="Groups, views, balls, overrides; by split; why groups are not in it."
     )
-    split: Annotated[dict[str, Any], BeforeValidator(_split_values)]
+    split: Annotated[dict[str, Any], BeforeValidator(_split_to_dict)]
     policy: PolicyDocument
     solver_version: str
     software_version: str
@@ -295,7 +295,7 @@ def freeze_version(
     """
     if dry_run or request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
-        return document(plan)
+        return make_document_response(plan)
     return version_jobs.request_freeze(
         services.jobs, services.store, dataset, request.value(), actor=actor
     )
@@ -353,7 +353,7 @@ def get_diff(
 @router.post(
     "/versions/{version}/verify",
     operation_id="verifyVersion",
-    **openapi_of_job_response(404),
+    **describe_job_response_for_openapi(404),
 )
 @may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)

@@ -9,21 +9,21 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from app.db.json_columns import Json, decompress, parse_as, parse_json_column
+from app.db.json_columns import Json, decompress, parse_json_as, parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
 from app.features.datasets.service import read_dataset_head
 from app.features.jobs.queries import OPEN, read_jobs
 from app.features.people.ownership import MIN_HASH, find_versions
-from app.features.solutions.queries import decode_camera, decode_solution
+from app.features.solutions.queries import decode_calibration_without_markings, decode_solution
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     FrozenOutline,
     OutlineStation,
     collect_shared_keys,
+    decode_frozen_json,
     read_frozen,
-    read_json,
     thaw_group,
     thaw_outline,
 )
@@ -36,10 +36,10 @@ from app.features.versions.queries import (
     list_versions_of_dataset,
     read_verifications,
 )
-from app.json_text import canonical_json_text, quoted
+from app.json_text import canonical_json_text, quote_text
 from app.soccer.codec import policy_from_json
 from app.soccer.group import Group
-from app.soccer.policy import Policy, digested_values
+from app.soccer.policy import Policy, values_to_digest
 from app.soccer.solution import Solution
 from app.soccer.split import Split
 
@@ -148,11 +148,11 @@ def find_version_id(store: Store, version: str, dataset: str | None = None) -> i
         found = _versions_from_rows(session, list_all_versions(session))
     fitting: list[Version] = find_versions(found, version)
     if not fitting:
-        raise NotFoundError(f"there is no version {quoted(version)}")
+        raise NotFoundError(f"there is no version {quote_text(version)}")
     if len(fitting) > 1:
         names = ", ".join(dict.fromkeys(item.dataset for item in fitting))
         raise InputError(
-            f"several versions are called {quoted(version)} (of {names})",
+            f"several versions are called {quote_text(version)} (of {names})",
             hint="Name it by its id, or name its dataset, too: ?dataset=NAME.",
             pointer="/version",
         )
@@ -197,10 +197,13 @@ def read_frozen_groups(
         StorageError: Content is missing.
     """
     bodies = _read_contents(session, version, {row.solution or "" for row in rows})
-    solved = [read_json(bodies[row.solution or ""]) for row in rows]
+    solved = [decode_frozen_json(bodies[row.solution or ""]) for row in rows]
     names = {name for value in solved for name in collect_calibration_keys(value)}
     more = _read_contents(session, version, names)
-    calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
+    calibrations = {
+        name.removeprefix(CALIBRATION): decode_calibration_without_markings(more[name])
+        for name in names
+    }
     groups = thaw_groups(session, version, rows)
     return [
         FrozenGroup(row, group, decode_solution(value, calibrations))
@@ -215,10 +218,10 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
         StorageError: Content is missing.
     """
     bodies = _read_contents(session, version, {row.said or "" for row in rows})
-    annotations = [read_json(bodies[row.said or ""]) for row in rows]
+    annotations = [decode_frozen_json(bodies[row.said or ""]) for row in rows]
     shared = {key for value in annotations for key in collect_shared_keys(value)}
     more = _read_contents(session, version, shared)
-    texts = {key: read_json(more[key]) for key in shared}
+    texts = {key: decode_frozen_json(more[key]) for key in shared}
     return [
         thaw_group(value, texts, row.frames) for row, value in zip(rows, annotations, strict=True)
     ]
@@ -231,12 +234,12 @@ def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGrou
         StorageError: Content is missing.
     """
     bodies = _read_contents(session, version, {row.said or "" for row in rows})
-    outlines = [parse_as(decompress(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    outlines = [parse_json_as(decompress(bodies[row.said or ""]), FrozenOutline) for row in rows]
     shared = {
         view.station for one in outlines for view in one.views if isinstance(view.station, str)
     }
     more = _read_contents(session, version, shared)
-    stations = {key: parse_as(decompress(more[key]), OutlineStation) for key in shared}
+    stations = {key: parse_json_as(decompress(more[key]), OutlineStation) for key in shared}
     return [
         thaw_outline(one, stations, row.frames) for row, one in zip(rows, outlines, strict=True)
     ]
@@ -304,7 +307,7 @@ def hash_version(
         rows: In order of ``position``, as the table has them.
         tracks: Keys of frozen tracks by stretch; a version without any has the hash that it always had.
     """
-    values = digested_values(policy)
+    values = values_to_digest(policy)
     digest = hashlib.sha256()
     _add_to_digest(digest, [HASH_FORMAT, values, solver_version])
     for row in rows:

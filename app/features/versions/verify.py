@@ -15,22 +15,22 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
 from app.features.solutions.queries import decode_calibration, encode_calibration, encode_solution
-from app.features.tracks.codec import TRACK_VERSION, track_again
+from app.features.tracks.codec import TRACK_VERSION, recompute_frozen_track
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     collect_shared_keys,
     compute_content_key,
+    decode_frozen_json,
+    decode_frozen_text,
     read_frozen,
-    read_json,
-    read_text,
     thaw_group,
 )
 from app.features.versions.queries import (
     VersionGroup,
     iterate_annotation_rows,
-    keep_verification,
     read_page,
     read_version_matches,
+    save_verification,
 )
 from app.features.versions.service import (
     Version,
@@ -38,14 +38,14 @@ from app.features.versions.service import (
     hash_version,
     read_version,
 )
-from app.json_text import canonical_json_text, digest_of
+from app.json_text import canonical_json_text, digest_content
 from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, compute_calibration_key
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.wording import plural
 from app.workers.executors import run_tasks
 
@@ -109,7 +109,7 @@ class VerifyReport:
     @property
     def sentence(self) -> str:
         """The outcome in one sentence, or two where tracks of another version come out differently."""
-        older = self._older_sentence if self.older_tracks else ""
+        older = self._format_older_tracks if self.older_tracks else ""
         if self.equal < self.groups:
             why = ""
             if self.solver_version != self.solver_version_now:
@@ -127,7 +127,7 @@ class VerifyReport:
         return f"{groups} and the hash came out as they were frozen.{older}"
 
     @property
-    def _older_sentence(self) -> str:
+    def _format_older_tracks(self) -> str:
         made = " and ".join(sorted(set(self.older_tracks.values())))
         names = ", ".join(sorted(self.older_tracks)[:_A_GROUP])
         count = plural(len(self.older_tracks), "track comes", "tracks come")
@@ -181,7 +181,7 @@ def verify_version(
         report = VerifyReport(
             version.name, version.hash, int(version.counts["groups"]), version.solver_version
         )
-        report.add(list(_version_differences(session, version)))
+        report.add(list(_find_version_differences(session, version)))
         frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
         matches = read_version_matches(session, version.id)
     done = 0
@@ -199,7 +199,7 @@ def verify_version(
     return report
 
 
-def verify_and_keep(
+def verify_and_save_report(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
@@ -220,25 +220,25 @@ def verify_and_keep(
         raise
     except Exception as error:
         problem = error.message if isinstance(error, ReviewError) else UNEXPECTED
-        keep_failure(store, version_id, problem, actor=actor)
+        save_verify_failure(store, version_id, problem, actor=actor)
         raise
-    keep_verification(store, version_id, actor=actor, report=report.values())
+    save_verification(store, version_id, actor=actor, report=report.values())
     return report
 
 
-def keep_failure(store: Store, version_id: int, problem: str, *, actor: str) -> None:
+def save_verify_failure(store: Store, version_id: int, problem: str, *, actor: str) -> None:
     """Keep with a version why nothing came of verifying it; what is damaged takes no word of it."""
     with suppress(DamagedError):
-        keep_verification(store, version_id, actor=actor, problem=problem)
+        save_verification(store, version_id, actor=actor, problem=problem)
 
 
 def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
     """The differences of each group of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.known.items()}
-    return [list(islice(_group_differences(row, task, known), _A_GROUP)) for row in task.rows]
+    return [list(islice(_find_group_differences(row, task, known), _A_GROUP)) for row in task.rows]
 
 
-def _version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
+def _find_version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
     """What of the version's own row does not follow from its groups."""
     names = ("key", "member", "split", "splits", "verdict", "said")
     rows = (
@@ -257,8 +257,8 @@ def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | Non
         found = None if body is None else compute_content_key(key, body)
         report.add([VersionDifference(None, place, key, found)])
         return
-    value = read_json(body)
-    differences = list(_track_differences(place, value))
+    value = decode_frozen_json(body)
+    differences = list(_find_track_differences(place, value))
     made_by = str(value["inputs"]["version"])
     if differences and made_by != TRACK_VERSION:
         report.older_tracks[stretch] = made_by
@@ -267,10 +267,10 @@ def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | Non
     report.add(differences)
 
 
-def _track_differences(place: str, value: Mapping[str, Any]) -> Iterator[VersionDifference]:
+def _find_track_differences(place: str, value: Mapping[str, Any]) -> Iterator[VersionDifference]:
     """What of a sound track comes out differently."""
     try:
-        now = track_again(value)
+        now = recompute_frozen_track(value)
     except Exception as error:
         # One broken track must not hide what the others say.
         yield VersionDifference(None, place, None, f"{type(error).__name__}: {error}")
@@ -285,7 +285,9 @@ def _track_differences(place: str, value: Mapping[str, Any]) -> Iterator[Version
 def _shorten_value(value: Json) -> Json:
     """A value for a report: long lists are told by their length and digest."""
     text = canonical_json_text(value)
-    return value if len(text) < 200 else f"{len(text):,} characters, {digest_of(text.encode())}"
+    return (
+        value if len(text) < 200 else f"{len(text):,} characters, {digest_content(text.encode())}"
+    )
 
 
 class _VerifyTasks:
@@ -316,14 +318,14 @@ class _VerifyTasks:
         """Everything that a chunk consists of."""
         wanted = {key for row in rows for key in (row.said, row.solution) if key}
         frozen = read_frozen(session, self._version.dataset_id, wanted)
-        more = {name for row in rows for name in _named_parts(row, frozen)}
+        more = {name for row in rows for name in _collect_named_keys(row, frozen)}
         return frozen | read_frozen(session, self._version.dataset_id, more)
 
     def _make_task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
-        sound = (row for row in rows if not _missing_keys(row, frozen))
-        annotations = (read_json(frozen[row.said or ""]) for row in sound)
+        sound = (row for row in rows if not _list_missing_keys(row, frozen))
+        annotations = (decode_frozen_json(frozen[row.said or ""]) for row in sound)
         known = self._calibrate_static_cameras(
-            [thaw_group(value, _named_values(value, frozen)) for value in annotations]
+            [thaw_group(value, _parse_named_values(value, frozen)) for value in annotations]
         )
         policy = self._version.policy
         return VerifyTask(rows, frozen, known, policy, self._splitter)
@@ -341,54 +343,58 @@ class _VerifyTasks:
         return {key: self._shared[key] for key in keys}
 
 
-def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
+def _collect_named_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
     """Keys that the annotations and the solution of a group name, as far as those are there."""
     names: set[str] = set()
     if row.said is not None and row.said in frozen:
-        names |= collect_shared_keys(read_json(frozen[row.said]))
+        names |= collect_shared_keys(decode_frozen_json(frozen[row.said]))
     if row.solution is not None and row.solution in frozen:
-        names |= collect_calibration_keys(read_json(frozen[row.solution]))
+        names |= collect_calibration_keys(decode_frozen_json(frozen[row.solution]))
     return names
 
 
-def _missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
+def _list_missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
     """Keys of frozen parts that a group needs and that are not there."""
-    wanted = {key for key in (row.said, row.solution) if key} | _named_parts(row, frozen)
+    wanted = {key for key in (row.said, row.solution) if key} | _collect_named_keys(row, frozen)
     return sorted(wanted - frozen.keys())
 
 
-def _named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
-    return {key: read_json(frozen[key]) for key in collect_shared_keys(annotations)}
+def _parse_named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+    return {key: decode_frozen_json(frozen[key]) for key in collect_shared_keys(annotations)}
 
 
-def _group_differences(
+def _find_group_differences(
     row: VersionGroup, task: VerifyTask, known: Mapping[str, Calibration]
 ) -> Iterator[VersionDifference]:
-    missing = _missing_keys(row, task.frozen)
+    missing = _list_missing_keys(row, task.frozen)
     if missing:
         yield from (VersionDifference(row.key, "missing", key, None) for key in missing)
         return
     try:
-        yield from _frozen_differences(row, task)
-        annotations = read_json(task.frozen[row.said or ""])
-        group = thaw_group(annotations, _named_values(annotations, task.frozen))
-        yield from _split_differences(row, group, task.splitter)
-        yield from _solution_differences(row, group, task, known)
+        yield from _find_content_differences(row, task)
+        annotations = decode_frozen_json(task.frozen[row.said or ""])
+        group = thaw_group(annotations, _parse_named_values(annotations, task.frozen))
+        yield from _find_split_differences(row, group, task.splitter)
+        yield from _find_solution_differences(row, group, task, known)
     except Exception as error:
         # One broken group must not hide what the others say.
         yield VersionDifference(row.key, "error", None, f"{type(error).__name__}: {error}")
 
 
-def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
+def _find_content_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
     """Parts that are not what their key says."""
     annotations, solution = row.said or "", row.solution or ""
-    for key in (annotations, *collect_shared_keys(read_json(task.frozen[annotations])), solution):
+    for key in (
+        annotations,
+        *collect_shared_keys(decode_frozen_json(task.frozen[annotations])),
+        solution,
+    ):
         found = compute_content_key(key, task.frozen[key])
         if found != key:
             yield VersionDifference(row.key, "digest", key, found)
 
 
-def _split_differences(
+def _find_split_differences(
     row: VersionGroup, group: Group, splitter: Splitter
 ) -> Iterator[VersionDifference]:
     views = [view.key for view in group.views]
@@ -401,10 +407,10 @@ def _split_differences(
             yield VersionDifference(row.key, place, frozen, now)
 
 
-def _solution_differences(
+def _find_solution_differences(
     row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
 ) -> Iterator[VersionDifference]:
-    encoded = encode_solution(group, solve(group, task.policy, known))
+    encoded = encode_solution(group, solve_group(group, task.policy, known))
     pairs = [("", task.frozen[row.solution or ""], encoded.body)]
     for key, body in sorted(encoded.calibrations.items()):
         frozen = task.frozen.get(CALIBRATION + key)
@@ -414,29 +420,31 @@ def _solution_differences(
             pairs.append(("calibration.", frozen, body))
     for place, then, now in pairs:
         # Texts, not bytes: another zlib may pack the same text in another way.
-        if read_text(then) != read_text(now):
-            yield from _unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
-    point = read_json(encoded.body)["ball"]
+        if decode_frozen_text(then) != decode_frozen_text(now):
+            yield from _find_unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
+    point = decode_frozen_json(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
         yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
 
 
 def _parse_frozen(body: bytes) -> Json:
     try:
-        return json.loads(read_text(body))
+        return json.loads(decode_frozen_text(body))
     except ValueError as error:
         raise StorageError(
             "a stored part of the frozen version is damaged: it is not valid JSON"
         ) from error
 
 
-def _unequal_leaves(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:
+def _find_unequal_leaves(
+    group: str, place: str, then: Json, now: Json
+) -> Iterator[VersionDifference]:
     """Leaves at which two JSON values differ."""
     if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
         for name in then:
-            yield from _unequal_leaves(group, f"{place}{name}.", then[name], now[name])
+            yield from _find_unequal_leaves(group, f"{place}{name}.", then[name], now[name])
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
         for index, (one, other) in enumerate(zip(then, now, strict=True)):
-            yield from _unequal_leaves(group, f"{place}{index}.", one, other)
+            yield from _find_unequal_leaves(group, f"{place}{index}.", one, other)
     elif repr(then) != repr(now):
         yield VersionDifference(group, place.rstrip("."), then, now)

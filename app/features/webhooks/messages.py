@@ -92,8 +92,8 @@ def read_messages(session: Session, webhook: Any, dataset: str) -> list[WebhookM
     place = (webhook.jobs_until, webhook.job_id)
     jobs = list_jobs_ended_since(session, webhook.dataset_id, *place, _OF_JOBS)
     return [
-        *_messages_of_log(webhook.id, dataset, entries),
-        *_messages_of_jobs(webhook.id, dataset, jobs),
+        *_make_log_messages(webhook.id, dataset, entries),
+        *_make_job_messages(webhook.id, dataset, jobs),
     ]
 
 
@@ -104,18 +104,18 @@ def make_ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> Web
     return WebhookMessage(f"msg_{webhook_id}_ping{stamp}", MessageKind.PING, body)
 
 
-def _messages_of_log(
+def _make_log_messages(
     webhook_id: int, dataset: str, entries: Sequence[Any]
 ) -> Iterator[WebhookMessage]:
     """Entries of one kind by one person that follow each other become one message."""
 
-    def what(row: Any) -> tuple[MessageKind, str]:
+    def classify_entry(row: Any) -> tuple[MessageKind, str]:
         kind = _OF_LOG.get(row.kind.removeprefix("station_"), MessageKind.DATASET)
         return (
             kind if row.group_id is not None or kind is MessageKind.FROZEN else MessageKind.DATASET
         ), row.actor
 
-    for (kind, actor), rows in groupby(entries, what):
+    for (kind, actor), rows in groupby(entries, classify_entry):
         found = list(rows)
         first, last = found[0].id, found[-1].id
         data = {
@@ -134,7 +134,7 @@ def _messages_of_log(
         )
 
 
-def _messages_of_jobs(
+def _make_job_messages(
     webhook_id: int, dataset: str, jobs: Sequence[Any]
 ) -> Iterator[WebhookMessage]:
     for row in jobs:

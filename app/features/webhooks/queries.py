@@ -253,16 +253,19 @@ def has_delivered_since(session: Session, webhook_id: int, at: str) -> bool:
 
 def has_old_deliveries(session: Session, before: str) -> bool:
     """Whether anything arrived or was given up before a time."""
-    return session.scalar(select(DeliveryModel.id).where(*_is_over(before)).limit(1)) is not None
+    return (
+        session.scalar(select(DeliveryModel.id).where(*_make_finished_conditions(before)).limit(1))
+        is not None
+    )
 
 
 def forget_deliveries(session: Session, before: str) -> int:
     """Delete what arrived or was given up before a time; returns how many."""
-    gone = session.execute(delete(DeliveryModel).where(*_is_over(before)))
+    gone = session.execute(delete(DeliveryModel).where(*_make_finished_conditions(before)))
     return int(cast(Any, gone).rowcount)
 
 
-def _is_over(before: str) -> tuple[ColumnElement[bool], ...]:
+def _make_finished_conditions(before: str) -> tuple[ColumnElement[bool], ...]:
     return DeliveryModel.next_at.is_(None), DeliveryModel.created < before
 
 
@@ -274,7 +277,7 @@ DISPUTED = "group.disputed"
 HANDED_BACK = "group.handed_back"
 
 
-def list_listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
+def list_subscribed_webhooks(session: Session, dataset_id: int, kind: str) -> list[int]:
     """Ids of the webhooks of a dataset that are told of a kind."""
     table = WebhookModel
     on = (table.dataset_id == dataset_id, table.off.is_(None))
@@ -305,7 +308,7 @@ def queue_webhook_messages(
         batch_id: The batch that it is about, as it is then.
         also: What else is told.
     """
-    hooks = list_listeners(session, dataset_id, kind)
+    hooks = list_subscribed_webhooks(session, dataset_id, kind)
     if not hooks:
         return 0
     data: dict[str, Json] = {"dataset": read_dataset_name(session, dataset_id), "actor": actor}

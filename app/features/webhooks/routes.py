@@ -176,4 +176,4 @@ def list_deliveries(
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:
     """Send a message once more, at once."""
-    return webhooks.send_again(store, dataset, webhook, delivery)
+    return webhooks.resend_delivery(store, dataset, webhook, delivery)

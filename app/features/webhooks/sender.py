@@ -16,7 +16,7 @@ import httpx
 import structlog
 
 from app.db.json_columns import parse_json_column
-from app.db.session import Session, text_of
+from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalled_batches
@@ -54,14 +54,14 @@ class WebhookAddress:
     port: int
     path: str
 
-    def is_below(self, other: WebhookAddress) -> bool:
+    def is_same_or_below(self, other: WebhookAddress) -> bool:
         """Whether it is another one, or leads on from it."""
         same = (self.scheme, self.host, self.port) == (other.scheme, other.host, other.port)
         folder = other.path if other.path.endswith("/") else other.path + "/"
         return same and (self.path == other.path or self.path.startswith(folder))
 
 
-def read_address(text: str, pointer: str | None = None) -> WebhookAddress:
+def parse_address(text: str, pointer: str | None = None) -> WebhookAddress:
     """An address as it will be used.
 
     Raises:
@@ -80,21 +80,21 @@ def read_address(text: str, pointer: str | None = None) -> WebhookAddress:
     return WebhookAddress(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
 
 
-def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = None) -> None:
+def require_allowed_address(text: str, allowed: Iterable[str], pointer: str | None = None) -> None:
     """Raise unless the operator lets the server send to an address.
 
     Raises:
         InputError: It is no address, or none that is allowed.
         ConflictError: None is allowed at all.
     """
-    address, places = read_address(text, pointer), [read_address(item) for item in allowed]
+    address, places = parse_address(text, pointer), [parse_address(item) for item in allowed]
     if not places:
         raise ConflictError(
             "this server is not allowed to send webhooks",
             hint="The operator of the server can allow addresses with the setting"
             " TOUCHLINE_WEBHOOKS.",
         )
-    if not any(address.is_below(place) for place in places):
+    if not any(address.is_same_or_below(place) for place in places):
         raise InputError(
             "the operator of this server does not allow webhooks to this address",
             hint=f"It may begin with: {', '.join(sorted(allowed))}",
@@ -236,7 +236,7 @@ class WebhookSender:
         """
         now = self._clock()
         with self._store.read() as session:
-            due = list_due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
+            due = list_due_deliveries(session, format_utc_time(now), TOGETHER, OF_ONE)
         answers = asyncio.run(self._send_all_due(due)) if due else []
         if answers:
             with self._store.write() as session:
@@ -309,7 +309,7 @@ class WebhookSender:
 
     async def _post_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> int:
         settings = self._store.settings
-        require_allowed(row.url, settings.webhooks)
+        require_allowed_address(row.url, settings.webhooks)
         headers = sign_message(
             derive_webhook_secret(settings, row.salt), row.message, self._clock(), row.body
         )
@@ -319,12 +319,16 @@ class WebhookSender:
 
     def _save_attempt(self, session: Session, row: DueDelivery, answer: DeliveryAttempt) -> None:
         now = self._clock()
-        tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
+        tried = {
+            "attempts": row.attempts + 1,
+            "tried": format_utc_time(now),
+            "status": answer.status,
+        }
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
         if answer.problem is None:
             values["state"] = DELIVERED
         elif row.attempts < len(AGAIN) and answer.status != GONE:
-            values["next_at"] = text_of(now + AGAIN[row.attempts])
+            values["next_at"] = format_utc_time(now + AGAIN[row.attempts])
         else:
             values["state"] = FAILED
         update_delivery(session, row.id, values)

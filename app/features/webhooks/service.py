@@ -37,7 +37,7 @@ from app.features.webhooks.queries import (
     update_delivery,
     update_webhook,
 )
-from app.features.webhooks.sender import require_allowed
+from app.features.webhooks.sender import require_allowed_address
 from app.json_text import Moment, canonical_json_text
 
 MOST = 20
@@ -107,7 +107,7 @@ def make_webhook(
         InputError: The operator does not allow the address, or no kind is asked for.
         ConflictError: The operator allows none, or the dataset has as many as it may.
     """
-    require_allowed(url, store.settings.webhooks, "/url")
+    require_allowed_address(url, store.settings.webhooks, "/url")
     number, salt = dataset_id(store, dataset), make_salt()
     secret = derive_webhook_secret(store.settings, salt)
     with store.write() as session:
@@ -115,7 +115,7 @@ def make_webhook(
             raise ConflictError(
                 f"a dataset has at most {MOST} webhooks", hint="Delete one of them."
             )
-        made = insert_webhook(session, number, url, _checked_kinds(kinds), salt=salt, by=actor)
+        made = insert_webhook(session, number, url, _validate_kinds(kinds), salt=salt, by=actor)
         add_audit_event(session, actor, "webhook made", number, url=url)
         return _read_webhook(session, number, made), secret
 
@@ -136,7 +136,7 @@ def change_webhook(
         NotFoundError: The dataset has none of that id.
     """
     if url is not None:
-        require_allowed(url, store.settings.webhooks, "/url")
+        require_allowed_address(url, store.settings.webhooks, "/url")
     number = dataset_id(store, dataset)
     with store.write() as session:
         found = _read_webhook(session, number, webhook_id)
@@ -144,7 +144,7 @@ def change_webhook(
         if url is not None:
             values["url"] = url
         if kinds is not None:
-            values["kinds"] = canonical_json_text(_checked_kinds(kinds))
+            values["kinds"] = canonical_json_text(_validate_kinds(kinds))
         if on is not None and on != (found.off is None):
             values |= (
                 {"off": None, "log_id": find_newest_entry_id(session), "jobs_until": now()}
@@ -190,11 +190,11 @@ def list_deliveries(
         ]
 
 
-def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
+def resend_delivery(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
     """Send a message once more, at once; its tries are counted anew."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_read_webhook(session, number, webhook_id))
+        _require_webhook_enabled(_read_webhook(session, number, webhook_id))
         if find_delivery(session, webhook_id, delivery_id) is None:
             raise NotFoundError(f"this webhook has no delivery {delivery_id}")
         update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
@@ -205,7 +205,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
     """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_read_webhook(session, number, webhook_id))
+        _require_webhook_enabled(_read_webhook(session, number, webhook_id))
         waiting = find_waiting_delivery(session, webhook_id, MessageKind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
@@ -215,14 +215,14 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
 
 
-def _require_on(webhook: Webhook) -> None:
+def _require_webhook_enabled(webhook: Webhook) -> None:
     if webhook.off is not None:
         raise ConflictError(
             f"the webhook is switched off: {webhook.off}", hint="Switch the webhook on first."
         )
 
 
-def _checked_kinds(kinds: Iterable[MessageKind]) -> list[str]:
+def _validate_kinds(kinds: Iterable[MessageKind]) -> list[str]:
     chosen = sorted({str(kind) for kind in kinds})
     if not chosen or MessageKind.PING in chosen:
         raise InputError(

@@ -19,7 +19,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
 from app.solving.ball_covariance import MeanCovariance, major_axis_sigma
 from app.solving.chi_square import p_values
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 from app.solving.judgement import (
     Judgement,
     compute_view_jac,
@@ -56,7 +56,7 @@ class BlockResults:
         uncertainty: Kept from the first time that another noise is tried.
     """
 
-    facts: Facts
+    facts: GroupFacts
     jac: FloatArray
     policy: Policy
     judgement: Judgement
@@ -66,7 +66,7 @@ class BlockResults:
     lock: Lock = field(default_factory=Lock, repr=False)
 
     @staticmethod
-    def by(facts: Facts, jac: FloatArray, policy: Policy) -> BlockResults:
+    def by(facts: GroupFacts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
         uncertainty = MeanCovariance(facts)
         judgement = judge_groups(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
@@ -96,16 +96,16 @@ class BlockResults:
 
     def judge_with_policy(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
-        if _uses_click_noise(policy) and noise_of_policy(policy) != noise_of_policy(self.policy):
+        if _uses_click_noise(policy) and get_click_noise(policy) != get_click_noise(self.policy):
             jac = _jac_at_threshold(self.facts, self.jac, policy)
-            return judge_groups(self.facts, policy, self._uncertainty(), jac)
-        return self._judge_under(policy)[0]
+            return judge_groups(self.facts, policy, self._get_uncertainty(), jac)
+        return self._rejudge_changed_groups(policy)[0]
 
     def judged_by(self, policy: Policy) -> BlockResults:
         """The groups judged by another policy from now on."""
-        if noise_of_policy(policy) != noise_of_policy(self.policy):
+        if get_click_noise(policy) != get_click_noise(self.policy):
             return BlockResults.by(self.facts, self.jac, policy)
-        judgement, new, part = self._judge_under(policy)
+        judgement, new, part = self._rejudge_changed_groups(policy)
         found = BlockResults(self.facts, self.jac, policy, judgement)
         if self.sigma is not None and self.p_value is not None:
             found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
@@ -114,7 +114,9 @@ class BlockResults:
                 found.sigma[new], found.p_value[new] = part.sigma, part.p_value
         return found
 
-    def _judge_under(self, policy: Policy) -> tuple[Judgement, BoolArray, BlockResults | None]:
+    def _rejudge_changed_groups(
+        self, policy: Policy
+    ) -> tuple[Judgement, BoolArray, BlockResults | None]:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
         jac = _jac_at_threshold(facts, self.jac, policy)
@@ -153,14 +155,14 @@ class BlockResults:
             None if policy.min_p_value is None else self.p_value,
         )
 
-    def _uncertainty(self) -> MeanCovariance:
+    def _get_uncertainty(self) -> MeanCovariance:
         with self.lock:
             if self.uncertainty is None:
                 self.uncertainty = MeanCovariance(self.facts)
         return self.uncertainty
 
 
-def noise_of_policy(policy: Policy) -> tuple[float, float, float]:
+def get_click_noise(policy: Policy) -> tuple[float, float, float]:
     """How exact clicks are taken to be."""
     return policy.click_sigma_px, policy.box_sigma_share, policy.given_sigma_px
 
@@ -170,7 +172,7 @@ def _uses_click_noise(policy: Policy) -> bool:
     return policy.max_sigma_m is not None or policy.min_p_value is not None
 
 
-def _jac_at_threshold(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
+def _jac_at_threshold(facts: GroupFacts, jac: FloatArray, policy: Policy) -> FloatArray:
     gamma = policy.jac_gamma_percent
     if gamma in GAMMAS_PERCENT:
         known: FloatArray = jac[GAMMAS_PERCENT.index(gamma)]
@@ -179,7 +181,7 @@ def _jac_at_threshold(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArr
 
 
 def _mean_sigmas(
-    facts: Facts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
+    facts: GroupFacts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
 ) -> FloatArray:
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
     point = judgement.point
@@ -190,7 +192,7 @@ def _mean_sigmas(
     return sigma
 
 
-def _p_values(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
+def _p_values(facts: GroupFacts, policy: Policy, judgement: Judgement) -> FloatArray:
     return p_values(facts, find_views_in_pairs(facts, judgement.valid), judgement.point, policy)
 
 
@@ -274,7 +276,7 @@ def count_table_groups(
         counted: What was counted under another policy: some of it is the same under each.
     """
     if counted is None:
-        curves = np.stack([_curve_of_steps(steps[live]) for steps in table.steps])
+        curves = np.stack([_make_threshold_curve(steps[live]) for steps in table.steps])
         counted = GroupCounts(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
     passes, before = judgement.passes[live], present.passes[live]
     split = np.bincount(table.split[live][passes], minlength=len(table.splits))
@@ -291,7 +293,7 @@ def count_table_groups(
     )
 
 
-def _curve_of_steps(steps: IntArray) -> IntArray:
+def _make_threshold_curve(steps: IntArray) -> IntArray:
     """A group counts at as many of the steps, from the first on, as are below its JaC."""
     counts = np.bincount(steps, minlength=len(JAC_STEPS) + 1)
     curve: IntArray = counts[::-1].cumsum()[::-1][1:]
@@ -328,14 +330,14 @@ def _count_findings(
 
 
 @dataclass(frozen=True)
-class Leak:
+class SplitLeak:
     """A match that lies in several splits, with the number of groups in each."""
 
     match: str
     splits: tuple[tuple[str, int], ...]
 
 
-def find_split_leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
+def find_split_leaks(places: Counter[tuple[str, str]]) -> tuple[SplitLeak, ...]:
     """Matches in several splits, by name.
 
     Args:
@@ -346,4 +348,4 @@ def find_split_leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
         if split:
             found.setdefault(match, []).append((split, groups))
     several = (match for match, splits in found.items() if len(splits) > 1)
-    return tuple(Leak(match, tuple(sorted(found[match]))) for match in sorted(several))
+    return tuple(SplitLeak(match, tuple(sorted(found[match]))) for match in sorted(several))

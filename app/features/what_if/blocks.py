@@ -32,7 +32,13 @@ from app.features.what_if.cache import (
     write_cached_block_list,
 )
 from app.features.what_if.table import EMPTY, YieldTable, join_tables, make_table
-from app.solving.facts import NOTHING, Facts, facts_from_bytes, facts_to_bytes, group_facts
+from app.solving.facts import (
+    NOTHING,
+    GroupFacts,
+    collect_facts_of_views,
+    facts_from_bytes,
+    facts_to_bytes,
+)
 
 CHUNK = 400
 """Groups that are read at once."""
@@ -67,7 +73,9 @@ def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, byte
     return found
 
 
-def _recompute_facts(session: Session, rows: Sequence[StoredFacts]) -> Iterator[tuple[int, Facts]]:
+def _recompute_facts(
+    session: Session, rows: Sequence[StoredFacts]
+) -> Iterator[tuple[int, GroupFacts]]:
     """Facts of solutions from before they were kept, where they still fit their group."""
     keys = {row.group_id: json.loads(row.calibrations) for row in rows}
     calibrations = read_calibrations(session, {key for names in keys.values() for key in names})
@@ -76,7 +84,7 @@ def _recompute_facts(session: Session, rows: Sequence[StoredFacts]) -> Iterator[
         stored = groups.get(row.group_id)
         if stored is not None and stored.inputs_hash == row.inputs_hash:
             found = [calibrations[key] for key in keys[row.group_id]]
-            yield row.group_id, group_facts(stored.group.views, found)
+            yield row.group_id, collect_facts_of_views(stored.group.views, found)
 
 
 BLOCK = 8192
@@ -145,7 +153,7 @@ class DatasetBlocks:
             self.whole = self.mark
         return self.whole == self.mark
 
-    def count_groups_left(self, session: Session) -> int:
+    def count_groups_to_read(self, session: Session) -> int:
         """How many groups have to be read until it is in step."""
         total = (
             count_groups(session, self.dataset_id) - self.groups if self.through is not None else 0
@@ -215,7 +223,7 @@ class DatasetBlocks:
         tail = [block for block in blocks if not block.name]
         self.blocks = [block for block in blocks if block.name and block.groups]
         if solved.groups or any(block.groups for block in tail):
-            table = join_tables([*(block.only_live for block in tail), solved])
+            table = join_tables([*(block.live_table for block in tail), solved])
             self.blocks.append(CachedBlock("", table))
         self.bare = join_tables([self.bare.select_groups(~np.isin(self.bare.group_id, new)), bare])
 
@@ -224,7 +232,7 @@ class DatasetBlocks:
         small = [block for block in self.blocks if not block.name or block.groups < BLOCK // 2]
         if any(not block.name for block in small):
             kept = [block for block in self.blocks if block not in small]
-            table = join_tables([block.only_live for block in small])
+            table = join_tables([block.live_table for block in small])
             self.blocks = [*kept, self._write_block(table)]
             self.version += 1
             self.version += 1

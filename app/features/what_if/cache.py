@@ -16,12 +16,12 @@ import numpy as np
 import structlog
 
 from app.durable import replace_file
-from app.features.what_if.block_results import BlockResults, noise_of_policy
+from app.features.what_if.block_results import BlockResults, get_click_noise
 from app.features.what_if.table import FIGURES, HEADS, YieldTable
 from app.geometry.arrays import BoolArray, IntArray
 from app.json_text import json_text
 from app.soccer.policy import Policy
-from app.solving.facts import COLUMNS, NOTHING, Facts
+from app.solving.facts import COLUMNS, NOTHING, GroupFacts
 from app.solving.judgement import Judgement
 
 _HEAD = 16
@@ -106,7 +106,7 @@ def _map_with_checksum(path: Path) -> tuple[ArraysFile, int | None]:
 
 
 FORMAT = 5
-"""Raised with every change of ``Facts``."""
+"""Raised with every change of ``GroupFacts``."""
 LIST, BARE = "table.json", "bare.heads"
 ARRAYS = (".facts", ".judged", ".heads", ".counted")
 """How names of files of arrays end."""
@@ -140,7 +140,7 @@ class CachedBlock:
         return self.table.groups if self.live is None else int(self.live.sum())
 
     @property
-    def only_live(self) -> YieldTable:
+    def live_table(self) -> YieldTable:
         """The table of the groups that count."""
         return self.table if self.live is None else self.table.select_groups(self.live)
 
@@ -190,7 +190,7 @@ def write_cached_block_list(folder: Path, table: CachedTable) -> None:
     if not all(block.name for block in table.blocks):
         return
     blocks = [
-        {"name": block.name, "gone": [] if block.live is None else _deleted_groups(block.live)}
+        {"name": block.name, "gone": [] if block.live is None else _list_deleted_rows(block.live)}
         for block in table.blocks
     ]
     bare = table.bare
@@ -214,7 +214,7 @@ def read_cached_table(folder: Path, calibration: str) -> CachedTable | None:
         if found["format"] != FORMAT or found["calibration"] != calibration:
             return None
         blocks = tuple(
-            _block_without(
+            _exclude_deleted_groups(
                 CachedBlock(item["name"], _map_table(folder, item["name"])), item["gone"]
             )
             for item in found["blocks"]
@@ -274,13 +274,13 @@ def read_cached_results(folder: Path, block: CachedBlock, policy: Policy) -> Blo
         return None
 
 
-def delete_table(folder: Path) -> None:
+def delete_cached_table(folder: Path) -> None:
     """Delete a kept table."""
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def _policy_key(policy: Policy) -> list[Any]:
-    return [policy.hash, *noise_of_policy(policy)]
+    return [policy.hash, *get_click_noise(policy)]
 
 
 def _block_path(folder: Path, name: str) -> Path:
@@ -297,7 +297,7 @@ def _map_table(folder: Path, name: str) -> YieldTable:
     if found.about["format"] != FORMAT:
         raise ValueError("the cached block was written in another format")
     arrays = found.arrays
-    facts = Facts(len(arrays["group_id"]), **{item: arrays[item] for item in COLUMNS})
+    facts = GroupFacts(len(arrays["group_id"]), **{item: arrays[item] for item in COLUMNS})
     heads = {item: arrays[item] for item in HEADS}
     splits, matches = tuple(found.about["splits"]), tuple(found.about["matches"])
     table = YieldTable(**heads, splits=splits, matches=matches, facts=facts)
@@ -337,7 +337,7 @@ def _require_valid_table(table: YieldTable) -> None:
         raise ValueError("a column of the cached table has a wrong number of groups")
 
 
-def _block_without(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
+def _exclude_deleted_groups(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
     if not gone:
         return block
     live = np.ones(block.table.groups, bool)
@@ -345,7 +345,7 @@ def _block_without(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
     return CachedBlock(block.name, block.table, live)
 
 
-def _deleted_groups(live: BoolArray) -> list[int]:
+def _list_deleted_rows(live: BoolArray) -> list[int]:
     gone: list[int] = np.flatnonzero(~live).tolist()
     return gone
 

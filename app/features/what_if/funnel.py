@@ -11,10 +11,10 @@ from app.features.what_if.block_results import (
     DISTANCES,
     FINDINGS,
     GroupCounts,
-    Leak,
+    SplitLeak,
     find_split_leaks,
+    get_click_noise,
     map_in_threads,
-    noise_of_policy,
     sum_group_counts,
 )
 from app.features.what_if.service import TableBlock, TableSnapshot, YieldStore
@@ -83,7 +83,7 @@ class Yield:
     splits: tuple[FunnelPart, ...]
     distances: tuple[FunnelPart, ...]
     findings: tuple[FunnelPart, ...]
-    leakage: tuple[Leak, ...]
+    leakage: tuple[SplitLeak, ...]
     gained: int
     lost: int
     needs_solving: tuple[str, ...]
@@ -103,15 +103,15 @@ def get_yield(
         NotFoundError: There is no such dataset.
     """
     snapshot = yields.snapshot(dataset_id)
-    policy = _changed_policy(snapshot.policy, values or {})
+    policy = _apply_threshold_values(snapshot.policy, values or {})
     unanswered = list_thresholds_that_need_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
 
     def count_block(block: TableBlock) -> GroupCounts:
-        return block.count_present if same else block.count_under(policy)
+        return block.present_counts if same else block.count_under_policy(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
-    side_by_side = noise_of_policy(policy) != noise_of_policy(snapshot.policy)
+    side_by_side = get_click_noise(policy) != get_click_noise(snapshot.policy)
     total = sum_group_counts(
         (map_in_threads if side_by_side else map)(count_block, snapshot.blocks)
     )
@@ -127,7 +127,7 @@ def list_thresholds_that_need_solving(present: Policy, tried: Policy) -> tuple[s
     )
 
 
-def _changed_policy(policy: Policy, values: Mapping[str, Any]) -> Policy:
+def _apply_threshold_values(policy: Policy, values: Mapping[str, Any]) -> Policy:
     values = dict(values)
     calibration = replace(policy.calibration, **values.pop("calibration", {}))
     return replace(policy, **{**values, "calibration": calibration})

@@ -15,7 +15,7 @@ from app.db.check import CheckResult
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
-from app.features.datasets.queries import find_dataset, policy_from_row, read_dataset_names
+from app.features.datasets.queries import find_dataset, parse_stored_policy, read_dataset_names
 from app.features.groups.revision_queries import count_changes, count_groups
 from app.features.what_if.block_results import (
     BlockResults,
@@ -27,7 +27,7 @@ from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.cache import (
     ARRAYS,
     CachedBlock,
-    delete_table,
+    delete_cached_table,
     map_arrays,
     read_cached_results,
     write_cached_results,
@@ -59,16 +59,16 @@ class TableBlock:
     judged: BlockResults
 
     @cached_property
-    def count_present(self) -> GroupCounts:
+    def present_counts(self) -> GroupCounts:
         """What is counted of its groups under the present policy."""
         judgement = self.judged.judgement
         return count_table_groups(self.table, self.live, self.judged.policy, judgement, judgement)
 
-    def count_under(self, policy: Policy) -> GroupCounts:
+    def count_under_policy(self, policy: Policy) -> GroupCounts:
         """What is counted of them under another one."""
         judgement = self.judged.judge_with_policy(policy)
         return count_table_groups(
-            self.table, self.live, policy, self.judged.judgement, judgement, self.count_present
+            self.table, self.live, policy, self.judged.judgement, judgement, self.present_counts
         )
 
     @property
@@ -114,7 +114,7 @@ class TableSnapshot:
     @cached_property
     def table(self) -> YieldTable:
         """The groups that are solved, in one table."""
-        return join_tables([EMPTY, *(part.block.only_live for part in self.blocks)])
+        return join_tables([EMPTY, *(part.block.live_table for part in self.blocks)])
 
     @property
     def nbytes(self) -> int:
@@ -158,7 +158,7 @@ class YieldStore:
             NotFoundError: There is no such dataset.
             OverloadedError: So many groups have changed that a thread reads them first.
         """
-        kept = self._entry_of(dataset_id)
+        kept = self._get_entry(dataset_id)
         if not kept.lock.acquire(timeout=PATIENCE_SECONDS):
             raise _not_ready_error(kept)
         try:
@@ -181,7 +181,7 @@ class YieldStore:
         Raises:
             NotFoundError: There is no such dataset.
         """
-        kept = self._entry_of(dataset_id)
+        kept = self._get_entry(dataset_id)
         with kept.lock:
             self._try_refresh(dataset_id, kept, None)
         self._evict_snapshots()
@@ -202,7 +202,7 @@ class YieldStore:
         except Exception:
             log.exception("a yield table stays behind")
 
-    def _entry_of(self, dataset_id: int) -> _YieldEntry:
+    def _get_entry(self, dataset_id: int) -> _YieldEntry:
         with self._lock:
             kept = self._kept.setdefault(dataset_id, _YieldEntry())
             self._kept.move_to_end(dataset_id)
@@ -219,7 +219,7 @@ class YieldStore:
         except NotFoundError:
             with self._lock:
                 self._kept.pop(dataset_id, None)
-            delete_table(self._folder(dataset_id))
+            delete_cached_table(self._folder(dataset_id))
             raise
 
     def _refresh_snapshot(
@@ -229,8 +229,8 @@ class YieldStore:
         while True:
             with self._store.read() as session:
                 policy = read_policy(session, dataset_id)
-                blocks = self._current_blocks(session, dataset_id, kept, policy)
-                left = blocks.count_groups_left(session)
+                blocks = self._load_current_blocks(session, dataset_id, kept, policy)
+                left = blocks.count_groups_to_read(session)
                 kept.read = blocks.groups, left
                 if most is not None and left > most:
                     return None
@@ -249,7 +249,7 @@ class YieldStore:
             kept.version = blocks.version
         return kept.snapshot
 
-    def _current_blocks(
+    def _load_current_blocks(
         self, session: Session, dataset_id: int, kept: _YieldEntry, policy: Policy
     ) -> DatasetBlocks:
         """The groups as they were looked at last, here or by another process."""
@@ -276,7 +276,7 @@ class YieldStore:
         """The snapshot of groups under a policy; what was judged before no longer is."""
         before = {id(part.table): part for part in old.blocks} if old is not None else {}
 
-        def judged_block(block: CachedBlock) -> TableBlock:
+        def judge_block(block: CachedBlock) -> TableBlock:
             known = before.get(id(block.table))
             if known is not None and known.judged.policy.hash == policy.hash:
                 return known if known.block is block else TableBlock(block, known.judged)
@@ -294,9 +294,7 @@ class YieldStore:
                 write_cached_results(blocks.folder, block, judged)
             return TableBlock(block, judged)
 
-        return TableSnapshot(
-            policy, tuple(map_in_threads(judged_block, blocks.blocks)), blocks.bare
-        )
+        return TableSnapshot(policy, tuple(map_in_threads(judge_block, blocks.blocks)), blocks.bare)
 
     def _evict_snapshots(self) -> None:
         with self._lock:
@@ -316,7 +314,7 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     row = find_dataset(session, dataset_id)
     if row is None:
         raise NotFoundError.dataset(dataset_id)
-    return policy_from_row(row.policy)
+    return parse_stored_policy(row.policy)
 
 
 def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
@@ -330,7 +328,7 @@ def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
 def examine_yields(settings: Settings) -> CheckResult:
     """Read every file of the cache; one that a server deletes meanwhile is none any more."""
     files = [path for ending in ARRAYS for path in sorted(settings.yields.glob(f"*/*{ending}"))]
-    damaged = [path for path in files if not _is_sound(path)]
+    damaged = [path for path in files if not _is_file_readable(path)]
     if damaged:
         more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
         sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
@@ -340,7 +338,7 @@ def examine_yields(settings: Settings) -> CheckResult:
     return CheckResult("yields", True, f"{count} in the cache, each as it was written")
 
 
-def _is_sound(path: Path) -> bool:
+def _is_file_readable(path: Path) -> bool:
     try:
         map_arrays(path, whole=True)
     except FileNotFoundError:

@@ -141,9 +141,9 @@ def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _Datase
         parts.append(count_rows([row[1:] for row in rows]))
     return _DatasetColumns(
         policy,
-        **_current_marks(session),
+        **_read_current_marks(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
-        counted=_join_counted(parts) if parts else count_rows([]),
+        counted=_join_columns(parts) if parts else count_rows([]),
     )
 
 
@@ -154,7 +154,7 @@ def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]
         after = rows[-1].group_id
 
 
-def _current_marks(session: Session) -> dict[str, Any]:
+def _read_current_marks(session: Session) -> dict[str, Any]:
     number = find_newest_entry_id(session)
     return {
         "change": find_newest_change_id(session),
@@ -167,7 +167,7 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     """What has changed, read again; groups that are gone show in the number of those left."""
     changed = set(list_changed_group_ids(session, dataset_id, kept.change))
     ids = sorted(changed | set(list_groups_judged_since(session, dataset_id, kept.verdict)))
-    moment = _current_marks(session)
+    moment = _read_current_marks(session)
     if not ids:
         return replace(kept, **moment)
     rows = [
@@ -178,7 +178,7 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     new = np.array([row[0] for row in rows], np.int64)
     stays = ~np.isin(kept.group_id, np.array(ids, np.int64))
     group_id = np.concatenate([kept.group_id[stays], new])
-    joined = _join_counted(
+    joined = _join_columns(
         [_select_groups(kept.counted, stays), count_rows([row[1:] for row in rows])]
     )
     order = np.argsort(group_id, kind="stable")
@@ -195,7 +195,7 @@ def _select_groups(found: StatisticsColumns, chosen: Any) -> StatisticsColumns:
     return replace(found, **{name: getattr(found, name)[..., chosen] for name in _ARRAYS})
 
 
-def _join_counted(parts: Sequence[StatisticsColumns]) -> StatisticsColumns:
+def _join_columns(parts: Sequence[StatisticsColumns]) -> StatisticsColumns:
     splits = sorted({name for part in parts for name in part.splits})
     matches = sorted({name for part in parts for name in part.matches})
     joined = {

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.facts import COLUMNS, NOTHING, Facts
+from app.solving.facts import COLUMNS, NOTHING, GroupFacts
 from app.solving.facts import join_facts as join_facts
 from app.solving.judgement import MIN_VIEWS, compute_view_jac
 
@@ -21,7 +21,7 @@ JAC_STEPS = tuple((np.arange(101) / 100).tolist())
 """Where the curves are counted: JaC from 0 to 1."""
 
 
-def qualifying_jac(facts: Facts, jac: FloatArray) -> FloatArray:
+def qualifying_jac(facts: GroupFacts, jac: FloatArray) -> FloatArray:
     """The JaC that a threshold must lie below so that two views with a ball qualify, (G,).
 
     A camera that was given and cannot be measured qualifies whatever the threshold; -1 where
@@ -44,7 +44,7 @@ def qualifying_jac(facts: Facts, jac: FloatArray) -> FloatArray:
     return second
 
 
-def qualifying_steps(facts: Facts, jac: FloatArray) -> npt.NDArray[np.uint8]:
+def count_qualifying_steps(facts: GroupFacts, jac: FloatArray) -> npt.NDArray[np.uint8]:
     """At how many of ``JAC_STEPS``, from the first on, a group qualifies, shape (G,).
 
     It does at every threshold strictly below the JaC of its second best view.
@@ -52,7 +52,7 @@ def qualifying_steps(facts: Facts, jac: FloatArray) -> npt.NDArray[np.uint8]:
     return np.searchsorted(JAC_STEPS, qualifying_jac(facts, jac), "left").astype(np.uint8)
 
 
-def is_unmeasured(facts: Facts) -> BoolArray:
+def find_unmeasured_groups(facts: GroupFacts) -> BoolArray:
     """Whether gate ``jac`` passes because the cameras are given and have no lines, shape (G,)."""
     measured = _count_views_by_group(facts, facts.view_included & facts.view_measured)
     given = _count_views_by_group(facts, facts.view_included & facts.view_camera & facts.view_given)
@@ -60,7 +60,7 @@ def is_unmeasured(facts: Facts) -> BoolArray:
     return unmeasured
 
 
-def _count_views_by_group(facts: Facts, chosen: BoolArray) -> IntArray:
+def _count_views_by_group(facts: GroupFacts, chosen: BoolArray) -> IntArray:
     return np.bincount(facts.view_group[chosen], minlength=facts.groups)
 
 
@@ -89,7 +89,7 @@ class YieldTable:
     match: IntArray
     matches: tuple[str, ...]
     pitch: FloatArray
-    facts: Facts
+    facts: GroupFacts
 
     @property
     def groups(self) -> int:
@@ -109,13 +109,13 @@ class YieldTable:
 
     @cached_property
     def steps(self) -> npt.NDArray[np.uint8]:
-        """``qualifying_steps`` at each of ``GAMMAS_PERCENT``, shape (3, G)."""
-        return np.stack([qualifying_steps(self.facts, jac) for jac in self.jac])
+        """``count_qualifying_steps`` at each of ``GAMMAS_PERCENT``, shape (3, G)."""
+        return np.stack([count_qualifying_steps(self.facts, jac) for jac in self.jac])
 
     @cached_property
     def unmeasured(self) -> BoolArray:
         """Groups whose cameras are given and have no lines to measure JaC, shape (G,)."""
-        return is_unmeasured(self.facts)
+        return find_unmeasured_groups(self.facts)
 
     def select_groups(self, kept: BoolArray) -> YieldTable:
         """The table of some of the groups, in the same order."""
@@ -140,7 +140,7 @@ class YieldTable:
         )
 
 
-def make_table(rows: Sequence[Any], facts: Facts) -> YieldTable:
+def make_table(rows: Sequence[Any], facts: GroupFacts) -> YieldTable:
     """The table of rows of solved groups, in the order of their facts."""
     splits, split = _encode_names([row.split for row in rows])
     matches, match = _encode_names([row.match for row in rows])

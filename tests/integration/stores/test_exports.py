@@ -24,12 +24,12 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError, OverloadedError, StorageError
 from app.features.datasets.service import dataset_id
-from app.features.exports.jobs import ExportFolder, export_work
+from app.features.exports.jobs import ExportFolder, run_export_job
 from app.features.exports.service import export_dataset
 from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs import runner as job_run
 from app.features.jobs.runner import JobProgress
-from app.media.frames import Frames, SentPicture, make_picture
+from app.media.frames import EncodedPicture, FrameProvider, make_picture
 from app.object_store.path import find_path, resolve_target_path
 from app.object_store.store import open_store
 from app.soccer.group import Media
@@ -195,7 +195,7 @@ class Apart:
         self._before = self._children()
         self.killed = False
 
-    def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
+    def read(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture:
         """A frame for the process, which may be its last one."""
         self.processes |= self._children() - self._before
         if self.killed:
@@ -213,10 +213,10 @@ class Apart:
         """The result of the job."""
         request = {"dataset": "league", "format": "coco", "all": True, "boxes": "optimized"}
         request |= {"images": "copy", "to": to}
-        frames = cast(Frames, self)
+        frames = cast(FrameProvider, self)
         number = dataset_id(self._store, "league")
         progress.job = replace(progress.job, dataset_id=number, request=request)
-        return export_work(self._store, self._folder, frames, progress)
+        return run_export_job(self._store, self._folder, frames, progress)
 
     def half_written(self) -> list[str]:
         """Names of what is not complete in the folder of exports."""

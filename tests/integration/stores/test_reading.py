@@ -17,12 +17,12 @@ from app.config import Settings
 from app.errors import InputError, NotFoundError, ReviewError, StorageError
 from app.features.imports.uploads import list_folder, resolve_folder
 from app.features.integrity.checks import examine_stores
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.frames_reader import read_frame_list
 from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.media.files import guess_content_type, read_frame
-from app.media.object_frames import is_kept
+from app.media.object_frames import is_cached
 from app.object_store.path import find_path, split_address
 from app.object_store.store import open_store
 from app.soccer.group import Group, Media
@@ -31,7 +31,7 @@ from tests.moto_server import StoreProxy, fill_store, store_settings, stored_set
 
 def groups_of(settings: Settings, address: str) -> list[Group]:
     report = ReaderReport()
-    found = [*read_soccernet_v3(find_path(settings, address), report, Limits.of(settings))]
+    found = [*read_soccernet_v3(find_path(settings, address), report, ImportLimits.of(settings))]
     assert not report.problems, report.problems
     return found
 
@@ -118,10 +118,10 @@ class TestReading:
         media = Media("s3://frames/big.zip", "3.bin")
         with contextlib.suppress(ReviewError):
             read_frame(media, None, False, settings)
-        assert is_kept(media, settings)
+        assert is_cached(media, settings)
         assert len(frame) < proxy.sent < len(frame) + 3 * 128 * 1024
         # Its list is known here; no range of another zip is taken for one of it.
-        sealed = Media(find_path(settings, "s3://frames/big.zip").sealed(), "1.bin")
+        sealed = Media(find_path(settings, "s3://frames/big.zip").make_sealed_address(), "1.bin")
         with contextlib.suppress(ReviewError):
             read_frame(replace(sealed, member="2.bin"), None, False, settings)
         store.put("big.zip", bytes(len(frame) * 5 + 1000))
@@ -177,7 +177,7 @@ class TestFrameLists:
         file.write_text(json.dumps({"frames": entries}))
         report = ReaderReport()
         found = read_frame_list(file, settings, report)
-        groups = [*found.with_listed_frames(read_soccernet_v3(labels, ReaderReport()))]
+        groups = [*found.replace_listed_frames(read_soccernet_v3(labels, ReaderReport()))]
         assert [problem.record for problem in report.problems] == [
             "frames/3",
             "frames/4",
@@ -191,7 +191,7 @@ class TestFrameLists:
         assert placed[1].media == media[0].media
         with pytest.raises(NotFoundError, match="its SHA-256 differs"):
             read_frame(wrong, None, False, settings)
-        assert not is_kept(wrong, settings)
+        assert not is_cached(wrong, settings)
 
 
 def _noise(count: int) -> bytes:
@@ -219,7 +219,7 @@ class TestBadDays:
         assert said in caught.value.message
         assert "secret" not in f"{caught.value.message} {caught.value.hint}"
         assert "soccer-data" not in caught.value.message
-        assert not is_kept(picture_object, settings)
+        assert not is_cached(picture_object, settings)
         proxy.mode = "open"
         assert guess_content_type(read_frame(picture_object, None, False, settings)) == "image/png"
 
@@ -285,7 +285,7 @@ def picture_object(settings: Settings, tree: Path) -> Media:
     with zipfile.ZipFile(archive) as frames:
         data = frames.read(frames.namelist()[0])
     open_store(settings, "frames").put("loose/7.png", data)
-    return Media(find_path(settings, "s3://frames/loose/7.png").sealed())
+    return Media(find_path(settings, "s3://frames/loose/7.png").make_sealed_address())
 
 
 class TestDoctor:

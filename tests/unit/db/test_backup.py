@@ -14,7 +14,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db import backup as backup_module
-from app.db.backup import EXPORTS, FRAMES, back_up, verify_backup
+from app.db.backup import EXPORTS, FRAMES, back_up_home, verify_backup
 from app.db.store import Store
 from app.errors import DamagedError, InputError, StorageError
 from tests.unit.db.homes import killed, say
@@ -34,7 +34,7 @@ class TestBackUp:
         self, filled: Store, tmp_path: Path
     ) -> None:
         say(filled, 30)
-        manifest = back_up(filled.settings, tmp_path / "b.zip")
+        manifest = back_up_home(filled.settings, tmp_path / "b.zip")
         say(filled, 5)
         assert (manifest.entries, manifest.rows["groups"], manifest.rows["view"]) == (30, 1, 3)
         assert verify_backup(tmp_path / "b.zip") == manifest
@@ -52,7 +52,7 @@ class TestBackUp:
             return examine_database(*arguments)
 
         monkeypatch.setattr(examine, meanwhile)
-        assert back_up(own_store.settings, tmp_path / "b.zip").entries == 3
+        assert back_up_home(own_store.settings, tmp_path / "b.zip").entries == 3
         with own_store.read() as session:
             assert session.execute(text("SELECT count(*) FROM log")).scalar() == 7
 
@@ -63,8 +63,8 @@ class TestBackUp:
         upload.mkdir(parents=True)
         (upload / "frames.zip").write_bytes(b"frames")
         (own_store.settings.uploads / "2.part").write_bytes(b"half")
-        assert list(back_up(own_store.settings, tmp_path / "a.zip").files) == ["touchline.db"]
-        back_up(own_store.settings, tmp_path / "b.zip", FRAMES)
+        assert list(back_up_home(own_store.settings, tmp_path / "a.zip").files) == ["touchline.db"]
+        back_up_home(own_store.settings, tmp_path / "b.zip", FRAMES)
         with zipfile.ZipFile(tmp_path / "b.zip") as backup:
             assert backup.testzip() is None
             assert backup.read("uploads/1/frames.zip") == b"frames"
@@ -84,7 +84,7 @@ class TestBackUp:
         monkeypatch.setattr(zipfile.ZipInfo, "from_file", meanwhile)
         # Found while the folder was listed, and there when it was looked at.
         monkeypatch.setattr(Path, "is_file", lambda _path: True)
-        manifest = back_up(own_store.settings, tmp_path / "b.zip", EXPORTS)
+        manifest = back_up_home(own_store.settings, tmp_path / "b.zip", EXPORTS)
         assert list(manifest.files) == ["touchline.db", f"exports/{stays.name}"]
         assert verify_backup(tmp_path / "b.zip") == manifest
 
@@ -100,7 +100,7 @@ class TestBackUp:
 
         monkeypatch.setattr(Path, "open", refuse)
         with pytest.raises(StorageError, match=r"a\.zip cannot be read: Permission denied"):
-            back_up(own_store.settings, tmp_path / "b.zip", EXPORTS)
+            back_up_home(own_store.settings, tmp_path / "b.zip", EXPORTS)
         assert not (tmp_path / "b.zip").exists()
 
     def test_a_folder_that_takes_no_backup_is_what_the_advice_is_about(
@@ -117,7 +117,7 @@ class TestBackUp:
         backups.mkdir()
         monkeypatch.setattr(Path, "mkdir", refuse)
         with pytest.raises(StorageError, match="cannot be written") as refused:
-            back_up(own_store.settings, backups / "x.zip")
+            back_up_home(own_store.settings, backups / "x.zip")
         assert (refused.value.hint or "").startswith(f"Make {backups} writable")
 
     def test_what_began_to_be_written_after_the_backup_began_is_left_out(
@@ -135,17 +135,17 @@ class TestBackUp:
             return add(backup, name, *arguments)
 
         monkeypatch.setattr(backup_module, "_add_file", meanwhile)
-        manifest = back_up(own_store.settings, tmp_path / "b.zip", ("sample", *EXPORTS))
+        manifest = back_up_home(own_store.settings, tmp_path / "b.zip", ("sample", *EXPORTS))
         assert list(manifest.files) == ["touchline.db", "sample/1.png", "exports/a.zip"]
 
     def test_is_for_its_owner_alone(self, own_store: Store, tmp_path: Path) -> None:
-        back_up(own_store.settings, tmp_path / "b.zip")
+        back_up_home(own_store.settings, tmp_path / "b.zip")
         assert (tmp_path / "b.zip").stat().st_mode & 0o777 == 0o600
 
     def test_never_replaces_a_file(self, own_store: Store, tmp_path: Path) -> None:
         (tmp_path / "b.zip").write_bytes(b"mine")
         with pytest.raises(InputError, match="already exists"):
-            back_up(own_store.settings, tmp_path / "b.zip")
+            back_up_home(own_store.settings, tmp_path / "b.zip")
         assert (tmp_path / "b.zip").read_bytes() == b"mine"
 
     def test_never_replaces_one_that_somebody_wrote_meanwhile(
@@ -154,7 +154,7 @@ class TestBackUp:
         out = tmp_path / "b.zip"
         monkeypatch.setattr("app.db.backup.verify_backup", lambda _: out.write_bytes(b"mine"))
         with pytest.raises(InputError, match="already exists"):
-            back_up(own_store.settings, out)
+            back_up_home(own_store.settings, out)
         assert out.read_bytes() == b"mine"
 
     @pytest.mark.parametrize("step", ["verify_backup", "sync_to_disk"])
@@ -168,7 +168,7 @@ class TestBackUp:
         folder = tmp_path / "out"
         folder.mkdir()
         with pytest.raises(StorageError, match="disk is full"):
-            back_up(own_store.settings, folder / "b.zip")
+            back_up_home(own_store.settings, folder / "b.zip")
         left = [path.name for path in folder.iterdir()]
         # The one that is in its place was verified, and may be lost with the power alone.
         assert left == (["b.zip"] if step == "sync_to_disk" else [])
@@ -179,7 +179,7 @@ class TestBackUp:
         left = tmp_path / ".b.zip.partial"
         left.mkdir()
         (left / "touchline.db").write_bytes(b"half")
-        back_up(own_store.settings, tmp_path / "b.zip")
+        back_up_home(own_store.settings, tmp_path / "b.zip")
         assert not left.exists()
 
     def test_a_damaged_database_makes_no_backup(self, own_store: Store, tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ class TestBackUp:
         content[page : page + 4096] = b"\xff" * 4096
         settings.database_file.write_bytes(content)
         with pytest.raises(DamagedError, match=r"left/touchline\.db"):
-            back_up(settings, tmp_path / "b.zip")
+            back_up_home(settings, tmp_path / "b.zip")
         assert not (tmp_path / "b.zip").exists()
 
     def test_a_log_that_was_changed_makes_no_backup(self, own_store: Store, tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ class TestBackUp:
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET actor = 'eve' WHERE id = 2"))
         with pytest.raises(DamagedError, match="row 2 of the log"):
-            back_up(own_store.settings, tmp_path / "b.zip")
+            back_up_home(own_store.settings, tmp_path / "b.zip")
 
     def test_a_home_whose_files_do_not_belong_together_is_not_touched(
         self, own_store: Store, tmp_path: Path
@@ -208,19 +208,19 @@ class TestBackUp:
         say(own_store, 5)
         settings = killed(own_store, tmp_path / "left", "touchline.db-wal")
         with pytest.raises(DamagedError, match="is missing"):
-            back_up(settings, tmp_path / "b.zip")
+            back_up_home(settings, tmp_path / "b.zip")
         assert not settings.database_file.exists()
 
     def test_a_home_that_is_none_has_nothing_to_back_up(self, tmp_path: Path) -> None:
         with pytest.raises(InputError, match="no database"):
-            back_up(Settings(home=tmp_path / "none"), tmp_path / "b.zip")
+            back_up_home(Settings(home=tmp_path / "none"), tmp_path / "b.zip")
 
 
 class TestVerifyBackup:
     @pytest.fixture
     def backup(self, own_store: Store, tmp_path: Path) -> Path:
         say(own_store, 3)
-        back_up(own_store.settings, tmp_path / "b.zip")
+        back_up_home(own_store.settings, tmp_path / "b.zip")
         return tmp_path / "b.zip"
 
     @pytest.mark.parametrize("place", [200, -200, 0.5])

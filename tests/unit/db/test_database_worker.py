@@ -14,7 +14,7 @@ import pytest
 import structlog
 
 from app.db import database_worker as module
-from app.db.database_worker import CallingServer, run_in_worker, with_grace
+from app.db.database_worker import ServerProxy, make_stop_with_grace_period, run_in_worker
 from app.db.session import now
 from app.db.store import Store
 from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
@@ -49,16 +49,16 @@ def run(
     )
 
 
-def name_process(own_store: Store, word: str, _caller: CallingServer) -> tuple[int, str, Path]:
+def name_process(own_store: Store, word: str, _caller: ServerProxy) -> tuple[int, str, Path]:
     return os.getpid(), word, own_store.settings.home
 
 
-def count(_store: Store, last: int, caller: CallingServer) -> None:
+def count(_store: Store, last: int, caller: ServerProxy) -> None:
     for number in range(1, last + 1):
         caller(number, last, "counting")
 
 
-def change_over(_store: Store, caller: CallingServer) -> None:
+def change_over(_store: Store, caller: ServerProxy) -> None:
     caller(1, 9, "reading")
     caller(1, 9, "packing")
     caller(2, 9, "packing")
@@ -68,7 +68,7 @@ def log_a_word(*_: object) -> None:
     structlog.get_logger("touchline.tests").warning("seen")
 
 
-def count_slowly(_store: Store, mark: Path, caller: CallingServer) -> None:
+def count_slowly(_store: Store, mark: Path, caller: ServerProxy) -> None:
     try:
         for number in range(10_000):
             caller(number)
@@ -77,25 +77,25 @@ def count_slowly(_store: Store, mark: Path, caller: CallingServer) -> None:
         mark.write_text("put away")
 
 
-def never_look_up(_store: Store, caller: CallingServer) -> None:
+def never_look_up(_store: Store, caller: ServerProxy) -> None:
     caller(1)
     time.sleep(SECONDS)
 
 
-def take_turn(_store: Store, mark: Path, caller: CallingServer) -> None:
+def take_turn(_store: Store, mark: Path, caller: ServerProxy) -> None:
     caller.__enter__()
     mark.write_text("taken")
     time.sleep(SECONDS)
 
 
-def ask(_store: Store, question: str, caller: CallingServer) -> str:
+def ask(_store: Store, question: str, caller: ServerProxy) -> str:
     try:
         return f"answered {caller.ask(question)}"
     except NotFoundError as error:
         return f"refused: {error.message}"
 
 
-def write(own_store: Store, _caller: CallingServer) -> None:
+def write(own_store: Store, _caller: ServerProxy) -> None:
     with own_store.write() as session:
         insert_dataset_row(session, "made apart", PAPER, now())
 
@@ -229,7 +229,7 @@ class TestRunInWorker:
 
 class TestWithGrace:
     def test_nothing_ends_what_is_wanted(self) -> None:
-        stop = with_grace(wanted)
+        stop = make_stop_with_grace_period(wanted)
         stop()
         stop()
 
@@ -239,7 +239,7 @@ class TestWithGrace:
         def unwanted() -> None:
             raise JobCancelled
 
-        stop, clock = with_grace(unwanted), [100.0]
+        stop, clock = make_stop_with_grace_period(unwanted), [100.0]
         monkeypatch.setattr(module, "monotonic", lambda: clock[0])
         stop()
         clock[0] += module.GRACE_SECONDS
@@ -256,4 +256,4 @@ class TestWithGrace:
 
         monkeypatch.setattr(module, "GRACE_SECONDS", 0.3)
         with pytest.raises(JobCancelled):
-            run(own_store, never_look_up, stop=with_grace(unwanted))
+            run(own_store, never_look_up, stop=make_stop_with_grace_period(unwanted))

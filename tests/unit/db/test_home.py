@@ -11,15 +11,15 @@ from app.db.home import (
     find_file_system,
     find_last_write_time,
     find_leftovers,
+    find_paths_open_to_others,
     is_half_written,
     make_home,
-    make_private,
-    open_to_others,
+    make_home_private,
 )
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.queries import delete_expired_cache_entries
-from app.features.imports.upload_queries import UploadWriter, get_upload, save_upload
+from app.features.imports.upload_queries import UploadWriter, get_upload, mark_upload_permanent
 from tests.unit.db.homes import say
 
 MOUNTS = """\
@@ -89,8 +89,8 @@ class TestMakePrivate:
         settings.database_file.touch()
         (settings.home / "letter.txt").touch()
         (settings.uploads / "link").symlink_to(settings.home / "letter.txt")
-        assert make_private(settings) == 5
-        assert make_private(settings) == 0
+        assert make_home_private(settings) == 5
+        assert make_home_private(settings) == 0
         assert settings.home.stat().st_mode & 0o777 == 0o700
         assert (upload / "frames.zip").stat().st_mode & 0o777 == 0o600
         assert (settings.home / "letter.txt").stat().st_mode & 0o777 == 0o644
@@ -102,8 +102,8 @@ class TestMakePrivate:
         old.parent.mkdir(parents=True)
         old.touch()
         settings.home.chmod(0o755)
-        assert old in open_to_others(settings)
-        make_private(settings)
+        assert old in find_paths_open_to_others(settings)
+        make_home_private(settings)
         assert old.stat().st_mode & 0o777 == 0o600
         assert old.parent.stat().st_mode & 0o777 == 0o700
 
@@ -120,7 +120,7 @@ class TestMakePrivate:
             path.touch()
         for path in (file, *beside):
             path.chmod(0o644)
-        make_private(other)
+        make_home_private(other)
         modes = [path.stat().st_mode & 0o777 for path in (file, *beside)]
         assert modes == [0o600, 0o600, 0o644, 0o644]
 
@@ -138,13 +138,13 @@ class TestMakePrivate:
         inside = f"{settings.home}/../accounts"
         for place in (str(file), inside):
             other = settings.model_copy(update={"database_url": f"sqlite:///{place}"})
-            make_private(other)
-            assert not set(files) & set(open_to_others(other))
+            make_home_private(other)
+            assert not set(files) & set(find_paths_open_to_others(other))
         assert {path.stat().st_mode & 0o777 for path in files} == {0o644}
 
     def test_from_then_on_new_files_are_private(self, settings) -> None:
         make_home(settings)
-        make_private(settings)
+        make_home_private(settings)
         (settings.home / "new").touch()
         assert (settings.home / "new").stat().st_mode & 0o777 == 0o600
 
@@ -194,7 +194,7 @@ class TestLeftovers:
             broken.setattr(Path, "replace", killed)
             broken.setattr(Path, "unlink", killed)
             with pytest.raises(KeyboardInterrupt):
-                save_upload(settings, upload.id)
+                mark_upload_permanent(settings, upload.id)
         before = [path for path in settings.home.rglob("*") if is_half_written(path, settings.home)]
         assert len(before) == 4, "a record, and a folder with a folder with a file"
         for path in before:

@@ -17,13 +17,13 @@ from app.db.idempotency import (
     StoredResponseModel,
     delete_old_responses,
     find_response,
-    find_stored,
-    has_key,
+    find_stored_response,
+    has_idempotency_key,
     insert_response,
     read_progress,
     save_progress,
-    store_sent,
-    without_response,
+    store_sent_response,
+    without_pending_response,
 )
 from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
@@ -100,11 +100,11 @@ def entries(store: Store) -> int:
 
 class TestStoreSent:
     def test_the_first_one_stays(self, store: Store) -> None:
-        assert find_stored(store, "key", "ann") is None
-        store_sent(store, "key", "ann", RESPONSE)
-        store_sent(store, "key", "ann", StoredResponse("other", 200, {}, b""))
-        assert find_stored(store, "key", "ann") == RESPONSE
-        assert find_stored(store, "key", "ben") is None
+        assert find_stored_response(store, "key", "ann") is None
+        store_sent_response(store, "key", "ann", RESPONSE)
+        store_sent_response(store, "key", "ann", StoredResponse("other", 200, {}, b""))
+        assert find_stored_response(store, "key", "ann") == RESPONSE
+        assert find_stored_response(store, "key", "ben") is None
 
 
 class TestPendingResponse:
@@ -124,9 +124,9 @@ class TestPendingResponse:
         with pending.open():
             outcome = work(store, "outcome")
         assert request.stored
-        assert pending.response_to(outcome) == "response to outcome"
+        assert pending.make_or_get_response(outcome) == "response to outcome"
         assert made == ["outcome"]
-        stored = find_stored(store, "key", "ann")
+        stored = find_stored_response(store, "key", "ann")
         assert stored == StoredResponse("digest", 200, {}, b"response to outcome")
 
     def test_is_stored_as_the_last_statement_of_the_transaction(
@@ -159,8 +159,8 @@ class TestPendingResponse:
         with pending.open():
             outcome = work(store, "outcome")
             assert made == []
-        assert pending.response_to(outcome) == "response to outcome"
-        assert find_stored(store, "key", "ann") is None
+        assert pending.make_or_get_response(outcome) == "response to outcome"
+        assert find_stored_response(store, "key", "ann") is None
 
     def test_is_not_stored_where_the_work_is_rolled_back(self, store: Store) -> None:
         request = KeyedRequest(IdempotencyKey("key", "ann", "digest"))
@@ -169,11 +169,11 @@ class TestPendingResponse:
             with pytest.raises(KeyError), store.write() as session:
                 session.respond("first")
                 raise KeyError
-            assert find_stored(store, "key", "ann") is None
+            assert find_stored_response(store, "key", "ann") is None
             assert not request.stored
             # As where a service tries again what somebody else has changed meanwhile.
             outcome = work(store, "second")
-        assert pending.response_to(outcome) == "response to second"
+        assert pending.make_or_get_response(outcome) == "response to second"
 
     def test_is_not_stored_where_the_commit_fails(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
@@ -186,7 +186,7 @@ class TestPendingResponse:
                     session, "commit", lambda: (_ for _ in ()).throw(OSError("full"))
                 )
             assert (request.stored, entries(store)) == (False, before)
-            assert find_stored(store, "key", "ann") is None
+            assert find_stored_response(store, "key", "ann") is None
 
     def test_of_two_that_do_the_same_work_the_second_does_nothing(self, store: Store) -> None:
         with keyed_request().open():
@@ -204,7 +204,7 @@ class TestPendingResponse:
         with pending.open(), store.write() as session:
             session.respond("inner")
             session.respond("outer")
-        assert pending.response_to("outer") == "response to outer"
+        assert pending.make_or_get_response("outer") == "response to outer"
 
     @pytest.mark.parametrize("has_a_key", [True, False])
     def test_a_request_is_answered_in_one_transaction_alone(
@@ -225,31 +225,31 @@ class TestPendingResponse:
         with pending.open():
             work(store, ["answered"])
         with pytest.raises(RuntimeError, match="must return the same outcome"):
-            pending.response_to(["answered"])
+            pending.make_or_get_response(["answered"])
 
     def test_other_threads_and_what_comes_after_have_no_request(self, store: Store) -> None:
         looked = threading.Event()
 
         def look() -> bool:
             looked.set()
-            return has_key()
+            return has_idempotency_key()
 
         with keyed_request().open(), ThreadPoolExecutor(1) as pool:
-            assert has_key()
+            assert has_idempotency_key()
             assert pool.submit(look).result() is False
             assert looked.is_set()
-        assert not has_key()
+        assert not has_idempotency_key()
 
 
 class TestWithoutResponse:
     def test_inner_work_leaves_the_response_to_the_outer_one(self, store: Store) -> None:
         pending = keyed_request()
         with pending.open():
-            with without_response():
+            with without_pending_response():
                 work(store, "inner")
-            assert find_stored(store, "key", "ann") is None
+            assert find_stored_response(store, "key", "ann") is None
             assert work(store, "outer") == "outer"
-        assert pending.response_to("outer") == "outer"
+        assert pending.make_or_get_response("outer") == "outer"
 
 
 class TestProgress:
@@ -275,14 +275,14 @@ class TestProgress:
     def test_the_response_takes_its_place(self, store: Store) -> None:
         with keyed_request().open():
             self.save(store, {"next": 7})
-            found = find_stored(store, "key", "ann")
+            found = find_stored_response(store, "key", "ann")
             assert found is not None
-            assert found.under_way
+            assert found.is_in_progress
             work(store, "outcome")
             assert self.read(store) is None
-        found = find_stored(store, "key", "ann")
+        found = find_stored_response(store, "key", "ann")
         assert found is not None
-        assert not found.under_way
+        assert not found.is_in_progress
 
     def test_a_request_without_a_key_saves_none(self, store: Store) -> None:
         self.save(store, {"next": 7})

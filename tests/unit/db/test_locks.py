@@ -6,7 +6,12 @@ import pytest
 
 from app.config import Settings
 from app.db import locks
-from app.db.locks import DatabaseInUse, hold_database_alone, hold_practice_lock, hold_server_lock
+from app.db.locks import (
+    DatabaseLock,
+    hold_exclusive_database_lock,
+    hold_practice_lock,
+    hold_server_lock,
+)
 from app.errors import BusyError, StorageError
 
 FLOCK = fcntl.flock
@@ -17,13 +22,13 @@ class TestDatabaseLock:
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
-        first = DatabaseInUse(settings)
+        first = DatabaseLock(settings)
         assert first.alone
         with pytest.raises(BusyError, match="has been opening the database") as refused:
-            DatabaseInUse(settings)
+            DatabaseLock(settings)
         assert "Ctrl-Z" in str(refused.value.hint)
         first.share()
-        second, third = DatabaseInUse(settings), DatabaseInUse(settings)
+        second, third = DatabaseLock(settings), DatabaseLock(settings)
         assert not (first.alone or second.alone or third.alone)
         for lock in (first, second, third):
             lock.release()
@@ -32,14 +37,14 @@ class TestDatabaseLock:
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
-        first, waited = DatabaseInUse(settings), []
+        first, waited = DatabaseLock(settings), []
 
         def with_a_gap(handle: int, operation: int) -> None:
             """Lets go before it shares, as the system may, and somebody opens just then."""
             FLOCK(handle, fcntl.LOCK_UN)
             monkeypatch.setattr(fcntl, "flock", FLOCK)
             try:
-                DatabaseInUse(settings).release()
+                DatabaseLock(settings).release()
             except BusyError:
                 waited.append(True)
             FLOCK(handle, operation)
@@ -52,14 +57,14 @@ class TestDatabaseLock:
     def test_what_must_be_alone_is_refused_beside_others_and_runs_after_them(
         self, settings: Settings
     ) -> None:
-        first = DatabaseInUse(settings)
+        first = DatabaseLock(settings)
         first.share()
         refused = pytest.raises(StorageError, match="has the database open: not now")
-        with refused, hold_database_alone(settings, "not now"):
+        with refused, hold_exclusive_database_lock(settings, "not now"):
             pass
         first.release()
         first.release()
-        with hold_database_alone(settings, "not now"):
+        with hold_exclusive_database_lock(settings, "not now"):
             pass
 
 

@@ -11,7 +11,7 @@ from app.db.log import (
     append_entries,
     filter_groups_with_history,
     find_newest_entry_id,
-    group_entries,
+    list_group_entries,
     list_station_entries,
     read_entries,
     read_log,
@@ -94,8 +94,8 @@ class TestEntriesOfOne:
                 replace(FIRST, group_id=8, kind="verdict"),
             ]
             append_entries(session, said)
-            assert [item.id for item in group_entries(session, 7)] == [1, 2, 4]
-            assert [item.id for item in group_entries(session, 7, verdicts=False)] == [1, 4]
+            assert [item.id for item in list_group_entries(session, 7)] == [1, 2, 4]
+            assert [item.id for item in list_group_entries(session, 7, verdicts=False)] == [1, 4]
             assert [item.id for item in list_station_entries(session, 3)] == [3]
             assert filter_groups_with_history(session, [7, 8, 9]) == {7}
             assert find_newest_entry_id(session) == 6

@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.backup import FRAMES, back_up
+from app.db.backup import FRAMES, back_up_home
 from app.db.locks import hold_server_lock
 from app.db.restore import restore_database
 from app.db.store import Store
@@ -29,7 +29,7 @@ def backup(own_store: Store, tmp_path: Path) -> Path:
     upload.mkdir(parents=True)
     (upload / "upload.json").write_bytes(b"{}")
     say(own_store, 3)
-    back_up(own_store.settings, tmp_path / "b.zip", FRAMES)
+    back_up_home(own_store.settings, tmp_path / "b.zip", FRAMES)
     say(own_store, 5)
     own_store.close()
     return tmp_path / "b.zip"
@@ -149,7 +149,7 @@ class TestRestore:
     def test_a_backup_of_a_newer_version_is_refused(self, own_store: Store, tmp_path: Path) -> None:
         with own_store.write() as session:
             session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
-        back_up(own_store.settings, tmp_path / "b.zip")
+        back_up_home(own_store.settings, tmp_path / "b.zip")
         with pytest.raises(StorageError, match="newer version"):
             restore_database(Settings(home=tmp_path / "new"), tmp_path / "b.zip")
 

@@ -13,7 +13,7 @@ from sqlalchemy import text
 from structlog.testing import capture_logs
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.dialects.sqlite import AGAIN_S, PRAGMAS
 from app.db.log import NewLogEntry, append_entries, read_log
 from app.db.migrate import migrate_database
@@ -135,12 +135,12 @@ class TestRequireWhole:
     def test_names_the_fault_and_no_change_is_taken_after_it(
         self, own_store: Store, monkeypatch
     ) -> None:
-        own_store.require_whole()
+        own_store.require_intact_database()
         monkeypatch.setattr(
-            type(dialect_of(own_store.settings)), "file_faults", lambda *_: ["Tree 5 is torn"]
+            type(get_dialect(own_store.settings)), "file_faults", lambda *_: ["Tree 5 is torn"]
         )
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
-            own_store.require_whole()
+            own_store.require_intact_database()
         with pytest.raises(DamagedError, match="nothing can be changed now"):
             add(own_store, "late")
 
@@ -160,7 +160,7 @@ class TestRequireWhole:
         own_store.close()
         opened = Store.open(settings)
         with capture_logs() as logs, pytest.raises(DamagedError) as caught:
-            opened.require_whole()
+            opened.require_intact_database()
         opened.close()
         assert caught.value.message == "touchline.db is damaged"
         assert logs[-1]["file"] == str(settings.database_file)

@@ -18,7 +18,7 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.scenes import make_scenes
 
 LINE = "Side line top"
@@ -91,7 +91,7 @@ class TestCompareBalls3D:
 
 class TestCompareAnnotations:
     def test_of_a_group_with_itself_is_nothing(self, group: Group) -> None:
-        solution = solve(group, Policy())
+        solution = solve_group(group, Policy())
         found = compare_annotations(group, group, solution, solution)
         assert found.ball.distance_m == 0
         assert all(view.largest_px < 1e-9 and view.position_m == 0 for view in found.views)
@@ -103,7 +103,7 @@ class TestCompareAnnotations:
         assert ball.box is not None
         moved = replace(ball, box=replace(ball.box, x=ball.box.x + 40))
         other = group.with_view(replace(view, balls=(moved,)))
-        solutions = solve(group, Policy()), solve(other, Policy())
+        solutions = solve_group(group, Policy()), solve_group(other, Policy())
         found = compare_annotations(group, other, *solutions)
         assert found.views[0].ball.center_px == pytest.approx(40)
         said = find_disagreements(found, ("accepted", "rejected"), AgreementLimits())
@@ -118,7 +118,7 @@ class TestCompareAnnotations:
             for name, points in view.station.lines.items()
         }
         other = group.with_view(replace(view, station=replace(view.station, lines=lines)))
-        solutions = solve(group, Policy()), solve(other, Policy())
+        solutions = solve_group(group, Policy()), solve_group(other, Policy())
         jac = compare_annotations(group, other, *solutions).views[0].jac
         back = compare_annotations(other, group, *reversed(solutions)).views[0].jac
         assert jac == back[::-1]

@@ -16,11 +16,11 @@ from app.evaluation.average_precision import (
     SIZE,
     area_under_curve,
     coco_average_precision,
-    detection_table,
-    error_figure,
-    find_hits,
-    interpolated_precision,
-    mean_interpolated,
+    interpolated_average_precision,
+    make_detection_table,
+    make_error_figure,
+    match_detections_to_balls,
+    mean_average_precision_over_ious,
     precision_recall_curve,
 )
 from app.evaluation.frame import Detection, JudgedFrame
@@ -108,17 +108,17 @@ class TestCocoAveragePrecision:
 
 class TestFindHits:
     def test_the_surest_detection_that_overlaps_gets_the_ball(self, make_judged) -> None:
-        hits = find_hits([make_judged(BALL, (AWAY, 0.9), (HALF, 0.8), (BALL, 0.7))])
+        hits = match_detections_to_balls([make_judged(BALL, (AWAY, 0.9), (HALF, 0.8), (BALL, 0.7))])
         assert hits.found[:, 0].tolist() == [False, True, False]
         # At 0.55 the half box does not reach, so the exact one does.
         assert hits.found[:, 1].tolist() == [False, False, True]
 
     def test_an_overlap_of_exactly_the_threshold_counts(self, make_judged) -> None:
         assert IOUS[0] == 0.5
-        assert find_hits([make_judged(BALL, (HALF, 0.8))]).found[0, 0]
+        assert match_detections_to_balls([make_judged(BALL, (HALF, 0.8))]).found[0, 0]
 
     def test_whatever_is_found_where_no_ball_is_is_wrong(self, make_judged) -> None:
-        assert not find_hits([make_judged(None, (BALL, 0.9))]).found.any()
+        assert not match_detections_to_balls([make_judged(None, (BALL, 0.9))]).found.any()
 
 
 class TestCurve:
@@ -130,45 +130,55 @@ class TestCurve:
             make_judged(BALL, (BALL, 0.9), (AWAY, 0.8), identity=1),
             make_judged(BALL, (BALL, 0.7), identity=2),
         ]
-        found = precision_recall_curve(find_hits(judged))
+        found = precision_recall_curve(match_detections_to_balls(judged))
         assert found.recall.tolist() == [0.5, 0.5, 1.0]
         assert found.precision == pytest.approx([1, 0.5, 2 / 3])
         # VOC: half of the recall at precision 1, half at 2/3.
         assert area_under_curve(found) == pytest.approx(0.5 + 0.5 * 2 / 3)
         # COCO: recalls 0 to 0.5 at 1, the 50 others at 2/3.
-        assert interpolated_precision(found) == pytest.approx((51 + 50 * 2 / 3) / 101)
+        assert interpolated_average_precision(found) == pytest.approx((51 + 50 * 2 / 3) / 101)
 
     def test_a_frame_that_counts_twice_is_a_frame_that_is_there_twice(self, make_judged) -> None:
         one, two = make_judged(BALL, (BALL, 0.9), identity=1), make_judged(BALL, (AWAY, 0.8))
-        twice = precision_recall_curve(find_hits([one, two]), 0, np.array([1.0, 2.0]))
-        written = precision_recall_curve(find_hits([one, two, two]))
-        assert interpolated_precision(twice) == pytest.approx(interpolated_precision(written))
+        twice = precision_recall_curve(
+            match_detections_to_balls([one, two]), 0, np.array([1.0, 2.0])
+        )
+        written = precision_recall_curve(match_detections_to_balls([one, two, two]))
+        assert interpolated_average_precision(twice) == pytest.approx(
+            interpolated_average_precision(written)
+        )
 
     def test_its_means_are_those_of_the_public_evaluator(self, random_judged) -> None:
-        hits = find_hits(random_judged)
+        hits = match_detections_to_balls(random_judged)
         ap_50, ap = coco_average_precision(random_judged)
-        assert interpolated_precision(precision_recall_curve(hits)) == pytest.approx(
+        assert interpolated_average_precision(precision_recall_curve(hits)) == pytest.approx(
             ap_50, abs=1e-12
         )
-        assert mean_interpolated(hits) == pytest.approx(ap, abs=1e-12)
+        assert mean_average_precision_over_ious(hits) == pytest.approx(ap, abs=1e-12)
 
 
 class TestMeanInterpolated:
     @pytest.mark.parametrize("seed", range(5))
     def test_is_that_of_each_threshold_to_the_last_bit(self, random_judged, seed: int) -> None:
-        hits = find_hits(random_judged)
+        hits = match_detections_to_balls(random_judged)
         weights = np.random.default_rng(seed).integers(0, 3, len(hits.balls)).astype(float)
         each = [
-            interpolated_precision(precision_recall_curve(hits, index, weights))
+            interpolated_average_precision(precision_recall_curve(hits, index, weights))
             for index in range(len(IOUS))
         ]
-        assert mean_interpolated(hits, weights) == np.mean(each)
+        assert mean_average_precision_over_ious(hits, weights) == np.mean(each)
 
     def test_without_a_ball_there_is_none_and_without_a_detection_it_is_nought(
         self, make_judged
     ) -> None:
-        assert np.isnan(mean_interpolated(find_hits([make_judged(None, (BALL, 0.9))])))
-        assert mean_interpolated(find_hits([make_judged(BALL)])) == 0.0
+        assert np.isnan(
+            mean_average_precision_over_ious(
+                match_detections_to_balls([make_judged(None, (BALL, 0.9))])
+            )
+        )
+        assert (
+            mean_average_precision_over_ious(match_detections_to_balls([make_judged(BALL)])) == 0.0
+        )
 
 
 RESULT = FrameResult(1, 1, "g", "v", "m", ball=True, detections=1)
@@ -194,7 +204,7 @@ class TestErrorFigure:
             replace(RESULT, distance_m=45.0, error_m=9.0),
             RESULT,
         ]
-        points, middle = error_figure(frames, DISTANCE).panels[0].series
+        points, middle = make_error_figure(frames, DISTANCE).panels[0].series
         assert middle.x == (25, 45)
         assert middle.y == (2, 9)
         assert (middle.low, middle.high, middle.count) == ((1, 9), (3, 9), (5, 1))
@@ -203,7 +213,7 @@ class TestErrorFigure:
     def test_a_median_opens_its_bin_and_a_point_its_frame(self) -> None:
         places = [20.0, 25.0, 29.9, 105.0]
         frames = [replace(RESULT, distance_m=place, error_m=1.0) for place in places]
-        points, middle = error_figure(frames, DISTANCE).panels[0].series
+        points, middle = make_error_figure(frames, DISTANCE).panels[0].series
         assert [(item.low, item.high) for item in middle.frames] == [(20, 30), (100, None)]
         assert {item.field for item in (*middle.frames, *points.frames)} == {"distance_m"}
         for behind in points.frames:
@@ -211,7 +221,7 @@ class TestErrorFigure:
 
     @pytest.mark.parametrize("bins", [DISTANCE, PARALLAX, SIZE])
     def test_without_values_the_figure_is_empty(self, bins) -> None:
-        points, middle = error_figure([RESULT], bins).panels[0].series
+        points, middle = make_error_figure([RESULT], bins).panels[0].series
         assert points.x == middle.x == ()
 
 
@@ -223,7 +233,7 @@ class TestDetectionTable:
             JudgedFrame(far, far.boxes["optimized"], ()),
         ]
         results = [measure_frame(item, DIAMETER) for item in judged]
-        table = detection_table(judged, results, DISTANCE)
+        table = make_detection_table(judged, results, DISTANCE)
         assert [row.label for row in table.rows] == ["20 to 30 m", "80 to 100 m"]
         assert [row.cells[0].value for row in table.rows] == [1, 0]
         assert [row.cells[2].value for row in table.rows] == [1, 0]

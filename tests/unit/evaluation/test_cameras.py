@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.bootstrap import Resamples
+from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.cameras import (
     FrameScore,
-    cameras_table,
-    jac_figure,
+    make_cameras_table,
+    make_jac_figure,
     measure_leave_one_out_errors,
     score_cameras,
     score_frame,
@@ -70,7 +70,7 @@ class TestScoreCameras:
 class TestCamerasTable:
     def test_missing_cameras_count_as_nothing(self, frames) -> None:
         rows = [("predicted", "Predicted", score_cameras(frames, {1: frames[0].camera}))]
-        table = cameras_table(rows, frames, Resamples.draw(["m1", "m2", "m3"]), {1})
+        table = make_cameras_table(rows, frames, MatchResamples.draw(["m1", "m2", "m3"]), {1})
         assert table.cell("predicted", "completeness").value == 0.5
         assert table.cell("predicted", "jac_0.5").value == pytest.approx(0.5)
         assert table.cell("predicted", "challenge").value == pytest.approx(0.5)
@@ -83,7 +83,7 @@ class TestCamerasTable:
 class TestJacFigure:
     def test_counts_frames_above_each_threshold(self, frames) -> None:
         rows = [("predicted", "Predicted", score_cameras(frames, {1: frames[0].camera}))]
-        (panel,) = jac_figure(rows, 0.75).panels
+        (panel,) = make_jac_figure(rows, 0.75).panels
         at = dict(zip(panel.series[0].x, panel.series[0].y, strict=True))
         assert (at[0.0], at[0.75], at[1.0]) == (0.5, 0.5, 0)
         assert panel.marks[0].at == 0.75
@@ -91,7 +91,7 @@ class TestJacFigure:
     def test_a_point_opens_the_frames_above_it_where_their_number_is_kept(self, frames) -> None:
         scores = score_cameras(frames, {1: frames[0].camera})
         rows = [("predicted", "Predicted", scores), ("dataset", "Own", scores)]
-        predicted, own = jac_figure(rows, 0.75).panels
+        predicted, own = make_jac_figure(rows, 0.75).panels
         at = dict(zip(predicted.series[0].x, predicted.series[0].frames, strict=True))
         assert at[0.75].low > 0.75 == np.nextafter(at[0.75].low, 0)
         assert at[0.75].high is None

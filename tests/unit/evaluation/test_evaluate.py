@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.bootstrap import Resamples
+from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.evaluate import (
     EvaluationInputs,
     EvaluationOptions,
-    boxes_figure,
-    boxes_table,
     evaluate,
+    make_boxes_figure,
+    make_boxes_table,
 )
 from app.evaluation.frame import Detection
 from app.evaluation.result import FrameRange
@@ -110,7 +110,7 @@ class TestEvaluate:
             assert len(inside) == row.cells[0].count
 
 
-ONE_MATCH = Resamples.draw(["m"])
+ONE_MATCH = MatchResamples.draw(["m"])
 
 
 def beside(box: Box) -> Box:
@@ -122,7 +122,7 @@ class TestBoxesTable:
     def test_measures_every_kind_over_the_same_frames(self, make_frame) -> None:
         frame, bare = make_frame(1), replace(make_frame(2), boxes={})
         careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"], 99: frame.boxes["exact"]}
-        table = boxes_table([frame, bare], careful, {}, ONE_MATCH)
+        table = make_boxes_table([frame, bare], careful, {}, ONE_MATCH)
         # The annotated box is 1.25 times the careful one: IoU 0.64, and a quarter of d over the
         # diagonal of a square.
         assert table.cell("annotated", "iou").value == pytest.approx(0.64)
@@ -135,7 +135,7 @@ class TestBoxesTable:
     def test_detections_get_a_row_where_they_overlap(self, make_frame) -> None:
         frame = make_frame(1)
         found = {1: [Detection(frame.boxes["annotated"], 0.4)]}
-        table = boxes_table([frame], {1: frame.boxes["exact"]}, found, ONE_MATCH)
+        table = make_boxes_table([frame], {1: frame.boxes["exact"]}, found, ONE_MATCH)
         assert table.cell("detected", "iou").value == pytest.approx(0.64)
 
     def test_only_the_row_whose_overlap_is_kept_opens_frames(self, make_frame) -> None:
@@ -157,7 +157,7 @@ class TestBoxesTable:
         self, make_frame
     ) -> None:
         frame = make_frame(1)
-        table = boxes_table([frame], {1: frame.boxes["exact"]}, {}, ONE_MATCH)
+        table = make_boxes_table([frame], {1: frame.boxes["exact"]}, {}, ONE_MATCH)
         for column in table.columns:
             best = {"higher": max, "lower": min}[column.better]
             exact, loose = (table.cell(kind, column.name).value for kind in ("exact", "annotated"))
@@ -170,7 +170,7 @@ class TestBoxesTable:
     def test_rows_stand_in_the_papers_order_under_their_names(self, make_frame) -> None:
         frame = make_frame(1)
         found = {1: [Detection(frame.boxes["exact"], 0.5)]}
-        table = boxes_table([frame], {1: frame.boxes["exact"]}, found, ONE_MATCH)
+        table = make_boxes_table([frame], {1: frame.boxes["exact"]}, found, ONE_MATCH)
         assert [(row.name, row.label) for row in table.rows] == [
             ("annotated", "Original boxes"),
             ("optimized", "Optimised boxes"),
@@ -187,7 +187,7 @@ class TestBoxesTable:
         careful = {frame.id: frame.boxes["exact"] for frame in (whole, part)}
         found = {frame.id: [Detection(frame.boxes["exact"], 0.5)] for frame in (whole, part)}
         part = replace(part, boxes={k: box for k, box in part.boxes.items() if k != lacking})
-        table = boxes_table([whole, part], careful, found, ONE_MATCH)
+        table = make_boxes_table([whole, part], careful, found, ONE_MATCH)
         counts = {(cell.count, cell.of) for row in table.rows for cell in row.cells}
         assert len(table.rows) == 4 and counts == {(1, 2)}
 
@@ -195,7 +195,7 @@ class TestBoxesTable:
         frames = [make_frame(1), make_frame(2), make_frame(3)]
         careful = dict.fromkeys((1, 2, 7, 8), frames[0].boxes["exact"])
         found = {1: [Detection(frames[0].boxes["exact"], 0.5)]}
-        table = boxes_table(frames, careful, found, ONE_MATCH)
+        table = make_boxes_table(frames, careful, found, ONE_MATCH)
         told = {row.name: [(cell.count, cell.of) for cell in row.cells] for row in table.rows}
         assert told.pop("detected") == [(1, 4), (1, 4)]
         assert set(map(tuple, told.values())) == {((2, 4), (2, 4))}
@@ -209,7 +209,7 @@ class TestBoxesTable:
             1: [Detection(exact, 0.3), Detection(poor, 0.6), Detection(beside(exact), 0.9)],
             5: [Detection(exact, 1.0)],
         }
-        table = boxes_table([frame], {1: exact}, found, ONE_MATCH)
+        table = make_boxes_table([frame], {1: exact}, found, ONE_MATCH)
         # A quarter of both is shared: 0.25 / 1.75.
         assert table.cell("detected", "iou").value == pytest.approx(1 / 7)
 
@@ -217,13 +217,13 @@ class TestBoxesTable:
         frame = make_frame(1)
         exact = frame.boxes["exact"]
         found = {1: [Detection(beside(exact), 0.9)]}
-        cell = boxes_table([frame], {1: exact}, found, ONE_MATCH).cell("detected", "iou")
+        cell = make_boxes_table([frame], {1: exact}, found, ONE_MATCH).cell("detected", "iou")
         assert (cell.value, cell.count, cell.of) == (None, 0, 1)
 
     def test_intervals_are_of_whole_matches(self, make_frame) -> None:
         one, other = make_frame(1, match="a"), make_frame(2, match="b")
         careful = {1: one.boxes["exact"], 2: other.boxes["annotated"]}
-        table = boxes_table([one, other], careful, {}, Resamples.draw(["a", "b"]))
+        table = make_boxes_table([one, other], careful, {}, MatchResamples.draw(["a", "b"]))
         cell = table.cell("annotated", "iou")
         # Of two matches a resample draws one twice in half of all cases.
         assert (cell.low, cell.high) == pytest.approx((0.64, 1.0))
@@ -233,7 +233,7 @@ class TestBoxesFigure:
     def test_every_box_of_every_frame_is_a_point_that_opens_its_frame(self, make_frame) -> None:
         near, far, nowhere = make_frame(1), make_frame(2), make_frame(3)
         careful = {frame.id: frame.boxes["exact"] for frame in (near, far, nowhere)}
-        figure = boxes_figure([near, far, nowhere], careful, {1: 30.0, 2: 20.0})
+        figure = make_boxes_figure([near, far, nowhere], careful, {1: 30.0, 2: 20.0})
         overlap, size = figure.panels
         series = {item.name: item for item in overlap.series}
         assert set(series) == {"annotated", "optimized", "exact"}
@@ -256,7 +256,7 @@ class TestBoxesFigure:
 
     def test_axes_say_what_they_show_and_that_of_iou_alone_ends(self, make_frame) -> None:
         frame = make_frame(1)
-        overlap, size = boxes_figure([frame], {1: frame.boxes["exact"]}, {1: 30.0}).panels
+        overlap, size = make_boxes_figure([frame], {1: frame.boxes["exact"]}, {1: 30.0}).panels
         assert [panel.x.unit for panel in (overlap, size)] == ["m", "m"]
         assert (overlap.y.label, overlap.y.low, overlap.y.high) == ("IoU", 0.0, 1.0)
         assert (size.y.label, size.y.unit, size.y.low) == ("Size error", "%", 0.0)
@@ -266,7 +266,7 @@ class TestBoxesFigure:
     def test_frames_that_are_nearly_as_far_open_each_its_own(self, make_frame) -> None:
         frames = [make_frame(number) for number in (1, 2, 3)]
         careful = {frame.id: frame.boxes["exact"] for frame in frames}
-        figure = boxes_figure(frames, careful, {1: 20.0, 2: 20.0 + 1e-9})
+        figure = make_boxes_figure(frames, careful, {1: 20.0, 2: 20.0 + 1e-9})
         assert figure.note.startswith("2 frames;")
         series = figure.panels[0].series[0]
         for place, behind in zip(series.x, series.frames, strict=True):

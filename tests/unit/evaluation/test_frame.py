@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.evaluation.frame import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNameIndex, NamedFrame
 from app.formats.frame_names import frame_path_by_match, frame_path_in_split
 from app.formats.gamestate_reader import sequence_frame_path
 from app.formats.sn_calibration import line_frame_path
@@ -19,8 +19,8 @@ def broadcast(identity: int, match: str, view: str) -> NamedFrame:
 
 
 @pytest.fixture
-def names() -> FrameNames:
-    return FrameNames.of(
+def names() -> FrameNameIndex:
+    return FrameNameIndex.of(
         [
             broadcast(1, ALDER, "7.png"),
             broadcast(2, ALDER, "7_1.png"),
@@ -106,13 +106,13 @@ class TestFind:
         assert names.find(name) is None
 
     def test_the_last_folder_alone_of_a_match_without_teams_does_not_tell_it(self) -> None:
-        found = FrameNames.of([broadcast(1, "epl/2015-2016/Arsenal", "2_2.png")])
+        found = FrameNameIndex.of([broadcast(1, "epl/2015-2016/Arsenal", "2_2.png")])
         assert found.find("Arsenal/2_2.png").id == 1
         assert found.find("x/epl/2015-2016/Arsenal/2_2.png").id == 1
         assert found.find("epl/2014-2015/Arsenal/2_2.png") is None
 
     def test_where_frames_have_no_match_their_group_tells_them(self) -> None:
-        found = FrameNames.of(
+        found = FrameNameIndex.of(
             [
                 NamedFrame(1, "g7", "7_1.png", "", SIZE),
                 NamedFrame(2, "358", "cam3", "", SIZE, station="cam3"),
@@ -125,14 +125,14 @@ class TestFind:
 
 class TestOfStation:
     def test_is_every_frame_of_the_camera(self, names) -> None:
-        assert names.of_station("camera/cam3.json") == (4, 5)
-        assert names.of_station("cam9") == ()
+        assert names.find_station_frames("camera/cam3.json") == (4, 5)
+        assert names.find_station_frames("cam9") == ()
 
 
 class TestFindNumber:
     @pytest.fixture
-    def pictures(self) -> FrameNames:
-        return FrameNames.of(
+    def pictures(self) -> FrameNameIndex:
+        return FrameNameIndex.of(
             [
                 NamedFrame(1, "kick0", "north", "", SIZE, picture="images/0004.jpg"),
                 NamedFrame(2, "kick0", "south", "", SIZE, picture="images/frame_000005.jpg"),
@@ -158,12 +158,12 @@ class TestFindNumber:
         ],
     )
     def test_a_number_is_that_in_the_name_of_a_picture(
-        self, pictures: FrameNames, text: str, found: int | None
+        self, pictures: FrameNameIndex, text: str, found: int | None
     ) -> None:
-        frame = pictures.find_number(text)
+        frame = pictures.find_by_number(text)
         assert (frame and frame.id) == found
 
-    def test_says_why_there_is_none(self, pictures: FrameNames) -> None:
+    def test_says_why_there_is_none(self, pictures: FrameNameIndex) -> None:
         assert "several frames" in pictures.explain_unknown_number("7")
         assert "is not a number that the name" in pictures.explain_unknown_number("99")
 
@@ -171,13 +171,13 @@ class TestFindNumber:
         ("name", "found"), [("0004.jpg", 1), ("other/0007.jpg", 4), ("0007.jpg", None)]
     )
     def test_pictures_are_names_too(
-        self, pictures: FrameNames, name: str, found: int | None
+        self, pictures: FrameNameIndex, name: str, found: int | None
     ) -> None:
         frame = pictures.find(name)
         assert (frame and frame.id) == found
 
     def test_views_of_one_match_that_are_called_alike_are_one_camera(
-        self, pictures: FrameNames
+        self, pictures: FrameNameIndex
     ) -> None:
-        assert pictures.of_station("south") == (2, 4, 5)
-        assert pictures.of_station("north") == ()
+        assert pictures.find_station_frames("south") == (2, 4, 5)
+        assert pictures.find_station_frames("north") == ()

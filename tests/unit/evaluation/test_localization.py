@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.bootstrap import Resamples
-from app.evaluation.localization import localization_table, make_precision_distance_figure
+from app.evaluation.bootstrap import MatchResamples
+from app.evaluation.localization import make_localization_table, make_precision_distance_figure
 from app.evaluation.result import FrameResult
 
 RESULT = FrameResult(1, 1, "g", "v", "m", ball=True, detections=1, distance_m=50.0)
@@ -21,14 +21,14 @@ def frames() -> list[FrameResult]:
 
 class TestLocalizationTable:
     def test_as_the_paper_counts(self, frames) -> None:
-        table = localization_table(frames, Resamples.draw(["m", "n"]), predicted=False)
+        table = make_localization_table(frames, MatchResamples.draw(["m", "n"]), predicted=False)
         cells = {name: table.cell("oracle", name) for name in ("mae_m", "mae_percent", "p_2m")}
         assert [cell.value for cell in cells.values()] == [2.5, 5, 0.5]
         assert all((cell.count, cell.of) == (2, 4) for cell in cells.values())
         assert table.cell("oracle", "median_m").value == 2.5
 
     def test_over_all_frames_a_miss_is_a_miss(self, frames) -> None:
-        table = localization_table(frames, Resamples.draw(["m", "n"]), predicted=False)
+        table = make_localization_table(frames, MatchResamples.draw(["m", "n"]), predicted=False)
         places, near = table.cell("oracle_all", "mae_m"), table.cell("oracle_all", "p_2m")
         assert places.value == pytest.approx(35 / 3)
         assert (places.count, places.of) == (3, 4)
@@ -36,14 +36,14 @@ class TestLocalizationTable:
 
     def test_predicted_cameras_have_rows_of_their_own(self, frames) -> None:
         frames[0] = replace(frames[0], predicted_error_m=3.0, predicted_error_percent=6.0)
-        table = localization_table(frames, Resamples.draw(["m", "n"]), predicted=True)
+        table = make_localization_table(frames, MatchResamples.draw(["m", "n"]), predicted=True)
         cell = table.cell("predicted", "mae_m")
         assert (cell.value, cell.count, cell.of) == (3, 1, 4)
         assert table.cell("predicted", "mae_percent").value == 6
 
     def test_an_error_of_exactly_two_metres_is_not_within(self) -> None:
         frame = replace(RESULT, error_m=2.0, error_percent=4.0, any_error_m=2.0)
-        table = localization_table([frame], Resamples.draw(["m"]), predicted=False)
+        table = make_localization_table([frame], MatchResamples.draw(["m"]), predicted=False)
         assert table.cell("oracle", "p_2m").value == 0
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNameIndex, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.formats.camera_json import camera_to_json
 from app.soccer.frames import Box, ImageSize
@@ -19,12 +19,12 @@ MATCH = "league/2030-2031/2030-08-17 - 18-00 Alder 3 - 1 Birch"
 
 
 @pytest.fixture
-def names() -> FrameNames:
+def names() -> FrameNameIndex:
     frames = [
         NamedFrame(number, f"{MATCH}/7.png", view, MATCH, SIZE)
         for number, view in enumerate(("7.png", "7_1.png"), 1)
     ]
-    return FrameNames.of([*frames, NamedFrame(9, "358", "cam3", "issia", SIZE, station="cam3")])
+    return FrameNameIndex.of([*frames, NamedFrame(9, "358", "cam3", "issia", SIZE, station="cam3")])
 
 
 def write(path: Path, value: object) -> Path:

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame import FrameNames
+from app.evaluation.frame import FrameNameIndex
 from app.evaluation.prediction_files import read_predictions
-from app.evaluation.prediction_run import PredictedTrack, ReadPredictions
+from app.evaluation.prediction_run import LoadedPredictions, PredictedTrack
 from app.soccer.frames import ImageSize
 
 HEAD = "frame,time_s,x_m,y_m,z_m,sigma_m,state,cameras\n"
 ROWS = "100,4.0,1.0,2.0,-0.5,0.1,measured,cam1 cam2\n101,4.04,,,,,gap,\n102,4.08,1.5,2,-0.6,,one_view,cam1\n"
 
 
-def read(path: Path, format: str = "auto", **options: object) -> ReadPredictions:  # noqa: A002
-    return read_predictions(path, format, FrameNames.of([]), **options)  # type: ignore[arg-type]
+def read(path: Path, format: str = "auto", **options: object) -> LoadedPredictions:  # noqa: A002
+    return read_predictions(path, format, FrameNameIndex.of([]), **options)  # type: ignore[arg-type]
 
 
 def only(path: Path) -> PredictedTrack:

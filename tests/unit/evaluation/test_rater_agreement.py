@@ -18,7 +18,7 @@ from app.evaluation.rater_agreement import (
     MEASURES,
     AgreementLimits,
     Disagreement,
-    Spread,
+    MedianAndTail,
     cohen_kappa,
     find_disagreements,
     fleiss_kappa,
@@ -295,9 +295,9 @@ class TestSpreads:
         found = measure_spreads([GroupDistance(views, Ball3DDistance(True, True, 0.25))])
         assert tuple(found) == MEASURES
         for name in ("line_px", "ball_px", "diameter_px", "position_m"):
-            assert found[name] == Spread(101, 50.0, 95.0), name
-        assert found["jac"] == Spread(101, pytest.approx(0.5), pytest.approx(0.05))
-        assert found["ball_m"] == Spread(1, 0.25, 0.25)
+            assert found[name] == MedianAndTail(101, 50.0, 95.0), name
+        assert found["jac"] == MedianAndTail(101, pytest.approx(0.5), pytest.approx(0.05))
+        assert found["ball_m"] == MedianAndTail(1, 0.25, 0.25)
 
     def test_of_nothing_there_is_none(self) -> None:
-        assert set(measure_spreads([]).values()) == {Spread(0)}
+        assert set(measure_spreads([]).values()) == {MedianAndTail(0)}

@@ -13,8 +13,8 @@ from app.evaluation.result import (
     WIDTH,
     Axis,
     Figure,
-    Mark,
     Panel,
+    ReferenceLine,
     Series,
     figure_to_png,
 )
@@ -58,7 +58,7 @@ class TestFigurePng:
         assert 0.4 < share < 0.8
 
     def test_a_mark_stands_where_it_should(self) -> None:
-        picture = drawn(figure(LINE, marks=(Mark("x", 0.5, "half"),)))
+        picture = drawn(figure(LINE, marks=(ReferenceLine("x", 0.5, "half"),)))
         columns = np.flatnonzero(like(picture, PALETTE[4]).any(axis=0))
         curve = np.flatnonzero(like(picture, PALETTE[0]).any(axis=0))
         assert columns.min() == pytest.approx((curve.min() + curve.max()) / 2, abs=12)

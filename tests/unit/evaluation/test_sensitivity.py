@@ -7,10 +7,10 @@ from app.evaluation.sensitivity import (
     choose_frames,
     error_slopes,
     make_centre_shifts,
+    make_sensitivity_figure,
+    make_sensitivity_table,
     make_size_changes,
     measure_frame_sensitivity,
-    sensitivity_figure,
-    sensitivity_table,
 )
 from app.geometry.sphere import position_from_diameter
 from app.soccer.frames import Box, ImagePoint
@@ -109,19 +109,19 @@ class TestTable:
     def test_tells_ends_and_correlation(self, make_frame) -> None:
         frames = [make_frame(number, distance=20.0 + 10 * number) for number in range(1, 5)]
         samples = [measure_frame_sensitivity(frame, DIAMETER) for frame in frames]
-        table = sensitivity_table(samples, able=9)
+        table = make_sensitivity_table(samples, able=9)
         assert table.cell("size", "smallest_m").value == pytest.approx(30 / 9)
         assert table.cell("size", "largest_m").value == pytest.approx(60 / 9)
         assert table.cell("size", "correlation").value == pytest.approx(1)
         assert (table.rows[0].cells[0].count, table.rows[0].cells[0].of) == (4, 9)
 
     def test_without_balls_the_table_is_empty(self) -> None:
-        assert sensitivity_table([], 0).cell("shift", "median_m").value is None
+        assert make_sensitivity_table([], 0).cell("shift", "median_m").value is None
 
 
 class TestFigure:
     def test_shows_curve_and_derivative_of_every_ball(self, make_frame) -> None:
-        figure = sensitivity_figure(
+        figure = make_sensitivity_figure(
             [measure_frame_sensitivity(make_frame(distance=50.0), DIAMETER)]
         )
         assert [len(panel.series) for panel in figure.panels] == [2, 2]

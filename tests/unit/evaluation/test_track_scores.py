@@ -10,13 +10,13 @@ import pytest
 from app.errors import InputError
 from app.evaluation.prediction_run import PredictedTrack
 from app.evaluation.result import Evaluation
-from app.evaluation.track_scores import TrueTrack, evaluate_tracks
+from app.evaluation.track_scores import GroundTruthTrack, evaluate_tracks
 
 COUNT = 50
 FRAMES = 100 + np.arange(COUNT)
 TIMES = FRAMES / 25.0
 PLACES = np.column_stack([0.2 * np.arange(COUNT), np.zeros(COUNT), np.full(COUNT, -1.0)])
-TRUTH = TrueTrack(
+TRUTH = GroundTruthTrack(
     "cup/final 1",
     "cup_final 1",
     FRAMES,

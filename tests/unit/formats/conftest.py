@@ -17,7 +17,14 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
-from app.soccer.solution import Ball3D, BallFit, Calibration, Pair, Solution, ViewSolution
+from app.soccer.solution import (
+    Ball3D,
+    BallFit,
+    Calibration,
+    Solution,
+    TriangulatedPair,
+    ViewSolution,
+)
 from tests.cameras import EVERY_COEFFICIENT
 
 # The same examples every time, and no clock: other work on the machine is not our failure.
@@ -165,7 +172,7 @@ def solved(camera: Camera) -> Callable[..., ExportRecord]:
             fit = _fit() if ball else None
             views.append(ViewSolution(view.key, calibration, "k", valid and ball, failed, fit))
         point = Ball3D((1.5, -2.25, -0.113), (0.0,) * 9, 0.1, 20.0, ("a", "b"))
-        pairs: tuple[Pair, ...] = ()
+        pairs: tuple[TriangulatedPair, ...] = ()
         solution = Solution(tuple(views), pairs, point if ball else None, ())
         return ExportRecord(group, solution, verdict)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.ball_names import is_ball, is_same_name
+from app.formats.ball_names import is_ball_name, is_same_name
 from app.formats.coco_reader import read_coco
 from app.formats.report import ReaderReport
 from tests.unit.formats.foreign_coco import ball, category, coco, image, write
@@ -73,11 +73,11 @@ OTHERS = [
 class TestIsBall:
     @pytest.mark.parametrize("name", [*BALLS, " sports ball ", "Soccer Ball", "sports  balls"])
     def test_the_ball_is_known_in_every_spelling(self, name: str) -> None:
-        assert is_ball(name)
+        assert is_ball_name(name)
 
     @pytest.mark.parametrize("name", [*OTHERS, "", "football player", "ball in hand"])
     def test_other_balls_and_other_things_are_not_it(self, name: str) -> None:
-        assert not is_ball(name)
+        assert not is_ball_name(name)
 
 
 class TestSameName:

@@ -15,8 +15,8 @@ from app.formats.camera_json import (
     covariance_from_json,
     covariance_to_json,
 )
-from app.formats.cameras import camera_file_text
-from app.geometry.arrays import row_by_row
+from app.formats.cameras import format_camera_file
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
 from app.soccer.frames import ImageSize
@@ -63,7 +63,7 @@ class TestCameraToJson:
     @pytest.mark.parametrize("lens", WIDE_LENSES)
     def test_a_wide_lens_is_named_and_never_looks_like_a_pinhole(self, lens: str) -> None:
         camera = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
-        value = json.loads(camera_file_text(camera))
+        value = json.loads(format_camera_file(camera))
         assert value["lens"] == lens
         assert tuple(value["lens_coefficients"]) == WIDE_LENSES[lens]
         # A reader of SoccerNet's own fields finds none of them, rather than zeros.
@@ -75,13 +75,13 @@ class TestCameraToJson:
 
     @given(cameras())
     def test_what_is_written_comes_back_exactly(self, camera: Camera) -> None:
-        again = camera_from_json(json.loads(camera_file_text(camera)), "f")
+        again = camera_from_json(json.loads(format_camera_file(camera)), "f")
         assert again == camera
 
 
 MAIN = looking((3.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2200.0, bend=0.02)
 SPREAD = np.diag([0.002, 0.003, 0.001, 0.4, 0.9, 0.3, 0.01, 0.004])
-SPREAD = row_by_row(SPREAD @ (0.5 * np.eye(8) + 0.5) @ SPREAD)
+SPREAD = flatten_covariance(SPREAD @ (0.5 * np.eye(8) + 0.5) @ SPREAD)
 """Covariance of a camera's parameters in which all go together."""
 HALF_SIZE = ImageSize(SIZE.width // 2, SIZE.height // 2)
 
@@ -105,7 +105,7 @@ class TestCovariance:
         assert np.corrcoef(np.transpose(drawn)) == pytest.approx(shares, abs=0.05)
 
     def test_a_file_brings_it_back(self) -> None:
-        value = json.loads(camera_file_text(MAIN, SPREAD, SIZE))
+        value = json.loads(format_camera_file(MAIN, SPREAD, SIZE))
         assert np.shape(value["covariance"]) == (8, 8)
         assert camera_from_json(value, "f") == MAIN
         assert covariance_from_json(value, MAIN, SIZE) == pytest.approx(SPREAD, rel=1e-9)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError
-from app.formats.camera_matrix import camera_from_matrices, holds_matrices
+from app.formats.camera_matrix import camera_from_matrices, has_camera_matrices
 from app.geometry.camera import Camera
 
 CAMERA = Camera(
@@ -32,7 +32,7 @@ GRASS = np.array([[x, y, 0.0] for x in (-20.0, 0.0, 30.0) for y in (-10.0, 0.0, 
 
 
 def read(value: dict[str, Any]) -> Camera:
-    assert holds_matrices(value)
+    assert has_camera_matrices(value)
     return camera_from_matrices(value, "c.json", None)
 
 

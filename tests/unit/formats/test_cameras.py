@@ -11,11 +11,11 @@ import pytest
 
 from app.errors import InputError, UnsafePathError
 from app.formats.camera_json import camera_to_json
-from app.formats.cameras import camera_file_text, read_cameras, write_camera_files
+from app.formats.cameras import format_camera_file, read_cameras, write_camera_files
 from app.formats.export_record import ExportRecord
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_writer import write_sn_calibration
-from app.geometry.arrays import row_by_row
+from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
@@ -40,15 +40,15 @@ class TestReadCameras:
     def test_equal_stems_in_two_folders_keep_their_folders(
         self, make_zip: Callable[..., Path], camera: Camera, report: ReaderReport
     ) -> None:
-        text = camera_file_text(camera)
+        text = format_camera_file(camera)
         path = make_zip({"a/camera_1.json": text, "b/camera_1.json": text})
         assert list(read_cameras(path, report)) == ["a/1", "b/1"]
 
     def test_a_bad_camera_is_reported_and_the_rest_imported(
         self, make_zip: Callable[..., Path], camera: Camera, report: ReaderReport
     ) -> None:
-        bad = camera_file_text(camera).replace("2100.5", "NaN")
-        path = make_zip({"camera_1.json": bad, "camera_2.json": camera_file_text(camera)})
+        bad = format_camera_file(camera).replace("2100.5", "NaN")
+        path = make_zip({"camera_1.json": bad, "camera_2.json": format_camera_file(camera)})
         assert list(read_cameras(path, report)) == ["2"]
         assert (report.read, report.imported) == (2, 1)
         assert "camera_1.json, x_focal_length: is nan, not a finite number" in str(
@@ -58,15 +58,15 @@ class TestReadCameras:
     def test_how_well_a_camera_is_known_is_read_with_it(
         self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:
-        known = row_by_row(np.eye(8) * 1e-4)
+        known = flatten_covariance(np.eye(8) * 1e-4)
         camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 1500.0)
-        text = camera_file_text(camera, known, SIZE)
+        text = format_camera_file(camera, known, SIZE)
         value = json.loads(text)
         broken = json.dumps({**value, "covariance": [[1.0]]})
         path = make_zip(
             {
                 "camera_1.json": text,
-                "camera_2.json": camera_file_text(camera),
+                "camera_2.json": format_camera_file(camera),
                 "camera_3.json": broken,
             }
         )
@@ -229,7 +229,7 @@ class TestWriteCameraFiles:
         record = solved(soccer_group(replays=1))
         assert record.solution is not None
         first, second = record.solution.views
-        spread = row_by_row(np.eye(8) * 1e-4)
+        spread = flatten_covariance(np.eye(8) * 1e-4)
         known = replace(first, calibration=replace(first.calibration, covariance=spread))
         record = replace(record, solution=replace(record.solution, views=(known, second)))
         (tmp_path / "lines").mkdir()

@@ -16,7 +16,7 @@ from app.formats.coco_reader import read_coco
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.unit.formats.foreign_coco import Item, category, write
 
 BALL = np.array([30.5, 4.2, -1.35])
@@ -127,7 +127,7 @@ def test_the_ball_is_where_it_is_and_the_pictures_are_found(
     (group,) = read_coco(tmp_path, report)
     assert [view.key for view in group.views] == ["north", "south"]
     assert [Path(view.media.path).name[:5] for view in group.views if view.media] == [*CAMERAS]
-    solution = solve(group, PAPER)
+    solution = solve_group(group, PAPER)
     assert solution.ball is not None
     assert np.abs(np.array(solution.ball.point) - BALL).max() < 1e-6
     assert report.problems == []

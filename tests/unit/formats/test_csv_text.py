@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from app.errors import DatasetFormatError
 from app.formats.csv_text import (
     CsvTable,
-    csv_cell,
+    format_csv_cell,
+    format_number_list,
     is_missing,
-    list_text,
     parse_number_list,
     read_rows,
 )
-from app.formats.file_tree import DEFAULT_LIMITS, Limits
+from app.formats.file_tree import DEFAULT_LIMITS, ImportLimits
 
 
 class TestCell:
@@ -35,23 +35,23 @@ class TestCell:
         ],
     )
     def test_numbers_by_repr_and_nothing_for_what_is_missing(self, value: Any, text: str) -> None:
-        assert csv_cell(value) == text
+        assert format_csv_cell(value) == text
 
     @pytest.mark.parametrize(
         "text", ["=1+2", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "=HYPERLINK()"]
     )
     def test_a_formula_is_escaped(self, text: str) -> None:
-        assert csv_cell(text) == f"'{text}"
+        assert format_csv_cell(text) == f"'{text}"
 
     @pytest.mark.parametrize("text", ["-5", "+1.5", "-1e-7", "-.5"])
     def test_the_text_of_a_number_is_untouched(self, text: str) -> None:
-        assert csv_cell(text) == text
+        assert format_csv_cell(text) == text
 
 
 class TestPlainList:
     def test_every_digit_and_no_numpy(self) -> None:
-        assert list_text([np.float64(0.1), 2.0]) == "[0.1, 2.0]"
-        assert list_text([3, 4]) == "[3, 4]"
+        assert format_number_list([np.float64(0.1), 2.0]) == "[0.1, 2.0]"
+        assert format_number_list([3, 4]) == "[3, 4]"
 
 
 class TestTable:
@@ -85,7 +85,7 @@ class TestReadRows:
 
     def test_a_table_beyond_the_limit_is_refused(self) -> None:
         with pytest.raises(DatasetFormatError, match="longer than 3 bytes"):
-            list(read_rows(b"a\n1\n", "f", ("a",), Limits(file_bytes=3)))
+            list(read_rows(b"a\n1\n", "f", ("a",), ImportLimits(file_bytes=3)))
 
     @given(st.text(st.characters(exclude_categories=["Cs"])))
     def test_any_text_comes_back_through_a_table(self, text: str) -> None:

@@ -7,14 +7,14 @@ import pytest
 
 from app.errors import InputError
 from app.formats.frame_names import (
-    ExportNames,
-    expected_frame_suffix,
-    fold_file_name,
-    frame_name_claims,
+    ExportKeyAssigner,
+    folder_name_of_split,
     frame_path_by_match,
     frame_path_in_split,
-    split_folder,
-    view_stem,
+    guess_frame_suffix,
+    map_frame_names_to_owners,
+    normalize_file_name,
+    strip_image_suffix,
 )
 from app.soccer.group import Group, Media, View
 
@@ -56,7 +56,7 @@ class TestFlatFrame:
 class TestSplitFolder:
     def test_uses_the_names_of_yolo_and_trains_without_a_split(self) -> None:
         splits = ("train", "valid", "test", "challenge", "")
-        assert [split_folder(split) for split in splits] == [
+        assert [folder_name_of_split(split) for split in splits] == [
             "train", "val", "test", "test", "train",
         ]  # fmt: skip
 
@@ -64,14 +64,18 @@ class TestSplitFolder:
 class TestLikelySuffix:
     def test_follows_the_frame_and_is_jpeg_for_videos(self, soccer_group: Make) -> None:
         view = soccer_group().views[0]
-        assert expected_frame_suffix(view) == ".jpg"
-        assert expected_frame_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
-        assert expected_frame_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"
+        assert guess_frame_suffix(view) == ".jpg"
+        assert guess_frame_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
+        assert guess_frame_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"
 
 
 class TestViewStem:
     def test_only_the_ending_of_an_image_is_cut(self) -> None:
-        assert [view_stem(key) for key in ("7_1.png", "cam3", "00002")] == ["7_1", "cam3", "00002"]
+        assert [strip_image_suffix(key) for key in ("7_1.png", "cam3", "00002")] == [
+            "7_1",
+            "cam3",
+            "00002",
+        ]
 
 
 @pytest.fixture
@@ -79,7 +83,7 @@ def view(soccer_group: Make) -> View:
     return soccer_group().views[0]
 
 
-def called(names: ExportNames, *groups: Group) -> list[str]:
+def called(names: ExportKeyAssigner, *groups: Group) -> list[str]:
     return [names.of(group, {}).get(view.key, view.key) for group in groups for view in group.views]
 
 
@@ -93,28 +97,28 @@ class TestExportNames:
     ) -> None:
         groups = groups_of(view, ("a", "north"), ("b", "north"), ("c", "south"))
         for order in (groups, groups[::-1]):
-            names = ExportNames(frame_name_claims, [(group, {}) for group in order])
+            names = ExportKeyAssigner(map_frame_names_to_owners, [(group, {}) for group in order])
             assert sorted(called(names, *order)) == ["a/north", "b/north", "south"]
 
     def test_a_name_of_a_group_is_no_other_frames_own(self, view: View) -> None:
         groups = groups_of(view, ("a", "7.png"), ("b", "7.png"), ("c", "a/7.png"))
-        names = ExportNames(frame_name_claims, [(group, {}) for group in groups])
+        names = ExportKeyAssigner(map_frame_names_to_owners, [(group, {}) for group in groups])
         first, second, third = called(names, *groups)
         assert (second, third) == ("b/7.png", "a/7.png")
         assert first.startswith("7_") and first.endswith(".png")
 
     def test_a_frame_that_was_not_announced_takes_nobodys_name(self, view: View) -> None:
-        names = ExportNames(frame_name_claims)
+        names = ExportKeyAssigner(map_frame_names_to_owners)
         assert called(names, *groups_of(view, ("a", "N"), ("b", "n"))) == ["N", "b/n"]
 
     def test_one_picture_that_two_groups_show_keeps_one_name(self, view: View) -> None:
         shown = replace(view, media=Media("/frames/7.png"))
         groups = groups_of(shown, ("a", "7.png"), ("b", "7.png"))
-        names = ExportNames(frame_name_claims, [(group, {}) for group in groups])
+        names = ExportKeyAssigner(map_frame_names_to_owners, [(group, {}) for group in groups])
         assert called(names, *groups) == ["7.png", "7.png"]
 
     def test_a_view_without_a_free_name_is_refused_by_its_names(self, view: View) -> None:
-        names = ExportNames(lambda group, view, split: {"always": (group.key, view.key)})
+        names = ExportKeyAssigner(lambda group, view, split: {"always": (group.key, view.key)})
         first, second = groups_of(view, ("a", "north"), ("b", "north"))
         assert names.of(first, {}) == {}
         with pytest.raises(
@@ -125,5 +129,5 @@ class TestExportNames:
 
 class TestFolded:
     def test_case_and_composition_make_no_other_name(self) -> None:
-        assert fold_file_name("Caf\u00c9") == fold_file_name("cafe\u0301")
-        assert fold_file_name("cafe") != fold_file_name("caf\u00e9")
+        assert normalize_file_name("Caf\u00c9") == normalize_file_name("cafe\u0301")
+        assert normalize_file_name("cafe") != normalize_file_name("caf\u00e9")

@@ -8,7 +8,7 @@ from PIL import Image
 
 from app.config import Settings
 from app.errors import InputError
-from app.formats.frames_reader import check_grouping, read_frames
+from app.formats.frames_reader import parse_grouping_pattern, read_frames
 from app.formats.report import ReaderReport
 from app.media.images import check_size, read_header
 from app.soccer.frames import ImageSize
@@ -133,10 +133,10 @@ class TestGrouping:
     )
     def test_what_is_no_pattern_is_refused(self, grouping: str) -> None:
         with pytest.raises(InputError, match=r"contains \{instant\} and \{camera\}"):
-            check_grouping(grouping)
+            parse_grouping_pattern(grouping)
 
     def test_letters_of_patterns_mean_themselves(self) -> None:
-        pattern = check_grouping("cam({camera}) {instant}.png")
+        pattern = parse_grouping_pattern("cam({camera}) {instant}.png")
         assert pattern is not None
         found = pattern.fullmatch("cam(a.b) 00:17.png")
         assert found is not None

@@ -10,11 +10,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from app.formats.export_record import ExportRecord
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.parquet import read_parquet, write_parquet
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
-from app.soccer.group import Group, LeftOut
+from app.soccer.group import Group, ViewExclusion
 from app.soccer.picture import PictureGeometry
 
 Solved = Callable[..., ExportRecord]
@@ -28,7 +28,7 @@ class TestReadParquet:
         report: ReaderReport, camera: Camera,
     ) -> None:  # fmt: skip
         groups = [soccer_group(), soccer_group("8.png", split="test", label="x")]
-        why = LeftOut("other", "another match")
+        why = ViewExclusion("other", "another match")
         known = replace(groups[0].views[0].station, given=camera, given_covariance=COVARIANCE)
         known = replace(known, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
         known = replace(known, proposed=(min(known.lines),))
@@ -82,5 +82,5 @@ class TestReadParquet:
     ) -> None:  # fmt: skip
         write_parquet(tmp_path, [solved(soccer_group())])
         packed = make_zip({"views.parquet": (tmp_path / "views.parquet").read_bytes()})
-        assert list(read_parquet(packed, report, limits=Limits(file_bytes=100))) == []
+        assert list(read_parquet(packed, report, limits=ImportLimits(file_bytes=100))) == []
         assert "longer than 100 bytes" in report.problems[0].problem

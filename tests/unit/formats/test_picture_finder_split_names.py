@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.formats.picture_finder import split_of_word, split_within_word
+from app.formats.picture_finder import find_split_in_word, parse_split_name
 
 
 class TestSplitOf:
@@ -16,7 +16,7 @@ class TestSplitOf:
         ],
     )  # fmt: skip
     def test_names_of_folders(self, name: str, split: str) -> None:
-        assert split_of_word(name) == split
+        assert parse_split_name(name) == split
 
 
 class TestSplitIn:
@@ -28,4 +28,4 @@ class TestSplitIn:
         ],
     )  # fmt: skip
     def test_a_word_of_a_name_says_it(self, name: str, split: str) -> None:
-        assert split_within_word(name) == split
+        assert find_split_in_word(name) == split

@@ -10,8 +10,8 @@ import pytest
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import (
     MatchInfoWriter,
-    match_info_of_view,
-    match_of_record,
+    build_match_key_of_record,
+    find_match_info_of_view,
     read_match_info,
 )
 from app.formats.trees import open_tree
@@ -35,7 +35,7 @@ class TestReadMatchInfo:
         (tmp_path / "valid/match_info_cam_gt.json").write_text(json.dumps(camera))
         found = read(tmp_path, report)
         assert found["valid/00001"] == {"match": "m", "camera": "Main camera center"}
-        assert match_of_record(found["valid/00002"]) == "league/season/match"
+        assert build_match_key_of_record(found["valid/00002"]) == "league/season/match"
         assert [item.record for item in report.problems] == ["00003.jpg"]
 
     def test_a_file_that_is_no_object_is_reported(
@@ -61,7 +61,7 @@ class TestMatchOf:
     def test_the_match_is_found_in_every_spelling_of_it(
         self, record: dict[str, Any], match: str
     ) -> None:
-        assert match_of_record(record) == match
+        assert build_match_key_of_record(record) == match
 
 
 class TestMatchInfoWriter:
@@ -71,9 +71,9 @@ class TestMatchInfoWriter:
         group = soccer_group(match="l/s/m")
         with MatchInfoWriter(tmp_path) as info:
             for view in group.views:
-                info.add(f"l/s/m/{view.key}", match_info_of_view(group, view))
+                info.add(f"l/s/m/{view.key}", find_match_info_of_view(group, view))
         found = read(tmp_path, report)
-        assert {match_of_record(record) for record in found.values()} == {"l/s/m"}
+        assert {build_match_key_of_record(record) for record in found.values()} == {"l/s/m"}
         assert set(found) == {"l/s/m/7", "l/s/m/7_1"}
 
     def test_without_images_it_is_an_empty_object(self, tmp_path: Path) -> None:

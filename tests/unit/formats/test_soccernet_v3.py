@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.formats.file_tree import DEFAULT_LIMITS, Limits
+from app.formats.file_tree import DEFAULT_LIMITS, ImportLimits
 from app.formats.report import ReaderReport
-from app.formats.soccernet_v3 import MatchFrames, group_label, parse_image_numbers
+from app.formats.soccernet_v3 import MatchFrameFinder, group_label, parse_image_numbers
 from app.formats.trees import open_tree
 from app.soccer.group import Media
 
@@ -40,10 +40,10 @@ class TestImageNumbers:
         assert parse_image_numbers("cam3") is None
 
 
-def _frames(folder: Path, report: ReaderReport) -> MatchFrames:
+def _frames(folder: Path, report: ReaderReport) -> MatchFrameFinder:
     tree = open_tree(folder, report)
     assert tree is not None
-    return MatchFrames(tree, "", tree.names(), report)
+    return MatchFrameFinder(tree, "", tree.names(), report)
 
 
 class TestMatchFrames:
@@ -91,7 +91,7 @@ class TestMatchFrames:
         path = make_zip({"m/frames/7.png": b"x"})
         tree = open_tree(path, report)
         assert tree is not None
-        frames = MatchFrames(tree, "m/", ["frames/7.png"], report)
+        frames = MatchFrameFinder(tree, "m/", ["frames/7.png"], report)
         assert frames.find_frame("7.png") == Media(str(path), "m/frames/7.png")
 
 
@@ -120,9 +120,9 @@ class TestFramesOfAZippedTree:
     @pytest.mark.parametrize(
         ("limits", "said"),
         [
-            (Limits(members=3), "members"),
-            (Limits(total_bytes=2_000_000), "unpacks to"),
-            (Limits(ratio=1), "grows more"),
+            (ImportLimits(members=3), "members"),
+            (ImportLimits(total_bytes=2_000_000), "unpacks to"),
+            (ImportLimits(ratio=1), "grows more"),
         ],
     )
     def test_what_is_inside_counts_toward_the_limits_of_the_whole(
@@ -130,7 +130,7 @@ class TestFramesOfAZippedTree:
         tmp_path: Path,
         make_zip: Callable[..., Path],
         report: ReaderReport,
-        limits: Limits,
+        limits: ImportLimits,
         said: str,
     ) -> None:
         inside = {f"{n}.png": bytes(1_500_000) for n in range(3)}
@@ -166,8 +166,10 @@ def _nested(
     return path
 
 
-def _zipped(path: Path, report: ReaderReport, limits: Limits = DEFAULT_LIMITS) -> MatchFrames:
+def _zipped(
+    path: Path, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
+) -> MatchFrameFinder:
     tree = open_tree(path, report, limits)
     assert tree is not None
     inside = [name.removeprefix("m/") for name in tree.names()]
-    return MatchFrames(tree, "m/", inside, report)
+    return MatchFrameFinder(tree, "m/", inside, report)

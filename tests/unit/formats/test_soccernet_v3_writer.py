@@ -19,7 +19,7 @@ from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3_writer import (
     COLUMNS,
     labels_to_json,
-    split_key,
+    parse_league_season_match,
     write_soccernet_v3,
     write_soccernet_v3d,
 )
@@ -267,4 +267,4 @@ class TestWriteSoccernetV3:
 
 class TestSplitKey:
     def test_league_season_and_match(self, soccer_group: Callable[..., Group], match: str) -> None:
-        assert "/".join(split_key(soccer_group())) == match
+        assert "/".join(parse_league_season_match(soccer_group())) == match

@@ -10,7 +10,7 @@ import pytest
 
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import ReaderReport
-from app.formats.soccernet_v3d_reader import SnTable, read_snv3d_table
+from app.formats.soccernet_v3d_reader import SoccerNetV3DTable, read_snv3d_table
 from app.formats.trees import open_tree
 from app.soccer.frames import Box, ImageSize
 
@@ -19,7 +19,7 @@ HEAD = (
     ",league,season,match,main_action,action,replay,img_w,img_h,is_ball,ball_bbox,calibration,"
     "JaC@0.005,JaC@0.01,JaC@0.02,ball_3D,rep_error,optimized_error,optimized_d,set\n"
 )
-Read = Callable[..., SnTable]
+Read = Callable[..., SoccerNetV3DTable]
 
 
 def row(number: int = 0, **cells: Any) -> str:
@@ -35,7 +35,7 @@ def row(number: int = 0, **cells: Any) -> str:
 
 @pytest.fixture
 def read(tmp_path: Path, report: ReaderReport) -> Read:
-    def run(text: str, **files: str) -> SnTable:
+    def run(text: str, **files: str) -> SoccerNetV3DTable:
         (tmp_path / "SNv3D.csv").write_text(text, encoding="utf-8")
         for name, content in files.items():
             (tmp_path / f"SNv3D-{name}.txt").write_text(content)

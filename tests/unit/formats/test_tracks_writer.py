@@ -12,7 +12,7 @@ import pytest
 
 from app.errors import InputError
 from app.formats.camera_matrix import read_camera_arrays
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.tracks_writer import (
     TrackRecord,
     position_sigma,
@@ -137,7 +137,7 @@ class TestWriteTrackArrays:
         part = {name: found[f"cam1/{name}"] for name in ("K", "R", "t", "k")}
         np.savez(tmp_path / "cam1.npz", **part)
         content = (tmp_path / "cam1.npz").read_bytes()
-        ((name, values),) = read_camera_arrays(content, "cam1", "cam1.npz", Limits())
+        ((name, values),) = read_camera_arrays(content, "cam1", "cam1.npz", ImportLimits())
         assert name is None
         assert np.allclose(values["K"], TRUTH["cam1"].K)
 

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 
 from app.config import Settings
 from app.errors import DatasetFormatError, ImageError
-from app.formats.file_tree import Limits, list_files_in_folder
+from app.formats.file_tree import ImportLimits, list_files_in_folder
 from app.formats.guess_format import guess_format
 from app.formats.report import ReaderReport
 from app.formats.safe_path import is_hidden, read_regular_file
-from app.formats.soccernet_v3 import MatchFrames
+from app.formats.soccernet_v3 import MatchFrameFinder
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.formats.trees import FolderTree, ZipTree, open_tree, open_tree_while_read
+from app.formats.trees import FolderTree, ZipTree, open_tree, open_tree_context
 from app.media.object_frames import ArchiveMembers
 
 MakeZip = Callable[..., Path]
@@ -27,7 +27,7 @@ MakeZip = Callable[..., Path]
 
 class TestLimits:
     def test_they_come_from_the_settings(self) -> None:
-        limits = Limits.of(Settings(max_members=3, max_file_bytes=5))
+        limits = ImportLimits.of(Settings(max_members=3, max_file_bytes=5))
         assert (limits.members, limits.file_bytes) == (3, 5)
 
 
@@ -69,11 +69,11 @@ class TestOpenedTree:
         path = tmp_path / "a.zip"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("a.json", "{}")
-        with open_tree_while_read(path, ReaderReport()) as tree:
+        with open_tree_context(path, ReaderReport()) as tree:
             assert tree is not None and tree.read_bytes("a.json") == b"{}"
         with pytest.raises(ValueError, match="closed"):
             tree.open("a.json")
-        with open_tree_while_read(tmp_path / "none", ReaderReport()) as tree:
+        with open_tree_context(tmp_path / "none", ReaderReport()) as tree:
             assert tree is None
 
 
@@ -112,7 +112,7 @@ class TestFolderTree:
 
     def test_a_file_beyond_the_limit_is_refused(self, tmp_path: Path, report: ReaderReport) -> None:
         (tmp_path / "a").write_bytes(b"x" * 11)
-        tree = open_tree(tmp_path, report, Limits(file_bytes=10))
+        tree = open_tree(tmp_path, report, ImportLimits(file_bytes=10))
         assert tree is not None
         with pytest.raises(DatasetFormatError, match="longer than 10 bytes"):
             tree.read_bytes("a")
@@ -136,7 +136,7 @@ class TestReadPlain:
 
 class TestZipTree:
     def test_members_are_read_in_place(self, make_zip: MakeZip, report: ReaderReport) -> None:
-        tree = ZipTree(make_zip({"b/2": "two", "a": "one", "b/": ""}), report, Limits())
+        tree = ZipTree(make_zip({"b/2": "two", "a": "one", "b/": ""}), report, ImportLimits())
         assert tree.names() == ["a", "b/2"]
         assert tree.read_bytes("b/2") == b"two"
         assert report.problems == []
@@ -145,7 +145,7 @@ class TestZipTree:
     def test_an_unsafe_member_is_left_out_and_the_rest_is_read(
         self, make_zip: MakeZip, report: ReaderReport, name: str
     ) -> None:
-        tree = ZipTree(make_zip({name: "evil", "good": "1"}), report, Limits())
+        tree = ZipTree(make_zip({name: "evil", "good": "1"}), report, ImportLimits())
         assert tree.names() == ["good"]
         assert len(report.problems) == 1
 
@@ -169,7 +169,7 @@ class TestZipTree:
             at = content.index(signature) + flags
             content[at : at + 2] = marked.to_bytes(2, "little")
         path.write_bytes(content)
-        tree = ZipTree(path, report, Limits())
+        tree = ZipTree(path, report, ImportLimits())
         assert (tree.names(), tree.read_bytes(name)) == ([name], b"one")
         media = tree.media(name)
         assert media.member is not None
@@ -179,7 +179,7 @@ class TestZipTree:
     def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: ReaderReport) -> None:
         path = make_zip({"aXb.json": "evil", "good": "1"})
         path.write_bytes(path.read_bytes().replace(b"aXb.json", b"a\x00b.json"))
-        assert ZipTree(path, report, Limits()).names() == ["good"]
+        assert ZipTree(path, report, ImportLimits()).names() == ["good"]
 
     def test_a_link_is_left_out(self, tmp_path: Path, report: ReaderReport) -> None:
         path = tmp_path / "a.zip"
@@ -187,7 +187,7 @@ class TestZipTree:
             entry = zipfile.ZipInfo("link")
             entry.external_attr = (stat.S_IFLNK | 0o777) << 16
             archive.writestr(entry, "/etc/passwd")
-        assert ZipTree(path, report, Limits()).names() == []
+        assert ZipTree(path, report, ImportLimits()).names() == []
         assert "link or device" in str(report.problems[0])
 
     @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -198,26 +198,26 @@ class TestZipTree:
         with zipfile.ZipFile(path, "w") as archive:
             for name in ("a.json", "a.json", "B.json", "b.json", "c.json"):
                 archive.writestr(name, name)
-        assert ZipTree(path, report, Limits()).names() == ["c.json"]
+        assert ZipTree(path, report, ImportLimits()).names() == ["c.json"]
         assert len(report.problems) == 4
 
     def test_too_many_members_are_refused(self, make_zip: MakeZip, report: ReaderReport) -> None:
         with pytest.raises(DatasetFormatError, match="has 3 members"):
-            ZipTree(make_zip({"a": "", "b": "", "c": ""}), report, Limits(members=2))
+            ZipTree(make_zip({"a": "", "b": "", "c": ""}), report, ImportLimits(members=2))
 
     def test_too_large_a_total_is_refused(self, make_zip: MakeZip, report: ReaderReport) -> None:
         with pytest.raises(DatasetFormatError, match="unpacks to 12 bytes"):
-            ZipTree(make_zip({"a": "123456", "b": "123456"}), report, Limits(total_bytes=11))
+            ZipTree(make_zip({"a": "123456", "b": "123456"}), report, ImportLimits(total_bytes=11))
 
     def test_a_bomb_is_left_out(self, make_zip: MakeZip, report: ReaderReport) -> None:
         path = make_zip({"bomb": b"0" * 8_000_000, "good": "1"})
-        assert ZipTree(path, report, Limits()).names() == ["good"]
+        assert ZipTree(path, report, ImportLimits()).names() == ["good"]
         assert "grows more than 200 times" in str(report.problems[0])
 
     def test_a_member_beyond_the_limit_is_refused(
         self, make_zip: MakeZip, report: ReaderReport
     ) -> None:
-        tree = ZipTree(make_zip({"a": os.urandom(100)}), report, Limits(file_bytes=99))
+        tree = ZipTree(make_zip({"a": os.urandom(100)}), report, ImportLimits(file_bytes=99))
         with pytest.raises(DatasetFormatError, match="longer than 99 bytes"):
             tree.read_bytes("a")
 
@@ -227,7 +227,7 @@ class TestZipTree:
         content[200:210] = bytes(10)
         path.write_bytes(content)
         with pytest.raises(DatasetFormatError, match=r"archive.zip/a: is damaged"):
-            ZipTree(path, report, Limits()).read_bytes("a")
+            ZipTree(path, report, ImportLimits()).read_bytes("a")
 
     def test_a_member_that_lies_about_its_size_is_refused(
         self, make_zip: MakeZip, report: ReaderReport
@@ -236,7 +236,7 @@ class TestZipTree:
         size = (100_000).to_bytes(4, "little")
         path.write_bytes(path.read_bytes().replace(size, (10).to_bytes(4, "little")))
         with pytest.raises(DatasetFormatError, match="damaged"):
-            ZipTree(path, report, Limits()).read_bytes("a")
+            ZipTree(path, report, ImportLimits()).read_bytes("a")
 
     @given(data=st.data())
     def test_of_a_damaged_zip_every_member_is_whole_or_named_in_a_problem(
@@ -300,19 +300,27 @@ class TestNamesThatAreNoText:
         self, marked: Path, make_zip: MakeZip, report: ReaderReport
     ) -> None:
         path = make_zip({"inner.zip": marked.read_bytes()}, marked.with_name("outer.zip"))
-        outer = ZipTree(path, report, Limits())
+        outer = ZipTree(path, report, ImportLimits())
         with closing(outer), closing(outer.open_nested_zip("inner.zip", report)) as inner:
             assert inner.read_bytes("d.json") == b"three"
 
     @pytest.mark.parametrize(
         ("limits", "said"),
         [
-            (Limits(members=5), "has 2 members, and the limit is 1: split it"),
-            (Limits(total_bytes=3_000), "unpacks to 2,000 bytes, and the limit is 1,000: split it"),
+            (ImportLimits(members=5), "has 2 members, and the limit is 1: split it"),
+            (
+                ImportLimits(total_bytes=3_000),
+                "unpacks to 2,000 bytes, and the limit is 1,000: split it",
+            ),
         ],
     )
     def test_what_nested_zips_hold_counts_toward_the_limits_of_the_one_around_them(
-        self, tmp_path: Path, make_zip: MakeZip, report: ReaderReport, limits: Limits, said: str
+        self,
+        tmp_path: Path,
+        make_zip: MakeZip,
+        report: ReaderReport,
+        limits: ImportLimits,
+        said: str,
     ) -> None:
         inner = make_zip({"a": "x" * 1_000, "b": "y" * 1_000}, tmp_path / "inner.zip").read_bytes()
         path = make_zip({"one.zip": inner, "two.zip": inner}, tmp_path / "outer.zip")
@@ -355,6 +363,8 @@ class TestPipesAndDevices:
         self, tmp_path: Path, report: ReaderReport
     ) -> None:
         os.mkfifo(tmp_path / "Frames-v3.zip")
-        frames = MatchFrames(FolderTree(tmp_path, report, Limits()), "", ["Frames-v3.zip"], report)
+        frames = MatchFrameFinder(
+            FolderTree(tmp_path, report, ImportLimits()), "", ["Frames-v3.zip"], report
+        )
         assert not frames.has_frames
         assert "Frames-v3.zip" in report.problems[0].path

@@ -10,7 +10,7 @@ import pytest
 
 from app.errors import UnsafePathError
 from app.formats.output import write_zip
-from app.formats.view_files import HELD, FilesToPack, ViewFiles, open_spill, write_to_disk
+from app.formats.view_files import HELD, FilesToPack, ViewFileBuffer, make_disk_writer, open_spill
 
 
 class TestSpill:
@@ -39,7 +39,7 @@ class TestViewFiles:
     def test_come_back_among_the_files_of_the_disk_in_the_order_of_their_paths(self, tmp_path):
         (tmp_path / "b").mkdir()
         (tmp_path / "b" / "2.csv").write_text("on disk")
-        with ViewFiles(tmp_path) as files:
+        with ViewFileBuffer(tmp_path) as files:
             files.put("b/3.json", "ü")
             files.put("b/1.json", "{}")
             files.put("a.json", "")
@@ -51,7 +51,7 @@ class TestViewFiles:
         ]
 
     def test_what_is_put_again_is_the_newer_file(self, tmp_path):
-        with ViewFiles(tmp_path) as files:
+        with ViewFileBuffer(tmp_path) as files:
             files.put("a", "first")
             files.put("./a", "then")
         assert list(FilesToPack(tmp_path)) == [("a", b"then")]
@@ -60,8 +60,8 @@ class TestViewFiles:
         texts = {f"{match}/camera_{view}.json": f"{match} {view}" * view for match in "ba" for view in range(40)}  # fmt: skip
         (tmp_path / "disk").mkdir()
         (tmp_path / "held").mkdir()
-        with ViewFiles(tmp_path / "held") as files:
-            for put in (write_to_disk(tmp_path / "disk"), files.put):
+        with ViewFileBuffer(tmp_path / "held") as files:
+            for put in (make_disk_writer(tmp_path / "disk"), files.put):
                 for path, text in texts.items():
                     put(path, text)
         made = []
@@ -73,7 +73,7 @@ class TestViewFiles:
         assert HELD not in zipfile.ZipFile(made[1]).namelist()
 
     def test_a_disk_that_is_full_is_told_as_it_is_of_a_file(self, tmp_path):
-        files = ViewFiles(tmp_path)
+        files = ViewFileBuffer(tmp_path)
         # What SQLite is told of a disk without room.
         files._connection.execute("PRAGMA max_page_count = 3")
         with pytest.raises(OSError, match="full"), files:
@@ -82,7 +82,7 @@ class TestViewFiles:
 
     @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
     def test_no_path_leaves_the_folder(self, tmp_path, path):
-        with ViewFiles(tmp_path) as files:
-            for put in (files.put, write_to_disk(tmp_path)):
+        with ViewFileBuffer(tmp_path) as files:
+            for put in (files.put, make_disk_writer(tmp_path)):
                 with pytest.raises(UnsafePathError):
                     put(path, "x")

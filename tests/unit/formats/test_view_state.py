@@ -11,18 +11,18 @@ from app.errors import DatasetFormatError
 from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_writer import labels_to_json
 from app.formats.view_state import (
+    GroupAssembler,
     GroupHead,
     PlacedView,
     StateReader,
-    ViewGroups,
     extras_from_json,
-    head_to_json,
+    group_head_to_json,
     view_to_json,
 )
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, LeftOut, Station, View
+from app.soccer.group import Group, Station, View, ViewExclusion
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 
@@ -53,10 +53,10 @@ class TestStateReader:
             proposed=(min(group.views[0].station.lines),),
             not_visible=("Circle left", "Goal left crossbar"),
         )
-        why = LeftOut("duplicate_view", "as camera 2")
+        why = ViewExclusion("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
         assert read(view_to_json(view)).view(view.size, Extras()) == view
-        head = read(head_to_json(group)).head()
+        head = read(group_head_to_json(group)).head()
         assert head.group(group.views) == group
         assert head.views == 2
 
@@ -95,7 +95,7 @@ class TestStateReader:
     @pytest.mark.parametrize("pitch", [[1, 2], "x", [105]])
     def test_an_impossible_pitch_is_refused(self, soccer_group: Make, pitch: Any) -> None:
         with pytest.raises(DatasetFormatError, match="pitch"):
-            read({**head_to_json(soccer_group()), "pitch": pitch}).head()
+            read({**group_head_to_json(soccer_group()), "pitch": pitch}).head()
 
 
 class TestExtras:
@@ -132,27 +132,27 @@ class TestViewGroups:
     def test_a_group_comes_when_its_last_view_does_in_the_order_of_positions(
         self, report: ReaderReport
     ) -> None:
-        groups = ViewGroups(report)
+        groups = GroupAssembler(report)
         assert list(groups.add(placed("b", position=1), "a.json")) == []
         assert list(groups.add(placed("x", "other"), "a.json")) == []
         (group,) = groups.add(placed("a"), "a.json")
         assert [view.key for view in group.views] == ["a", "b"]
-        (rest,) = groups.incomplete_groups()
+        (rest,) = groups.release_incomplete_groups()
         assert (rest.key, report.imported) == ("other", 3)
-        assert list(groups.incomplete_groups()) == []
+        assert list(groups.release_incomplete_groups()) == []
         assert report.remarks == [
             "1 group has fewer views than when it was written: other (1 of 2)"
         ]
 
     def test_static_cameras_of_one_key_are_one_station(self, report: ReaderReport) -> None:
-        groups = ViewGroups(report)
+        groups = GroupAssembler(report)
         first, second = (
             group for name in "ab" for group in groups.add(placed("v", name, views=1), "a.json")
         )
         assert first.views[0].station is second.views[0].station
 
     def test_a_view_that_comes_twice_counts_once(self, report: ReaderReport) -> None:
-        groups = ViewGroups(report)
+        groups = GroupAssembler(report)
         assert list(groups.add(placed("a"), "a.json")) == []
         assert list(groups.add(placed("a"), "a.json")) == []
         (problem,) = report.problems
@@ -161,14 +161,14 @@ class TestViewGroups:
     def test_a_group_that_comes_again_in_another_file_is_not_handed_on_twice(
         self, report: ReaderReport
     ) -> None:
-        groups = ViewGroups(report)
+        groups = GroupAssembler(report)
         found = [
             group
             for path in ("a.json", "b.json")
             for key in ("a", "b")
             for group in groups.add(placed(key), path)
         ]
-        assert (len(found), report.imported, list(groups.incomplete_groups())) == (1, 2, [])
+        assert (len(found), report.imported, list(groups.release_incomplete_groups())) == (1, 2, [])
         assert [(problem.path, problem.field) for problem in report.problems] == [
             ("b.json", "a"),
             ("b.json", "b"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.formats import viper_reader
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
@@ -46,7 +46,7 @@ def _read(
     (tmp_path / name).write_bytes(content)
     tree = open_tree(tmp_path, report)
     assert tree is not None
-    (track,) = read_viper(tree, name, report, Limits(file_bytes=1_000_000))
+    (track,) = read_viper(tree, name, report, ImportLimits(file_bytes=1_000_000))
     return track
 
 
@@ -64,7 +64,7 @@ class TestReadViper:
     ) -> None:
         points = ball('<data:point framespan="9:9" x="100" y="50"/>')
         text = HEAD + points + ENDLESS[what](900_000) + points + TAIL
-        assert _read(tmp_path, text, report).ball_points == 1
+        assert _read(tmp_path, text, report).ball_point_count == 1
         assert report.problems == []
         text = HEAD + points + ENDLESS[what](20_000_000) + points + TAIL
         content = gzip.compress(text.encode())
@@ -72,7 +72,7 @@ class TestReadViper:
         tree = open_tree(tmp_path, report)
         assert tree is not None
         (track,) = read_viper(tree, "2.xgtf.gz", report)
-        assert track.ball_points == 1
+        assert track.ball_point_count == 1
         (problem,) = report.problems
         assert problem.problem == "holds more than 1,000,000 bytes without an element"
 
@@ -100,7 +100,7 @@ class TestReadViper:
         blank = 'x="1" y=" " width="" height=" "'
         text = HEAD + person(7, blank) + person(8, BOX) + TAIL
         track = _read(tmp_path, text, report)
-        assert track.person_boxes == 1
+        assert track.person_box_count == 1
         (problem,) = report.problems
         assert str(problem).endswith("1.xgtf, Person 7, framespan 9:9: y is blank")
 
@@ -109,7 +109,7 @@ class TestReadViper:
         self, tmp_path: Path, report: ReaderReport, span: str
     ) -> None:
         text = HEAD + person(7, BOX, span) + person(8, BOX) + TAIL
-        assert _read(tmp_path, text, report).person_boxes == 1
+        assert _read(tmp_path, text, report).person_box_count == 1
         assert report.problems[0].field == f"framespan {span}"
 
     def test_a_framespan_beyond_the_limit_is_named_with_file_object_and_limit(
@@ -158,7 +158,7 @@ class TestReadViper:
         self, tmp_path: Path, report: ReaderReport
     ) -> None:
         text = HEAD + person(7, BOX) + person(8, BOX)[:40]
-        assert _read(tmp_path, text, report).person_boxes == 1
+        assert _read(tmp_path, text, report).person_box_count == 1
         assert "0 ball points and 1 persons before it are kept" in str(report.problems[0])
 
     def test_a_packed_file_that_ends_early_keeps_what_was_read(
@@ -167,7 +167,7 @@ class TestReadViper:
         text = HEAD + "".join(person(number, BOX) for number in range(3000)) + TAIL
         content = gzip.compress(text.encode())
         track = _read(tmp_path, content[: len(content) // 2], report, "1.xgtf.gz")
-        assert 0 < track.person_boxes < 3000
+        assert 0 < track.person_box_count < 3000
         assert "damaged or cut off" in str(report.problems[0])
 
     @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ class TestReadViper:
     )
     def test_a_dtd_is_refused(self, tmp_path: Path, report: ReaderReport, doctype: str) -> None:
         text = HEAD.replace("<viper", doctype + "<viper", 1) + person(7, BOX) + TAIL
-        assert _read(tmp_path, text, report).person_boxes == 0
+        assert _read(tmp_path, text, report).person_box_count == 0
         assert "DTD or an entity" in str(report.problems[0])
 
     def test_a_packed_bomb_is_refused(self, tmp_path: Path, report: ReaderReport) -> None:
@@ -193,7 +193,7 @@ class TestReadViper:
     ) -> None:
         monkeypatch.setattr("app.formats.viper_reader.MAX_ENTRIES", 1000)
         text = HEAD + "".join(person(number, BOX, "1:400") for number in range(5)) + TAIL
-        assert _read(tmp_path, text, report).person_boxes == 800
+        assert _read(tmp_path, text, report).person_box_count == 800
         assert "holds more than 1,000 entries" in str(report.problems[0])
 
     @pytest.mark.parametrize("encoding", ["shift_jis", "no-such-code"])
@@ -281,7 +281,7 @@ class TestShapes:
         self, tmp_path: Path, report: ReaderReport, name: str
     ) -> None:
         text = ball_as('<data:point framespan="9:9" x="1" y="2"/>', name)
-        assert _read(tmp_path, text, report).ball_points == 1
+        assert _read(tmp_path, text, report).ball_point_count == 1
 
     @pytest.mark.parametrize(
         ("name", "entry", "what"),
@@ -299,7 +299,7 @@ class TestShapes:
         self, tmp_path: Path, report: ReaderReport, name: str, entry: str, what: str
     ) -> None:
         track = _read(tmp_path, ball_as(entry * 3, name), report)
-        assert (track.ball_points, track.person_boxes) == (0, 0)
+        assert (track.ball_point_count, track.person_box_count) == (0, 0)
         (problem,) = report.problems
         assert (problem.record, problem.field) == (f"object {name}", f"LOCATION, {what}")
         assert problem.problem.startswith("3 entries are left out: balls are read as point, bbox")
@@ -388,7 +388,7 @@ class TestSources:
         tree = open_tree(tmp_path, report)
         assert tree is not None
         tracks = read_viper(tree, "1.xgtf", report)
-        assert [(track.source, track.ball_points) for track in tracks] == [
+        assert [(track.source, track.ball_point_count) for track in tracks] == [
             ("cam.mpg", 1),
             ("b.avi", 1),
         ]

@@ -3,11 +3,11 @@ import pytest
 
 from app.geometry.bundle import (
     Rays,
-    best_points,
     bundle_equations,
     linearize,
-    nearest_points,
-    ray_gaps,
+    optimize_points,
+    ray_pair_distances_px,
+    triangulate_nearest_points,
 )
 from app.geometry.camera import Camera
 from app.geometry.resection import X, Z, camera_from_parameters, parameters_from_camera
@@ -53,7 +53,7 @@ class TestRays:
             rays.sigma[~hidden],
             rays.half_diagonals,
         )
-        pair, rows = less.of_cameras(0, 1)
+        pair, rows = less.select_common_points(0, 1)
         assert rows.tolist() == [row for row in range(len(POINTS)) if row != 4]
         assert sorted(pair.camera.tolist()) == [0] * 11 + [1] * 11
 
@@ -96,11 +96,11 @@ class TestLinearize:
 
 class TestBestPoints:
     def test_rays_that_meet_give_their_point(self):
-        assert np.allclose(nearest_points(TRUTH, rays_of()), POINTS, atol=1e-6)
+        assert np.allclose(triangulate_nearest_points(TRUTH, rays_of()), POINTS, atol=1e-6)
 
     def test_no_point_nearby_costs_less(self):
         rays = rays_of(2.0)
-        points = best_points(TRUTH, rays, np.inf)
+        points = optimize_points(TRUTH, rays, np.inf)
         least = (linearize(TRUTH, points, rays).residuals ** 2).sum()
         for step in 0.01 * np.vstack([np.eye(3), -np.eye(3)]):
             assert (linearize(TRUTH, points + step, rays).residuals ** 2).sum() > least
@@ -124,7 +124,7 @@ class TestBundleEquations:
         _, _, information = bundle_equations(TRUTH, rays, np.inf)
         generator = np.random.default_rng(0)
         way = generator.normal(size=TRUTH.shape) * (1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3, 1e-5, 1e-5)
-        squares = linearize(TRUTH + way, best_points(TRUTH + way, rays, np.inf), rays).residuals
+        squares = linearize(TRUTH + way, optimize_points(TRUTH + way, rays, np.inf), rays).residuals
         expected = 0.5 * (squares**2).sum()
         assert 0.5 * way.ravel() @ information @ way.ravel() == pytest.approx(expected, rel=1e-3)
 
@@ -140,16 +140,16 @@ class TestBundleEquations:
 
 class TestRayGaps:
     def test_rays_that_meet_have_none(self):
-        pair, _ = rays_of().of_cameras(0, 1)
-        gaps, signed, _ = ray_gaps(TRUTH, pair)
+        pair, _ = rays_of().select_common_points(0, 1)
+        gaps, signed, _ = ray_pair_distances_px(TRUTH, pair)
         assert gaps.max() < 1e-6
         assert np.abs(signed).max() < 1e-6
 
     def test_both_errors_count(self):
         rays = rays_of(3.0, sigma=2.0)
-        pair, _ = rays.of_cameras(0, 1)
-        gaps, signed, free = ray_gaps(TRUTH, pair)
-        at = linearize(TRUTH, best_points(TRUTH, pair, np.inf), pair)
+        pair, _ = rays.select_common_points(0, 1)
+        gaps, signed, free = ray_pair_distances_px(TRUTH, pair)
+        at = linearize(TRUTH, optimize_points(TRUTH, pair, np.inf), pair)
         apart = 2.0 * np.hypot(*at.residuals.T)
         assert gaps[5] == pytest.approx(apart[pair.point == 5].sum())
         # Two rays leave one number over: the signed gap says all there is.

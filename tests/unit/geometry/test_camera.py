@@ -93,13 +93,15 @@ class TestOnGround:
         places = np.array([[0.0, 0.0, 0.0], [10.0, -5.0, 0.0], [-7.5, 3.0, 0.0]])
         for lens in WIDE_LENSES:
             camera = wide((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), lens, focal=700.0)
-            assert np.allclose(camera.on_ground(camera.project(places)), places[:, :2], atol=1e-6)
+            assert np.allclose(
+                camera.project_to_ground(camera.project(places)), places[:, :2], atol=1e-6
+            )
         pixels = EVERY_COEFFICIENT.project(places)
-        assert np.allclose(EVERY_COEFFICIENT.on_ground(pixels), places[:, :2], atol=1e-6)
+        assert np.allclose(EVERY_COEFFICIENT.project_to_ground(pixels), places[:, :2], atol=1e-6)
 
     def test_what_looks_above_the_horizon_is_nowhere(self) -> None:
         pixels = np.array([[480.0, -2000.0], [480.0, 270.0]])
-        found = main_camera().on_ground(pixels)
+        found = main_camera().project_to_ground(pixels)
         assert np.isnan(found).tolist() == [[True, True], [False, False]]
 
 

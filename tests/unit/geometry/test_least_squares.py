@@ -9,7 +9,7 @@ from app.geometry.least_squares import (
     OUT_OF_STEPS,
     covariance,
     levenberg_marquardt,
-    require_determined,
+    require_determined_parameters,
 )
 
 TIMES = np.linspace(0, 2, 30)
@@ -77,8 +77,8 @@ class TestCovariance:
 class TestRequireDetermined:
     def test_an_open_combination_is_said(self):
         with pytest.raises(DegenerateGeometryError, match="do not determine"):
-            require_determined(np.array([[1.0, 1.0], [1.0, 1.0]]))
+            require_determined_parameters(np.array([[1.0, 1.0], [1.0, 1.0]]))
 
     def test_a_parameter_without_influence_is_said(self):
         with pytest.raises(DegenerateGeometryError, match="no influence"):
-            require_determined(np.diag([1.0, 0.0]))
+            require_determined_parameters(np.diag([1.0, 0.0]))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.likely_point import CameraTable, LikelyPoints, _project, likely_points
+from app.geometry.likely_point import CameraTable, LikelyPoints, _project, find_most_likely_points
 from tests.cameras import EVERY_COEFFICIENT, WIDE_LENSES, looking, wide
 
 MIDDLE = (10.0, 0.0, 0.0)
@@ -25,7 +25,7 @@ def found_from(cameras, views, start=(10.0, 0.0, -1.0), off=0.0) -> LikelyPoints
     pixels = np.array([camera.project(BALL[None])[0] for camera in cameras]) + off
     spreads = np.tile(ONE_PIXEL, (1, len(views), 1, 1))
     table = CameraTable.of(cameras)
-    return likely_points(table, pixels, np.array([views]), np.array([start]), spreads)
+    return find_most_likely_points(table, pixels, np.array([views]), np.array([start]), spreads)
 
 
 def look(cameras: CameraTable, number, point):
@@ -89,8 +89,8 @@ class TestLikelyPoints:
         chosen, starts = np.array([[0, 1], [0, 2]]), np.array([[10.0, 0.0, -1.0]] * 2)
         spreads = np.tile(ONE_PIXEL, (2, 2, 1, 1))
         table = CameraTable.of(cameras)
-        both = likely_points(table, pixels, chosen, starts, spreads)
-        alone = likely_points(table, pixels, chosen[1:], starts[1:], spreads[1:])
+        both = find_most_likely_points(table, pixels, chosen, starts, spreads)
+        alone = find_most_likely_points(table, pixels, chosen[1:], starts[1:], spreads[1:])
         assert both.found.tolist() == [False, True]
         assert np.array_equal(both.points[1], alone.points[0])
         assert np.array_equal(both.covariances[1], alone.covariances[0])
@@ -102,7 +102,7 @@ class TestLikelyPoints:
     def test_an_uncertainty_that_is_none_is_no_answer(self):
         pixels = np.array([camera.project(BALL[None])[0] for camera in PINHOLES])
         spreads = np.zeros((1, 2, 2, 2))
-        made = likely_points(
+        made = find_most_likely_points(
             CameraTable.of(PINHOLES), pixels, np.array([[0, 1]]), BALL[None], spreads
         )
         assert made.found.tolist() == [False]

@@ -9,10 +9,10 @@ from app.geometry.resection import (
     PARAMETERS,
     CurvePoints,
     Curves,
-    Prior,
+    GaussianPrior,
     camera_from_parameters,
     curve_distances,
-    fit_curves,
+    fit_camera_to_curves,
     normal_equations,
     parameters_from_camera,
     projection_jacobians,
@@ -71,7 +71,10 @@ def rows(parameters, seen):
 
 
 def test_compiled_rounds_are_those_of_least_squares_bit_for_bit(monkeypatch) -> None:
-    seen, prior = curve_points(1.5), Prior(np.zeros(8), np.array([9.0, 9, 9, 99, 99, 99, 99, 0.1]))
+    seen, prior = (
+        curve_points(1.5),
+        GaussianPrior(np.zeros(8), np.array([9.0, 9, 9, 99, 99, 99, 99, 0.1])),
+    )
     starts = TRUTH + np.random.default_rng(2).normal(0, 1, (9, 8)) * [
         0.3, 0.1, 0.02, 9, 9, 4, 0.2, 0.02,
     ]  # fmt: skip
@@ -81,7 +84,7 @@ def test_compiled_rounds_are_those_of_least_squares_bit_for_bit(monkeypatch) -> 
     monkeypatch.setattr(least_squares, "TOLERANCE", 1e-4)
     for steps, damping in ((4, 1e-2), (30, 1e-3)):
         monkeypatch.setattr(least_squares, "_FIRST_DAMPING", damping)
-        fit = fit_curves(starts, *problem, steps, tolerance=1e-4, damping=damping)
+        fit = fit_camera_to_curves(starts, *problem, steps, tolerance=1e-4, damping=damping)
         slow = levenberg_marquardt(
             lambda parameters: normal_equations(parameters, *problem), starts, steps
         )
@@ -153,7 +156,7 @@ class TestResidualRows:
 class TestNormalEquations:
     def test_the_gradient_is_the_slope_of_the_cost(self):
         seen = curve_points(2.0)
-        prior = Prior(TRUTH + 0.1, np.full(PARAMETERS, 0.5))
+        prior = GaussianPrior(TRUTH + 0.1, np.full(PARAMETERS, 0.5))
         cost_at = lambda row: normal_equations(  # noqa: E731
             row[None], CURVES, seen, prior, 2.0, HALF_DIAGONAL
         )
@@ -165,7 +168,7 @@ class TestNormalEquations:
             assert slope == pytest.approx(gradient[parameter], rel=1e-3)
 
     def test_rows_are_independent(self):
-        seen, prior = curve_points(1.0), Prior(np.zeros(8), np.full(8, np.inf))
+        seen, prior = curve_points(1.0), GaussianPrior(np.zeros(8), np.full(8, np.inf))
         both = np.stack([TRUTH, TRUTH + 0.001])
         together = normal_equations(both, CURVES, seen, prior, 2.0, HALF_DIAGONAL)
         alone = normal_equations(both[1:], CURVES, seen, prior, 2.0, HALF_DIAGONAL)

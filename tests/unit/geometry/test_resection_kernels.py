@@ -4,12 +4,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.geometry.resection_kernels import keep_farthest_points
+from app.geometry.resection_kernels import select_farthest_points
 
 
 def kept(pixels, curve, limits):
     keep = np.empty(len(pixels), dtype=np.bool_)
-    keep_farthest_points(
+    select_farthest_points(
         np.array(pixels, float).reshape(-1, 2), np.array(curve), np.array(limits), keep
     )
     return np.flatnonzero(keep).tolist()

@@ -6,7 +6,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.imports.upload_queries import upload_path
 from app.features.jobs.queries import NewJob, insert_job
@@ -17,7 +17,7 @@ from app.features.people.service import invite
 from app.features.people.session_routes import get_login
 from app.features.predictions.reader import PredictionFiles, read_files
 from app.features.predictions.service import add_predictions
-from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.service import get_recording
 from app.formats.frame_names import frame_path_in_split
 from app.http.team import get_team
@@ -163,7 +163,7 @@ def turned_cameras(api: Any) -> Request:
     path = recording(api)
     found = get_recording(store_of(api), int(path.rpartition("/")[2]))
     frames = [frame(number, "tracked") for number in range(10)]
-    save_cameras(store_of(api), found, (0, 9), Tracked(frames, ()), [], "ann")
+    save_cameras(store_of(api), found, (0, 9), TrackedStretch(frames, ()), [], "ann")
     return "PATCH", f"{path}/cameras/3", {"turned": True}, {}
 
 
@@ -355,7 +355,7 @@ def paint(api: Any) -> Request:
 
 def no_paint(api: Any) -> Request:
     store = store_of(api)
-    group = load(store, 1).group
+    group = load_group_state(store, 1).group
     views = tuple(replace(view, media=Media(f"/gone/{view.key}")) for view in group.views)
     import_groups(store, "broadcast", [replace(group, views=views)], source="test", actor="local")
     ended(api, paint(api))

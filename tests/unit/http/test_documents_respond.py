@@ -311,7 +311,7 @@ class TestInnerWork:
     ) -> None:
         method, path, body, headers = made(api)
         # As where the server stops once the work is done.
-        monkeypatch.setattr(idempotency, "store_sent", lambda *_: None)
+        monkeypatch.setattr(idempotency, "store_sent_response", lambda *_: None)
         first, again = (
             api.request(method, f"{API}{path}", json=body, headers={**headers, **KEY})
             for _ in range(2)

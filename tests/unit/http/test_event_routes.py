@@ -17,7 +17,7 @@ from fastapi import FastAPI
 
 from app.db.store import Store
 from app.features.groups.edit import IncludeView
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -88,7 +88,9 @@ class TestListen:
         store, (address, _) = app.state.services.store, served
         with opened(address, dataset="broadcast") as stream:
             assert stream.answer.headers["content-type"].startswith("text/event-stream")
-            state = set_verdict(store, 1, "deferred", if_match=load(store, 1).etag, actor="bob")
+            state = set_verdict(
+                store, 1, "deferred", if_match=load_group_state(store, 1).etag, actor="bob"
+            )
             name, data = stream.next()
             assert (name, data) == (
                 "group",
@@ -108,7 +110,7 @@ class TestListen:
         store, (address, _) = app.state.services.store, served
         with opened(address, dataset="broadcast") as stream:
             for number, state in ((1, "deferred"), (2, "deferred"), (1, "unreviewed")):
-                etag = load(store, number).etag
+                etag = load_group_state(store, number).etag
                 set_verdict(store, number, state, if_match=etag, actor="bob")
                 assert stream.next()[1]["group"] == number
 
@@ -137,8 +139,8 @@ class TestListen:
     def test_changes_of_another_dataset_are_not_told(self, app, served) -> None:
         store, (address, _) = app.state.services.store, served
         with opened(address, dataset="static") as stream:
-            set_verdict(store, 1, "deferred", if_match=load(store, 1).etag, actor="bob")
-            set_verdict(store, 4, "deferred", if_match=load(store, 4).etag, actor="bob")
+            set_verdict(store, 1, "deferred", if_match=load_group_state(store, 1).etag, actor="bob")
+            set_verdict(store, 4, "deferred", if_match=load_group_state(store, 4).etag, actor="bob")
             assert stream.next()[1]["group"] == 4
 
     def test_a_listener_that_reconnects_misses_nothing_and_hears_nothing_twice(
@@ -147,11 +149,15 @@ class TestListen:
         store, (address, _) = app.state.services.store, served
         with opened(address) as stream:
             edit = IncludeView("7.png", False)
-            edited = submit(store, 1, edit, if_match=load(store, 1).etag, actor="bob")
+            edited = submit_edit(
+                store, 1, edit, if_match=load_group_state(store, 1).etag, actor="bob"
+            )
             assert stream.next()[1]["etag"] == edited.etag
             last = stream.last_id
         # Nobody listens; meanwhile:
-        judged = set_verdict(store, 2, "deferred", if_match=load(store, 2).etag, actor="bob")
+        judged = set_verdict(
+            store, 2, "deferred", if_match=load_group_state(store, 2).etag, actor="bob"
+        )
         with opened(address, {"Last-Event-ID": last}) as stream:
             assert stream.next()[1]["etag"] == judged.etag
         odd = ("x", "-1", "9" * 30, "999999")
@@ -169,7 +175,11 @@ class TestListen:
         services, (address, _) = app.state.services, served
         moment = httpx.get(f"{address}/api/v1/session").json()["moment"]
         judged = set_verdict(
-            services.store, 2, "deferred", if_match=load(services.store, 2).etag, actor="bob"
+            services.store,
+            2,
+            "deferred",
+            if_match=load_group_state(services.store, 2).etag,
+            actor="bob",
         )
         with opened(address, since=moment) as stream:
             assert stream.next()[1]["etag"] == judged.etag

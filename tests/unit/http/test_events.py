@@ -8,7 +8,7 @@ import pytest
 
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import LoggedChange
-from app.http.events import Listener, _change_event, make_first_event
+from app.http.events import EventListener, _change_event, make_first_event
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ def test_who_comes_once_a_dataset_is_gone_is_told_of_it_only_if_they_see_everyth
     sight: Visibility, entry: int, told: bool
 ) -> None:
     async def ask() -> bool:
-        feed = Listener(None, 5, sight, began=10)
-        return feed.is_told(LoggedChange(entry, 3, None, "delete", "eve"))
+        feed = EventListener(None, 5, sight, began=10)
+        return feed.listens_to_change(LoggedChange(entry, 3, None, "delete", "eve"))
 
     assert asyncio.run(ask()) is told
 
@@ -37,7 +37,7 @@ def test_who_annotates_blind_is_told_no_id_of_the_log() -> None:
     ]
 
     async def read(numbered: bool) -> bytes:
-        feed = Listener(None, 5, EVERYTHING, began=10, numbered=numbered)
+        feed = EventListener(None, 5, EVERYTHING, began=10, numbered=numbered)
         feed.take(told)
         feed.take([], ended=True)
         return b"".join([event async for event in feed.read()])

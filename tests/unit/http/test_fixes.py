@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from app.features.groups.edit_codec import edit_to_json
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.groups.suggested_edits import _ACTIONS, list_edits_of_fix
 from app.features.imports.ingest import import_groups
-from app.soccer.finding import FINDING_KINDS, Fix
+from app.soccer.finding import FINDING_KINDS, SuggestedFix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
 from app.soccer.pitch import MARKINGS
@@ -41,14 +41,14 @@ def proposed() -> dict[str, set[str]]:
     return found
 
 
-def fix_of(action: str, group: Group) -> Fix:
+def fix_of(action: str, group: Group) -> SuggestedFix:
     """A fix of that action for the first view of a group."""
     view = group.views[0]
     first, second = sorted(view.station.lines)[:2]
     if action == "hide_marking":
         first = next(marking for marking in MARKINGS if marking not in view.station.lines)
     to = second if action == "relabel" else None
-    return Fix(action, view.key, first, to, 1 if action == "pick_ball" else 0)
+    return SuggestedFix(action, view.key, first, to, 1 if action == "pick_ball" else 0)
 
 
 class TestPage:
@@ -74,7 +74,7 @@ class TestRequests:
         import_groups(store, "fixed", [group.with_view(two)], source="test", actor="local")
         (row,) = api.get("/api/v1/groups", params={"dataset": "fixed"}).json()["items"]
         document = api.get(f"/api/v1/groups/{row['id']}").json()
-        state = load(store, row["id"])
+        state = load_group_state(store, row["id"])
         (offer,) = list_edits_of_fix(state.group, fix_of(action, state.group), ImagePoint(9.0, 8.0))
         edit = edit_to_json(offer.edit)
         assert edit["edit"] == ACTIONS[action][1]
@@ -85,4 +85,4 @@ class TestRequests:
         )
         sent = api.patch(path, json=body, headers={"If-Match": document["etag"]})
         assert sent.status_code == 200, sent.text
-        assert load(store, row["id"]).group == offer.edit.apply(state.group)
+        assert load_group_state(store, row["id"]).group == offer.edit.apply(state.group)

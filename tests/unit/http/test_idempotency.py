@@ -17,11 +17,11 @@ from starlette.responses import Response
 from structlog.testing import capture_logs
 
 from app.db import idempotency
-from app.db.idempotency import StoredResponseModel, shorten_responses
+from app.db.idempotency import StoredResponseModel, delete_oldest_response_bodies
 from app.errors import StorageError
 from app.features.verdicts import routes as verdicts
 from app.features.verdicts.service import set_verdict
-from app.http.idempotency import Idempotency, RequestDigest
+from app.http.idempotency import IdempotencyHandler, RequestDigest
 from app.http.request_limits import WRITE
 from app.http.server import Server, open_listening_socket
 from tests.openapi import openapi_of
@@ -56,7 +56,7 @@ class TestRepetition:
         etag = api.get(f"{API}/groups/1").headers["etag"]
         accept(api, etag=etag)
         with app.state.services.store.write() as session:
-            assert shorten_responses(session, 0) == 1
+            assert delete_oldest_response_bodies(session, 0) == 1
         again = accept(api, etag=etag)
         assert (again.status_code, again.headers["idempotency-replayed"]) == (409, "true")
         assert "Do not send it again" in again.json()["hint"]
@@ -265,7 +265,7 @@ class TestRepetitionsThatWait:
 class TestStreamed:
     def test_an_upload_is_known_by_its_bytes_which_are_not_held(self, app) -> None:
         parts: list[int] = []
-        idempotency = Idempotency()
+        idempotency = IdempotencyHandler()
 
         async def call(chunks: list[bytes]) -> Response:
             waiting = list(chunks)

@@ -247,7 +247,7 @@ def test_a_database_that_does_not_answer_is_a_number_and_no_error(
     def fail(_store: object) -> None:
         raise StorageError("the database is damaged")
 
-    monkeypatch.setattr("app.http.metrics.read_home", fail)
+    monkeypatch.setattr("app.http.metrics.read_home_report", fail)
     assert read("touchline_database_up") == 0
     assert read("touchline_requests_busy", **{"class": "read"}) == 0
 
@@ -269,7 +269,7 @@ def test_damage_that_the_numbers_themselves_meet_is_said_at_once(
         store.note_damage(error)
         raise error
 
-    monkeypatch.setattr("app.http.metrics.read_home", meet)
+    monkeypatch.setattr("app.http.metrics.read_home_report", meet)
     assert (read("touchline_database_damaged"), read("touchline_database_up")) == (1, 0)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.http.pages import FOLDER, STATIC, BrowserSite, JoinedModules, digest
+from app.http.pages import FOLDER, STATIC, BrowserSite, JoinedModules, digest_modules
 
 PAGE = b"""<html><head>
 \t<script type="module" async src="/static/ahead.js"></script>
@@ -37,7 +37,7 @@ def join(folder: Path) -> None:
     (folder / FOLDER).mkdir(exist_ok=True)
     for name in ("ahead.js", "main.js", "chunk-1.js"):
         (folder / FOLDER / name).write_text(f"/* {name} */")
-    about = {"of": digest(folder), "needed_first": ["chunk-1.js"]}
+    about = {"of": digest_modules(folder), "needed_first": ["chunk-1.js"]}
     (folder / FOLDER / "about.json").write_text(json.dumps(about))
 
 
@@ -79,22 +79,22 @@ class TestJoinedModules:
         "about", ["", "[]", "{}", '{"of": 3}', '{"of": "OF"}', '{"of": "OF", "needed_first": 3}']
     )
     def test_what_does_not_say_what_it_is_of_is_not_used(self, folder, about) -> None:
-        text = about.replace("OF", digest(folder))
+        text = about.replace("OF", digest_modules(folder))
         (folder / FOLDER / "about.json").write_text(text)
         assert JoinedModules.read(folder) is None
         assert "main.js" in asked_for(folder)
 
     def test_files_of_libraries_and_of_earlier_builds_are_no_modules(self, folder) -> None:
-        before = digest(folder)
+        before = digest_modules(folder)
         for name in ("node_modules/preact", FOLDER, f"{FOLDER}.new"):
             (folder / name).mkdir(parents=True, exist_ok=True)
             (folder / name / "x.js").write_text("// x\n")
-        assert digest(folder) == before
+        assert digest_modules(folder) == before
 
     def test_its_digest_is_of_names_and_contents_and_of_nothing_else(self, folder) -> None:
-        before = digest(folder)
+        before = digest_modules(folder)
         os.utime(folder / "main.js", (1, 1))
-        assert digest(folder) == before
+        assert digest_modules(folder) == before
 
 
 class TestBuilt:

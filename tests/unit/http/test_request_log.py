@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from starlette.responses import Response
 from starlette.testclient import TestClient
 
-from app.http.request_log import MOST_REFUSALS, RefusalBound, RequestLog
+from app.http.request_log import MOST_REFUSALS, RefusalLogLimiter, RequestLog
 
 
 @pytest.fixture
@@ -77,11 +77,11 @@ def test_every_request_has_a_name_of_its_own(logged) -> None:
 class TestRefusalBound:
     def test_of_many_in_a_second_some_are_told_and_the_rest_is_counted(self, lines) -> None:
         clock, later = [5.0], []
-        bound = RefusalBound(lambda: clock[0], later.append)
-        assert [bound.admits() for _ in range(MOST_REFUSALS + 3)].count(True) == MOST_REFUSALS
+        bound = RefusalLogLimiter(lambda: clock[0], later.append)
+        assert [bound.should_log() for _ in range(MOST_REFUSALS + 3)].count(True) == MOST_REFUSALS
         assert (lines, len(later)) == ([], 1)
         clock[0] += 1.0
-        assert bound.admits()
+        assert bound.should_log()
         later.pop()()
         assert [(line["event"], line["count"]) for line in lines] == [
             ("more requests were refused", 3)
@@ -89,10 +89,10 @@ class TestRefusalBound:
 
     def test_the_rest_is_counted_also_where_nothing_more_is_refused(self, lines) -> None:
         async def refuse_many() -> None:
-            bound = RefusalBound()
+            bound = RefusalLogLimiter()
             with structlog.contextvars.bound_contextvars(request="one of them"):
                 for _ in range(MOST_REFUSALS + 2):
-                    bound.admits()
+                    bound.should_log()
             await asyncio.sleep(1.1)
 
         asyncio.run(refuse_many())
@@ -100,10 +100,10 @@ class TestRefusalBound:
 
     def test_seldom_ones_are_all_told(self, lines) -> None:
         clock = [5.0]
-        bound = RefusalBound(lambda: clock[0], pytest.fail)
+        bound = RefusalLogLimiter(lambda: clock[0], pytest.fail)
         for _ in range(3 * MOST_REFUSALS):
             clock[0] += 0.1
-            assert bound.admits()
+            assert bound.should_log()
         assert lines == []
 
     def test_what_changed_something_is_always_told(self, logged, lines) -> None:

@@ -10,10 +10,16 @@ from fastapi import APIRouter, FastAPI, Request
 
 from app.errors import ForbiddenError, NotLoggedInError
 from app.http.errors import install_error_handlers
-from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
+from app.http.permissions import Action, OwnedKind, RoleScope, may, open_to_all
 from app.http.request_limits import RequestLimits
 from app.http.requests import MAX_STRANGERS_BYTES
-from app.http.route import Gate, Route, list_routes, require_permissions, respond_to_unknown_route
+from app.http.route import (
+    RequestPipeline,
+    Route,
+    list_routes,
+    require_permissions,
+    respond_to_unknown_route,
+)
 
 JSON = [(b"content-type", b"application/json")]
 BYTES = {"requestBody": {"content": {"application/octet-stream": {}}}}
@@ -67,7 +73,7 @@ class Exchange:
         made = FastAPI(openapi_url=None)
         made.router.route_class, made.router.default = Route, respond_to_unknown_route
         keyless: Any = KeyLess()
-        made.state.gate = Gate(access, keyless, RequestLimits(), most)
+        made.state.gate = RequestPipeline(access, keyless, RequestLimits(), most)
         install_error_handlers(made)
 
         async def read(request: Request) -> None:
@@ -85,7 +91,7 @@ class Exchange:
         made.add_api_route("/open", open_to_all(_copy(read)), methods=["POST"], status_code=204)
         made.add_api_route(
             "/up",
-            may(Action.LEAD, where=Where.SOMEWHERE)(stream),
+            may(Action.LEAD, where=RoleScope.SOMEWHERE)(stream),
             methods=["POST"],
             status_code=204,
             openapi_extra=BYTES,

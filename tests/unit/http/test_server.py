@@ -21,9 +21,9 @@ from app.http.server import (
     MAX_CONNECTIONS,
     SWITCH_SECONDS,
     Server,
-    find_connection_limit,
     make_server,
     open_listening_socket,
+    raise_connection_limit,
     warm_up_process,
 )
 
@@ -81,11 +81,11 @@ def server() -> Iterator[Server]:
 
 class TestConnections:
     def test_leave_descriptors_for_the_files_of_the_home(self) -> None:
-        assert 8 <= find_connection_limit() <= MAX_CONNECTIONS
+        assert 8 <= raise_connection_limit() <= MAX_CONNECTIONS
 
     def test_a_head_and_connections_are_bounded(self, server: Server) -> None:
         assert server.config.h11_max_incomplete_event_size == HEAD_BYTES
-        assert server.config.limit_concurrency == find_connection_limit()
+        assert server.config.limit_concurrency == raise_connection_limit()
         assert not server.config.proxy_headers
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.http.server import serve_with
+from app.http.server import serve_with_processes
 from tests.waiting import SECONDS
 
 PROGRAM = "from tests.unit.http.test_server_web_processes import main; main()"
@@ -35,7 +35,7 @@ def main() -> None:
         listening.listen()
         sys.stdout.write(f"{listening.getsockname()[1]}\n")
         sys.stdout.flush()
-        serve_with(2, answer, Settings(), listening)
+        serve_with_processes(2, answer, Settings(), listening)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ import pytest
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, OverloadedError, TooLargeError
 from app.media import frames as module
-from app.media.frames import Frames, find_neighbouring_frames, make_picture
+from app.media.frames import FrameProvider, find_neighbouring_frames, make_picture
 from app.soccer.group import Media
 from app.worker_process import WorkerLimits
 
@@ -50,8 +50,8 @@ def settings(tmp_path: Path) -> Settings:
 
 
 @pytest.fixture
-def frames(settings: Settings) -> Iterator[Frames]:
-    made = Frames(settings)
+def frames(settings: Settings) -> Iterator[FrameProvider]:
+    made = FrameProvider(settings)
     yield made
     made.close()
 
@@ -65,13 +65,17 @@ def media(tmp_path: Path) -> Media:
 
 class TestFrames:
     def test_makes_the_same_picture_as_this_process(
-        self, frames: Frames, media: Media, settings: Settings
+        self, frames: FrameProvider, media: Media, settings: Settings
     ) -> None:
         for width in (None, 40):
             assert frames.read(media, width, False) == make_picture(media, width, False, settings)
 
     def test_a_picture_that_was_made_needs_no_process(
-        self, frames: Frames, media: Media, settings: Settings, monkeypatch: pytest.MonkeyPatch
+        self,
+        frames: FrameProvider,
+        media: Media,
+        settings: Settings,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         assert frames.cached(media, 40, False) is None
         made = make_picture(media, 40, False, settings)
@@ -88,7 +92,7 @@ class TestFrames:
         path = tmp_path / "deep.png"
         path.write_bytes(deep_png(7000))
         monkeypatch.setattr(module, "LIMITS", LITTLE)
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             frames.read(media, None, False)
             with pytest.raises(TooLargeError, match=r"^frame deep\.png needs more than 450 MiB"):
@@ -102,7 +106,7 @@ class TestFrames:
     ) -> None:
         monkeypatch.setattr(module, "LIMITS", LITTLE)
         monkeypatch.setattr(module, "make_picture", decode_nothing)
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             for side, error, reason in (
                 (7000, TooLargeError, "needs more than 450 MiB"),
@@ -125,7 +129,7 @@ class TestFrames:
     )
     def test_what_may_be_the_machines_doing_is_tried_again(
         self,
-        frames: Frames,
+        frames: FrameProvider,
         media: Media,
         monkeypatch: pytest.MonkeyPatch,
         end: str,
@@ -139,7 +143,7 @@ class TestFrames:
         assert frames.read(media, None, False).kind == "image/png"
 
     def test_what_takes_too_long_is_not_tried_again_before_it_changes(
-        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+        self, frames: FrameProvider, media: Media, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
             patch.setattr(module, "make_picture", run_out_of_time)
@@ -152,7 +156,7 @@ class TestFrames:
         assert frames.read(media, None, False).kind == "image/png"
 
     def test_another_width_that_waited_meanwhile_is_not_tried_either(
-        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+        self, frames: FrameProvider, media: Media, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "make_picture", note_and_run_out_of_time)
         for task in [frames.ask(media, width, False) for width in (None, 40, 80)]:
@@ -161,7 +165,7 @@ class TestFrames:
         assert Path(f"{media.path}.tries").read_text() == "None\n"
 
     def test_what_is_silent_is_tried_again_after_a_while(
-        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+        self, frames: FrameProvider, media: Media, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
             patch.setattr(module, "make_picture", sleep_on)
@@ -174,7 +178,7 @@ class TestFrames:
         monkeypatch.setattr(module, "monotonic", lambda: later)
         assert frames.read(media, 40, False).kind == "image/jpeg"
 
-    def test_a_refusal_is_that_of_this_process(self, frames: Frames, tmp_path: Path) -> None:
+    def test_a_refusal_is_that_of_this_process(self, frames: FrameProvider, tmp_path: Path) -> None:
         with pytest.raises(NotFoundError, match=r"gone\.png is no longer in the place"):
             frames.read(Media(str(tmp_path / "gone.png")), None, False)
         path = tmp_path / "x.png"
@@ -182,7 +186,7 @@ class TestFrames:
         with pytest.raises(ImageError, match=r"frame x\.png is no JPEG, PNG or WebP image"):
             frames.read(Media(str(path)), None, False)
 
-    def test_the_frames_around_one_are_found(self, frames: Frames, tmp_path: Path) -> None:
+    def test_the_frames_around_one_are_found(self, frames: FrameProvider, tmp_path: Path) -> None:
         folder = tmp_path / "img1"
         folder.mkdir()
         for number in (1, 2, 3):

@@ -13,7 +13,7 @@ from app.errors import ImageError, NotFoundError, TooLargeError
 from app.media import files as media_module
 from app.media import video as video_index
 from app.media.files import decode_frame, has_index, read_frame, read_video_times
-from app.media.frames import Frames, find_neighbouring_frames
+from app.media.frames import FrameProvider, find_neighbouring_frames
 from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
 
@@ -177,7 +177,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             assert frames.request_work_on_frame(media, False, is_indexed).future.result(60)
             write_video(tmp_path / "cam1.mp4", "mp4v", 21)
@@ -189,7 +189,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             asked = frames.request_work_on_frame(media, False, is_indexed)
             asked.abandon()
@@ -204,7 +204,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             for name, error in (("cam1.mp4", ImageError), ("cam2.mp4", NotFoundError)):
                 media = Media(str(tmp_path / name), frame=0)
@@ -219,7 +219,7 @@ class TestFramesOfTheServer:
         settings.cache.mkdir(parents=True)
         (settings.cache / "videos").write_bytes(b"no folder")
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 40)), frame=35)
-        frames = Frames(settings)
+        frames = FrameProvider(settings)
         try:
             data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
             assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 35
@@ -234,7 +234,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         path = vary_times(write_video(tmp_path / "cam1.mp4", "MPG2"), RATES["any duration"])
-        media, frames = Media(str(path), frame=55), Frames(settings)
+        media, frames = Media(str(path), frame=55), FrameProvider(settings)
         try:
             indexing = frames.request_fetch(media)
             assert indexing is not None and indexing.future.result(60)
@@ -248,7 +248,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         path = write_video(tmp_path / "cam1.mp4", "MPG2")
-        media, frames = Media(str(path), frame=55), Frames(settings)
+        media, frames = Media(str(path), frame=55), FrameProvider(settings)
         try:
             first, second = frames.request_fetch(media), frames.request_fetch(media)
             assert first is not None and second is not None
@@ -263,7 +263,7 @@ class TestFramesOfTheServer:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
-        media, frames = Media(str(tmp_path / "cam1.mp4"), frame=0), Frames(settings)
+        media, frames = Media(str(tmp_path / "cam1.mp4"), frame=0), FrameProvider(settings)
         try:
             for waiting in (frames.request_fetch(media), frames.request_fetch(media)):
                 assert waiting is not None

@@ -12,27 +12,27 @@ from app.paint.agreement import (
     measure_clear_agreement,
     measure_explained_strength,
 )
-from app.paint.ridges import find_line_like, measure_line_strength
+from app.paint.ridges import find_line_like_pixels, measure_line_strength
 from app.soccer.pitch import Pitch
 from tests.unit.paint.test_snap import panned
 
 
 class TestAgreement:
     def test_the_true_camera_is_supported_and_the_turned_one_is_not(self, rendered):
-        paint = find_line_like(rendered.image, rendered.field)
+        paint = find_line_like_pixels(rendered.image, rendered.field)
         right = measure_agreement(rendered.truth, rendered.field, paint)
         wrong = measure_agreement(panned(rendered.truth, 25.0), rendered.field, paint)
         assert right.supported > 0.8 and right.explained > 0.5
         assert wrong.product < right.product / 3
 
     def test_the_picture_itself_may_be_given(self, rendered):
-        paint = find_line_like(rendered.image, rendered.field)
+        paint = find_line_like_pixels(rendered.image, rendered.field)
         assert measure_agreement(
             rendered.truth, rendered.field, rendered.image
         ) == measure_agreement(rendered.truth, rendered.field, paint)
 
     def test_paint_that_no_marking_explains_lowers_explained_alone(self, rendered):
-        paint = find_line_like(rendered.image, rendered.field)
+        paint = find_line_like_pixels(rendered.image, rendered.field)
         more = paint.copy()
         rows = np.nonzero(rendered.field.mean(axis=1) > 0.9)[0]
         more[rows[len(rows) // 2], ::2] = True
@@ -64,7 +64,7 @@ class TestClearPaint:
     def places(self, rendered, on_pitch: bool):
         """Rows and columns on the field that the camera puts on the pitch, or far from it."""
         rows, columns = np.nonzero(rendered.field)
-        at = rendered.truth.on_ground(np.column_stack([columns, rows]).astype(float))
+        at = rendered.truth.project_to_ground(np.column_stack([columns, rows]).astype(float))
         beyond = (np.abs(at[:, :2]) - (52.5, 34.0)).max(axis=1)
         kept = np.nan_to_num(beyond, nan=np.inf) < -1 if on_pitch else ~(beyond < 8)
         return rows[kept], columns[kept]

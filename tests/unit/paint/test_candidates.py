@@ -10,7 +10,7 @@ from app.paint.candidates import (
     MAIN,
     WIDE,
     CameraLibrary,
-    candidate_cameras,
+    find_candidate_cameras,
     make_library_of_known_cameras,
 )
 from app.soccer.pitch import Segment
@@ -40,20 +40,20 @@ class TestCandidates:
         "marking", ["Big rect. right main", "Side line right", "Side line top"]
     )
     def test_the_true_camera_is_among_them_where_one_marking_is_seen(self, marking: str):
-        rows = candidate_cameras(_piece(TRUE, marking, 0.3, 0.7), EXACT, PITCH, SMALL.width)
+        rows = find_candidate_cameras(_piece(TRUE, marking, 0.3, 0.7), EXACT, PITCH, SMALL.width)
         true = parameters_from_camera(TRUE, SMALL.diagonal / 2)
         apart = np.abs(rows[:, PAN : TILT + 1] - true[PAN : TILT + 1]).max(axis=1)
         assert np.degrees(apart.min()) < 0.01
 
     def test_each_of_them_sees_a_marking_along_the_piece(self):
         piece = _piece(TRUE, "Big rect. right top", 0.1, 0.9)
-        rows = candidate_cameras(piece, MAIN, PITCH, SMALL.width)
+        rows = find_candidate_cameras(piece, MAIN, PITCH, SMALL.width)
         assert 50 < len(rows) < 3000
         assert (np.degrees(rows[:, TILT]) < 91).all()
 
     def test_none_lays_a_short_marking_on_a_piece_that_is_longer(self):
         whole = _piece(TRUE, "Side line right", 0.0, 0.9)
-        rows = candidate_cameras(whole, EXACT, PITCH, SMALL.width)
+        rows = find_candidate_cameras(whole, EXACT, PITCH, SMALL.width)
         assert 1 <= len(rows) < 6
 
     def test_every_stand_is_beside_the_pitch_on_the_side_of_the_main_camera(self):

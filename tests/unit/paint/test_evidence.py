@@ -7,13 +7,13 @@ import pytest
 
 from app.paint.evidence import (
     find_paint,
+    has_grass_beside,
     read_picture,
-    shows_grass_beside,
     to_paint_evidence,
     trace_visible_markings,
 )
 from app.paint.profile_kernels import find_stripes
-from app.paint.tracing import TracedPlaces, painted_markings
+from app.paint.tracing import TracedPlaces, painted_marking_mask
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.unit.paint.test_grass import GRASS, picture
@@ -73,7 +73,7 @@ class TestTrace:
         reading = read_picture(rendered.image, rendered.field)
         traced = trace_visible_markings(reading, rendered.truth, Pitch())
         assert len(traced.pixels) > 300
-        assert painted_markings()[traced.marking].all()
+        assert painted_marking_mask()[traced.marking].all()
         apart = np.hypot(*(rendered.truth.project(traced.places) - traced.pixels).T)
         # The lens of the truth has one term, that of the trace a second one tied to it.
         assert np.percentile(apart, 95) < 0.4
@@ -110,7 +110,7 @@ class TestShowsGrassBeside:
             none, np.column_stack([x, np.full(len(x), 50.0)]), np.tile([1.0, 0.0], (len(x), 1)),
             np.ones(len(x)), np.zeros(len(x), np.int64), none, len(x),
         )  # fmt: skip
-        told = shows_grass_beside(reading, traced, 3.0)
+        told = has_grass_beside(reading, traced, 3.0)
         assert told.tolist() == [False, True, True, False, True, False]
 
 

@@ -11,15 +11,15 @@ from app.geometry.camera import Camera
 from app.paint.evidence import (
     MOST_PLACES,
     SPACING_PX,
-    Evidence,
-    Reading,
-    _bright_as_paint,
+    DetectedPaint,
+    PreparedPicture,
+    _is_bright_as_paint,
+    exclude_hidden_boxes,
     find_paint,
+    has_grass_beside,
     read_picture,
-    shows_grass_beside,
     to_paint_evidence,
     trace_visible_markings,
-    visible_field,
 )
 from app.paint.profile_kernels import find_stripes
 from app.paint.tracing import TracedPlaces, trace_places
@@ -34,7 +34,7 @@ WHITE = (230, 230, 230)
 HEIGHT, WIDTH = 100, 200
 
 
-def read(image: np.ndarray) -> Reading:
+def read(image: np.ndarray) -> PreparedPicture:
     return read_picture(image, np.ones(image.shape[:2], np.bool_))
 
 
@@ -104,7 +104,7 @@ class TestSeenField:
         expected = np.ones((HEIGHT, WIDTH), np.bool_)
         for row in rows:
             expected[row, list(columns)] = False
-        seen = visible_field(np.ones((HEIGHT, WIDTH), np.bool_), [box])
+        seen = exclude_hidden_boxes(np.ones((HEIGHT, WIDTH), np.bool_), [box])
         assert np.array_equal(seen, expected)
 
 
@@ -238,7 +238,7 @@ class TestBrightAsPaint:
         asked = np.array([least - 1, least + 1, most - 1, most + 1])
         strengths = np.concatenate([[100.0] * 12, [50.0] * 12, asked])
         widths = np.concatenate([[4.0] * 12, [1.3] * 12, [width] * 4])
-        told = _bright_as_paint(strengths, widths)
+        told = _is_bright_as_paint(strengths, widths)
         assert told[:24].all() and told[24:].tolist() == [False, True, True, False]
 
 
@@ -262,9 +262,7 @@ class TestShowsGrassBeside:
         self, x: float, width: float, window: float, shown: bool
     ) -> None:
         traced = upright([x] * 4, width)
-        assert (
-            shows_grass_beside(read(picture(GRASS, HEIGHT, WIDTH)), traced, window).all() == shown
-        )
+        assert has_grass_beside(read(picture(GRASS, HEIGHT, WIDTH)), traced, window).all() == shown
         painted = striped(x, width)
         assert (len(find_paint(read(painted), traced, window).offsets) == 4) == shown
 
@@ -286,7 +284,7 @@ class TestShowsGrassBeside:
         image = picture(GRASS, HEIGHT, WIDTH)
         hidden = [Box(column, 0.0, 1.0, HEIGHT)]
         reading = read_picture(image, np.ones((HEIGHT, WIDTH), np.bool_), hidden)
-        assert shows_grass_beside(reading, upright([x] * 4, width), 3.0).all() == shown
+        assert has_grass_beside(reading, upright([x] * 4, width), 3.0).all() == shown
 
 
 class TestEvidence:
@@ -350,12 +348,12 @@ class TestEvidence:
         assert larger.share == evidence.share
 
 
-def found_with(rendered, camera: Camera) -> Evidence:
+def found_with(rendered, camera: Camera) -> DetectedPaint:
     reading = read_picture(rendered.image, rendered.field)
     return find_paint(reading, trace_visible_markings(reading, camera, Pitch()), 6.0)
 
 
-def _sigma_of_one_level(reading: Reading, traced: TracedPlaces) -> float:
+def _sigma_of_one_level(reading: PreparedPicture, traced: TracedPlaces) -> float:
     """Standard deviation of a place, pixels, where the noise is one grey level."""
     offsets, sigmas, strengths = np.empty((3, len(traced.pixels)))
     find_stripes(

@@ -18,10 +18,10 @@ from app.paint.propose import (
     explain_uncertain_camera,
     measure_weakest_marking,
     propose_camera,
-    read_frame,
-    scale_snapped,
+    read_and_prepare_frame,
+    scale_snapped_camera,
 )
-from app.paint.snap import SnappedCamera, snap_reading
+from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.sample.render import render_view
 from app.sample.scene import Scene
 from app.sample.scenes import make_match
@@ -122,17 +122,17 @@ class TestPropose:
         picture = lawn(marked(true, "Circle central", "Middle line"))
         reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
         asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
-        assert snap_reading(*asked).reason == NO_PAINT
-        assert snap_reading(*asked, circles_count_twice=True).reason is None
+        assert snap_to_prepared_picture(*asked).reason == NO_PAINT
+        assert snap_to_prepared_picture(*asked, circles_count_twice=True).reason is None
 
     def test_at_full_size_it_is_drawn_as_it_was_found(self, monkeypatch: pytest.MonkeyPatch):
         asked = []
 
         def snap(*given, **named):
             asked.append((given[0].width, given[4], named))
-            return snap_reading(*given, **named)
+            return snap_to_prepared_picture(*given, **named)
 
-        monkeypatch.setattr("app.paint.propose.snap_reading", snap)
+        monkeypatch.setattr("app.paint.propose.snap_to_prepared_picture", snap)
         small = lawn(drawn(TRUE, 3))
         picture = np.asarray(cv2.resize(small, (1280, 720), interpolation=cv2.INTER_CUBIC))
         assert propose_camera(picture, known=[TRUE]).outcome == "proposed"
@@ -149,7 +149,7 @@ class TestPropose:
         seen = find_paint(reading, trace_visible_markings(reading, aside, PITCH), 12.0)
         assert np.median(np.abs(seen.offsets)) > 1.0
         snapped = SnappedCamera(aside, seen, 1.0, None, 0.5, None, (540, 960))
-        large = scale_snapped(snapped, 1080, 1920)
+        large = scale_snapped_camera(snapped, 1080, 1920)
         before, after = (to_paint_evidence(item.evidence, item.camera) for item in (snapped, large))
         for name, places in before.points.items():
             told = np.array(after.points[name])
@@ -183,15 +183,15 @@ class TestPropose:
         reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
         spread = np.diag(np.array([0.05, 0.05, 0.01, 0.5, 0.5, 0.5, 0.2, 0.01]) ** 2)
         asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy(), spread)
-        assert snap_reading(*asked).reason == NO_PAINT
-        assert snap_reading(*asked, position_is_known=True).reason is None
+        assert snap_to_prepared_picture(*asked).reason == NO_PAINT
+        assert snap_to_prepared_picture(*asked, position_is_known=True).reason is None
 
     def test_a_small_picture_is_read_enlarged_and_told_in_its_own_pixels(
         self, scene: Scene, frame: Image
     ):
         height, width = frame.shape[:2]
         small = cv2.resize(frame, (400, 400 * height // width), interpolation=cv2.INTER_AREA)
-        read = read_frame(small)
+        read = read_and_prepare_frame(small)
         assert isinstance(read, SearchedFrame) and read.image.shape[1] == 800
         found = propose_camera(np.asarray(small, np.uint8))
         assert found.outcome == "proposed"
@@ -199,7 +199,7 @@ class TestPropose:
         assert found.snapped.size == small.shape[:2]
         true = scene.truth.views[0].camera.scaled(400 / width, small.shape[0] / height)
         assert found.camera.principal_point == pytest.approx(true.principal_point, abs=0.01)
-        seen = true.on_ground(np.array([[150.0, 120.0], [250.0, 160.0], [350.0, 200.0]]))
+        seen = true.project_to_ground(np.array([[150.0, 120.0], [250.0, 160.0], [350.0, 200.0]]))
         seen = np.column_stack([seen, np.zeros(len(seen))])
         apart = np.hypot(*(found.camera.project(seen) - true.project(seen)).T)
         assert np.nanmax(apart) < 0.5
@@ -220,9 +220,11 @@ class TestPropose:
     def test_three_lines_say_too_little_of_the_camera(self):
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
         names = ("Side line right", "Small rect. right main", "Small rect. right top")
-        frame = read_frame(lawn(marked(true, *names)))
+        frame = read_and_prepare_frame(lawn(marked(true, *names)))
         assert isinstance(frame, SearchedFrame)
-        snapped = snap_reading(frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
+        snapped = snap_to_prepared_picture(
+            frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy()
+        )
         assert snapped.reason is None
         seen = PaintAgreement(0.9, 0.9, 400)
         reason = explain_uncertain_camera([RankedCamera(snapped, seen, 1.0)])
@@ -237,7 +239,9 @@ class TestPropose:
             30,
         )
         reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
-        snapped = snap_reading(reading, TRUE, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
+        snapped = snap_to_prepared_picture(
+            reading, TRUE, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy()
+        )
         assert snapped.reason is None
         assert measure_weakest_marking(reading, snapped, PITCH) > 0.7
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.paint.ridges import find_line_like, find_straight_pieces, measure_line_strength
+from app.paint.ridges import find_line_like_pixels, find_straight_pieces, measure_line_strength
 from tests.unit.paint.test_grass import CROWD, GRASS, picture
 
 
@@ -19,7 +19,7 @@ class TestLineLike:
     def test_a_painted_line_becomes_its_thin_crest(self):
         image = picture(GRASS, 300, 960)
         image[149:152, 100:700] = 225
-        found = find_line_like(noisy(image), np.ones((300, 960), np.bool_))
+        found = find_line_like_pixels(noisy(image), np.ones((300, 960), np.bool_))
         assert found[150, 110:690].mean() > 0.95
         assert found[:, 200:600].sum(axis=0).max() <= 2
 
@@ -28,7 +28,7 @@ class TestLineLike:
         image[:100] = CROWD
         image[96:100] = 235
         image[180:200, 300:312] = 235
-        found = find_line_like(noisy(image), np.ones((300, 960), np.bool_))
+        found = find_line_like_pixels(noisy(image), np.ones((300, 960), np.bool_))
         assert not found[:110].any()
         assert not found[170:210, 290:322].any()
 
@@ -39,19 +39,19 @@ class TestLineLike:
         image, field = noisy(image), np.ones((300, 960), np.bool_)
         found = measure_line_strength(image, field)
         assert np.median(found[150, 110:690]) > 5 * np.max(found[221, 110:690]) > 0
-        assert ((found > 0) == find_line_like(image, field)).all()
+        assert ((found > 0) == find_line_like_pixels(image, field)).all()
         large = np.repeat(np.repeat(image, 2, axis=0), 2, axis=1)
         seen = measure_line_strength(large, np.ones((600, 1920), np.bool_))
         assert np.median(seen[seen > 0]) == pytest.approx(np.median(found[found > 0]), rel=0.2)
 
     def test_nothing_is_found_where_no_field_is(self):
         image = noisy(picture(GRASS, 90, 160))
-        assert not find_line_like(image, np.zeros((90, 160), np.bool_)).any()
+        assert not find_line_like_pixels(image, np.zeros((90, 160), np.bool_)).any()
 
     def test_pixels_of_a_large_picture_lie_on_its_line(self):
         image = picture(GRASS, 1080, 1920)
         image[600:606] = 225
-        rows = np.nonzero(find_line_like(noisy(image), np.ones((1080, 1920), np.bool_)))[0]
+        rows = np.nonzero(find_line_like_pixels(noisy(image), np.ones((1080, 1920), np.bool_)))[0]
         assert len(rows) > 800
         assert np.percentile(np.abs(rows - 602.5), 95) <= 2.5
 

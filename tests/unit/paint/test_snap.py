@@ -9,7 +9,7 @@ import pytest
 
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import parameters_from_camera
-from app.paint.evidence import Evidence, to_paint_evidence
+from app.paint.evidence import DetectedPaint, to_paint_evidence
 from app.paint.snap import CURVED, _has_enough_paint, snap_camera
 from app.paint.tracing import TracedPlaces
 from app.soccer.frames import ImageSize
@@ -17,7 +17,7 @@ from app.soccer.group import Station
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import calibrate_paint
+from app.solving.calibrate import calibrate_from_paint
 from tests.unit.paint.test_grass import GRASS, picture
 
 
@@ -90,7 +90,7 @@ class TestCircle:
             )
             none = np.zeros((len(marking), 2))
             traced = TracedPlaces(none, none, none, none[:, 0], marking, none, len(marking))
-            seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
+            seen = DetectedPaint(traced, none[:, 0], none[:, 0], none[:, 0])
             return _has_enough_paint(seen, CURVED, spacing)
 
         assert suffices(places) and not suffices(places - 1)
@@ -105,7 +105,7 @@ class TestStored:
         size = ImageSize(1280, 720)
         station = Station("main", size)
         reading = PaintReading("", "", kept)
-        again = calibrate_paint(clicked, reading, station, Pitch(), CalibrationPolicy())
+        again = calibrate_from_paint(clicked, reading, station, Pitch(), CalibrationPolicy())
         assert again.source == "paint"
         moved = parameters_from_camera(again.camera, size.diagonal / 2) - parameters_from_camera(
             found.camera, size.diagonal / 2

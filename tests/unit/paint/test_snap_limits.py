@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
-from app.paint.evidence import Evidence, Reading, read_picture, trace_visible_markings
+from app.paint.evidence import DetectedPaint, PreparedPicture, read_picture, trace_visible_markings
 from app.paint.snap import SnappedCamera, _has_enough_paint, snap_camera
 from app.paint.tracing import PAINTED, TracedPlaces
 from app.soccer.frames import ImageSize
@@ -77,7 +77,7 @@ def photographed(image: np.ndarray) -> np.ndarray:
     return np.clip(np.round(cv2.GaussianBlur(image, (0, 0), 0.6) + noise), 0, 255).astype(np.uint8)
 
 
-def read(image: np.ndarray) -> Reading:
+def read(image: np.ndarray) -> PreparedPicture:
     return read_picture(image, np.ones(image.shape[:2], np.bool_))
 
 
@@ -125,7 +125,7 @@ class TestEnough:
         marking = np.repeat(np.arange(len(counts)), counts)
         none = np.zeros((len(marking), 2))
         traced = TracedPlaces(none, none, none, none[:, 0], marking, none, 10 * len(marking))
-        seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
+        seen = DetectedPaint(traced, none[:, 0], none[:, 0], none[:, 0])
         assert _has_enough_paint(seen, []) == enough
 
     @pytest.mark.parametrize(

@@ -1,22 +1,22 @@
 from __future__ import annotations
 
-from app.sample.fixture import group_counts, make_fixture, split_of
+from app.sample.fixture import group_counts_by_match, make_fixture, split_of_match
 
 
 class TestGroupCounts:
     def test_the_sizes_of_soccernet_make_four_hundred_matches(self):
-        counts = group_counts(12_764)
+        counts = group_counts_by_match(12_764)
         assert len(counts) == 400
         assert sum(counts) == 12_764
         assert min(counts) >= 31
         assert max(counts) <= 32
 
     def test_sixty_groups_are_four_matches_of_fifteen(self):
-        assert group_counts(60) == [15, 15, 15, 15]
+        assert group_counts_by_match(60) == [15, 15, 15, 15]
 
     def test_fewer_groups_than_matches_leave_no_match_empty(self):
-        assert group_counts(2) == [1, 1]
-        assert group_counts(1) == [1]
+        assert group_counts_by_match(2) == [1, 1]
+        assert group_counts_by_match(1) == [1]
 
 
 class TestMakeFixture:
@@ -44,4 +44,4 @@ class TestMakeFixture:
 
 class TestSplitOf:
     def test_four_matches_have_all_three_splits(self):
-        assert [split_of(index) for index in range(4)] == ["train", "train", "valid", "test"]
+        assert [split_of_match(index) for index in range(4)] == ["train", "train", "valid", "test"]

@@ -16,7 +16,7 @@ from app.sample.scenes import (
 from app.soccer.frames import Box
 from app.soccer.pitch import CIRCLES, MARKINGS
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.scenes import make_scenes
 
 
@@ -64,7 +64,7 @@ class TestMakeScenes:
     def test_clean_scenes_are_solved_within_a_decimetre(self, clean_scenes: list[Scene]):
         errors = []
         for scene in clean_scenes[:12]:
-            solution = solve(scene.group, PAPER)
+            solution = solve_group(scene.group, PAPER)
             if solution.ball is not None:
                 errors.append(np.linalg.norm(np.subtract(solution.ball.point, scene.truth.ball)))
         assert len(errors) >= 11
@@ -81,7 +81,7 @@ class TestMakeMatch:
     def test_of_the_sample_a_group_that_lacks_two_stubs_passes_without_a_click(self):
         """Half a pixel of either cost its main camera a quarter of JaC."""
         [scene] = make_match(1, 15, SEED, numbers=[2])
-        paper, curated = (solve(scene.group, policy) for policy in (PAPER, TOUCHLINE))
+        paper, curated = (solve_group(scene.group, policy) for policy in (PAPER, TOUCHLINE))
         missing = {fit.marking: fit.length_px for fit in paper.views[0].calibration.markings}
         for fit in curated.views[0].calibration.markings:
             del missing[fit.marking]

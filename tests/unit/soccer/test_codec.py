@@ -14,8 +14,8 @@ from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.codec import (
     group_from_json,
-    group_inputs_hash,
     group_to_json,
+    hash_group_inputs,
     hash_imported_group,
     station_digest,
     view_digest,
@@ -179,12 +179,12 @@ class TestInputsHash:
     def test_changes_with_everything_that_solving_reads(
         self, full_group, full_camera, change
     ) -> None:
-        assert group_inputs_hash(change(full_group, full_camera)) != group_inputs_hash(full_group)
+        assert hash_group_inputs(change(full_group, full_camera)) != hash_group_inputs(full_group)
 
     def test_changes_with_each_number_that_was_read_of_the_paint(self, full_group) -> None:
         key = full_group.views[0].key
         read = [READ, replace(READ, supported=0.25), replace(READ, frame="another")]
-        hashes = {group_inputs_hash(replace(full_group, paint={key: one})) for one in read}
+        hashes = {hash_group_inputs(replace(full_group, paint={key: one})) for one in read}
         assert len(hashes) == 3
 
     @pytest.mark.parametrize(
@@ -197,18 +197,18 @@ class TestInputsHash:
         ],
     )
     def test_ignores_what_solving_does_not_read(self, full_group, change) -> None:
-        assert group_inputs_hash(change(full_group)) == group_inputs_hash(full_group)
+        assert hash_group_inputs(change(full_group)) == hash_group_inputs(full_group)
         assert hash_imported_group(change(full_group)) != hash_imported_group(full_group)
 
     def test_a_group_without_paint_has_the_hash_that_it_had_before_there_was_any(self) -> None:
         bare = Group("g", ())
-        assert group_inputs_hash(bare) == "d840b118d89e0dcabd41d2a342024f39"
+        assert hash_group_inputs(bare) == "d840b118d89e0dcabd41d2a342024f39"
 
     def test_is_the_same_after_a_round_trip(self, full_group) -> None:
         full_group = replace(full_group, positions={full_group.views[0].key: NEAR})
         full_group = replace(full_group, paint={full_group.views[0].key: READ})
         again = group_from_json(group_to_json(full_group))
-        assert group_inputs_hash(again) == group_inputs_hash(full_group)
+        assert hash_group_inputs(again) == hash_group_inputs(full_group)
         assert hash_imported_group(again) == hash_imported_group(full_group)
 
 

@@ -16,14 +16,14 @@ from app.solving.ball_3d import (
     _ViewSubsets,
     choose_exported_ball,
     compute_mean_ball,
+    explain_implausible_position,
     is_plausible_position,
     judge_pairs,
-    list_implausible_reasons,
 )
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import collect_facts
 from app.solving.judgement import judge_groups
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.solving.triangulate import collect_ball_observations, triangulate_observation_pairs
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_views
@@ -44,19 +44,19 @@ class TestImplausible:
         ("outside", "height", "reach"), [(8.0, 14.0, 6.5), (5.0, 20.5, 4.875), (1.0, 38.0, 0.5)]
     )
     def test_the_higher_a_ball_the_less_far_outside_it_may_be(self, outside, height, reach) -> None:
-        ((number, limit, words),) = list_implausible_reasons(
+        ((number, limit, words),) = explain_implausible_position(
             (52.5 + outside, 0.0, -height), PITCH, PAPER
         )
         assert (number, limit) == (pytest.approx(outside), pytest.approx(reach))
         assert words == f"is {outside:.0f} m outside the pitch at a height of {height:.2f} m"
 
     def test_each_end_alone_has_its_own_words(self) -> None:
-        found = list_implausible_reasons((0.0, 62.0, 10.2), PITCH, PAPER)
+        found = explain_implausible_position((0.0, 62.0, 10.2), PITCH, PAPER)
         assert [words for _, _, words in found] == [
             "lies 10.20 m below the grass",
             "is 28 m outside the pitch",
         ]
-        ((number, limit, words),) = list_implausible_reasons((0.0, 0.0, -41.0), PITCH, PAPER)
+        ((number, limit, words),) = explain_implausible_position((0.0, 0.0, -41.0), PITCH, PAPER)
         assert (number, limit, words) == (41.0, 40.0, "flies 41.00 m above the grass")
 
 
@@ -150,13 +150,13 @@ def views(sigma_px=0.0, seed=0):
 
 class TestBestBall:
     def test_exact_clicks_give_the_exact_point(self):
-        best = solve(group(*views()), PAPER).best_ball
+        best = solve_group(group(*views()), PAPER).best_ball
         assert np.allclose(best.point, BALL, atol=1e-9)
         assert best.views == ("a", "b", "c")
 
     def test_one_bad_view_does_no_harm_and_is_named(self):
         a, b, c = views()
-        best = solve(group(a, b, moved(c, 0.0, 60.0)), PAPER).best_ball
+        best = solve_group(group(a, b, moved(c, 0.0, 60.0)), PAPER).best_ball
         assert best.contradicting == ("c",)
         assert np.allclose(best.point, BALL, atol=1e-6)
 
@@ -166,24 +166,24 @@ class TestBestBall:
         sigma = 1.5 * 1280 / 1920
         inside = 0
         for seed in range(300):
-            best = solve(group(*views(sigma, seed)), policy).best_ball
+            best = solve_group(group(*views(sigma, seed)), policy).best_ball
             off = np.array(best.point) - BALL
             inside += off @ np.linalg.solve(np.reshape(best.covariance, (3, 3)), off) < 7.815
         assert 0.92 <= inside / 300 <= 0.98
 
     def test_two_views_that_contradict_each_other_say_so_by_their_covariance(self):
         a, b, _ = views()
-        calm = solve(group(a, b), PAPER).best_ball
-        torn = solve(group(a, moved(b, 0.0, 15.0)), PAPER).best_ball
+        calm = solve_group(group(a, b), PAPER).best_ball
+        torn = solve_group(group(a, moved(b, 0.0, 15.0)), PAPER).best_ball
         assert torn.sigma_m > 2 * calm.sigma_m
 
     def test_influence_is_how_far_the_point_moves_without_a_view(self):
-        best = solve(group(*views(1.0, 3)), PAPER).best_ball
+        best = solve_group(group(*views(1.0, 3)), PAPER).best_ball
         assert [view for view, _ in best.influence_m] == ["a", "b", "c"]
         assert all(0 < metres < 0.5 for _, metres in best.influence_m)
 
     def test_one_view_gives_none(self):
-        assert solve(group(views()[0]), PAPER).best_ball is None
+        assert solve_group(group(views()[0]), PAPER).best_ball is None
 
     def test_subsets_of_views_have_together_the_bits_that_each_has_alone(self):
         views = _ViewSubsets(collect_ball_observations(*random_views(11)), PAPER)

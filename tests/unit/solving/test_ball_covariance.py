@@ -24,7 +24,7 @@ from app.solving.ball_covariance import (
     major_axis_sigma,
     pixel_covariance,
 )
-from app.solving.facts import facts_from_bytes, facts_to_bytes, group_facts, join_facts
+from app.solving.facts import collect_facts_of_views, facts_from_bytes, facts_to_bytes, join_facts
 from app.solving.judgement import judge_groups
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_to_warp, warp_to_picture
@@ -92,7 +92,7 @@ class TestPictureSpreads:
     HALF = SIZE.diagonal / 2
 
     def calibration(self, whole):
-        camera = self.DONE.camera_of_shown_picture(
+        camera = self.DONE.camera_of_annotated_picture(
             camera_from_parameters(self.taken(), MIDDLE, self.HALF), SIZE
         )
         covariance = tuple(whole[:8, :8].ravel().tolist())
@@ -106,7 +106,7 @@ class TestPictureSpreads:
         camera = camera_from_parameters(unknowns[:8], MIDDLE, self.HALF)
         return (
             warp_to_picture(unknowns[8:], (0, 0, 0))
-            .camera_of_shown_picture(camera, SIZE)
+            .camera_of_annotated_picture(camera, SIZE)
             .project(np.array([BALL]))[0]
         )
 
@@ -131,7 +131,7 @@ class TestPictureSpreads:
             given_view("b", MAIN, BALL),
         ]
         other = Calibration("lines", MAIN, covariance=tuple((1e-6 * np.eye(8)).ravel().tolist()))
-        facts = group_facts(views, [calibration, other])
+        facts = collect_facts_of_views(views, [calibration, other])
         found = facts_from_bytes([facts_to_bytes(facts)])
         points = np.array([BALL, BALL])
         spreads = calibration_pixel_covariances(found, np.arange(2), points)
@@ -176,7 +176,7 @@ class TestIsWithin:
 class TestMeanSpread:
     def covariance(self, *cameras: Camera, policy=PAPER) -> np.ndarray:
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
-        facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
+        facts = collect_facts_of_views(views, [Calibration("given", camera) for camera in cameras])
         spread = MeanCovariance(facts)
         judgement = judge_groups(facts, policy, spread)
         return spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)[0]
@@ -244,7 +244,7 @@ class TestMeanSpread:
     @given(st.lists(st.integers(0, 1000), min_size=2, max_size=6))
     @settings(max_examples=30, deadline=None)
     def test_results_kept_for_other_policies_change_no_bit(self, seeds):
-        facts = join_facts([group_facts(*random_views(seed)) for seed in range(60)])
+        facts = join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(60)])
         kept = MeanCovariance(facts)
         for seed in seeds:
             policy = replace(random_policy(seed), max_sigma_m=0.1)
@@ -261,7 +261,7 @@ class TestMeanSpread:
             for _ in range(13)
         ]
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
-        facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
+        facts = collect_facts_of_views(views, [Calibration("given", camera) for camera in cameras])
         kept, zero = MeanCovariance(facts), np.array([0])
         for last in (70, 71):
             valid = np.arange(len(facts.pair_group)) <= last

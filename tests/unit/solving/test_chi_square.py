@@ -16,12 +16,12 @@ from app.solving.ball_covariance import MeanCovariance
 from app.solving.chi_square import (
     ChiSquareResiduals,
     chi_square_residuals,
-    chi_square_residuals_without_each_view,
+    compute_leave_one_out_chi_square,
     sigma_widening,
 )
-from app.solving.facts import Facts, group_facts, join_facts
+from app.solving.facts import GroupFacts, collect_facts_of_views, join_facts
 from app.solving.judgement import find_views_in_pairs, judge_groups
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_policy, random_views
 
@@ -42,12 +42,12 @@ def views(keys: str = "abc", noise_px: float = 0.0, seed: int = 0):
     return [moved(given_view(key, CAMERAS[key], BALL), *rng.normal(0, noise_px, 2)) for key in keys]
 
 
-def facts(keys: str = "abc", noise_px: float = 0.0, seed: int = 0) -> Facts:
+def facts(keys: str = "abc", noise_px: float = 0.0, seed: int = 0) -> GroupFacts:
     calibrations = [Calibration("given", CAMERAS[key]) for key in keys]
-    return group_facts(views(keys, noise_px, seed), calibrations)
+    return collect_facts_of_views(views(keys, noise_px, seed), calibrations)
 
 
-def found(of: Facts, policy=POLICY, off: float = 0.0) -> ChiSquareResiduals:
+def found(of: GroupFacts, policy=POLICY, off: float = 0.0) -> ChiSquareResiduals:
     start = np.tile(np.array(BALL) + off, (of.groups, 1))
     return chi_square_residuals(of, np.ones(len(of.view_group), bool), start, policy)
 
@@ -68,7 +68,7 @@ class TestResidualsOf:
 
     def test_the_ball_is_the_most_likely_one(self) -> None:
         for seed in range(3):
-            best = solve(group(*views("abc", 1.0, seed)), POLICY).best_ball
+            best = solve_group(group(*views("abc", 1.0, seed)), POLICY).best_ball
             assert best is not None
             one = found(facts("abc", 1.0, seed))
             assert one.point[0] == pytest.approx(np.array(best.point), abs=1e-3)
@@ -104,9 +104,9 @@ class TestResidualsOf:
     @settings(max_examples=25, deadline=None)
     def test_a_table_has_the_residuals_of_each_of_its_groups_bit_by_bit(self, seeds, seed):
         policy = random_policy(seed)
-        parts = [group_facts(*random_views(seed)) for seed in seeds]
+        parts = [collect_facts_of_views(*random_views(seed)) for seed in seeds]
 
-        def residuals_at_ball(of: Facts) -> ChiSquareResiduals:
+        def residuals_at_ball(of: GroupFacts) -> ChiSquareResiduals:
             judgement = judge_groups(of, policy, MeanCovariance(of))
             return chi_square_residuals(
                 of, find_views_in_pairs(of, judgement.valid), judgement.point, policy
@@ -124,7 +124,7 @@ class TestResidualsOf:
 def facts_with_parameters() -> np.ndarray:
     covariance = tuple((1e-4 * np.eye(8)).ravel().tolist())
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in "abc"]
-    return group_facts(views(), calibrations).view_parameters
+    return collect_facts_of_views(views(), calibrations).view_parameters
 
 
 class TestGivenCameras:
@@ -133,7 +133,7 @@ class TestGivenCameras:
     ASKED = replace(POLICY, min_p_value=0.001, tau_percent=5.0)
 
     def judged(self, policy, seed: int, noise_px: float = 5.0):
-        return solve(group(*views("abc", noise_px * 1280 / 1920, seed)), policy)
+        return solve_group(group(*views("abc", noise_px * 1280 / 1920, seed)), policy)
 
     def test_their_sigma_counts_in_the_residuals(self) -> None:
         policy = replace(self.ASKED, click_sigma_px=0.5, given_sigma_px=5.0)
@@ -168,7 +168,7 @@ class TestGivenCameras:
             False,
             True,
         )
-        of = group_facts(views("abc"), [one, none, replace(one, covariance=None)])
+        of = collect_facts_of_views(views("abc"), [one, none, replace(one, covariance=None)])
         assert of.view_bare.tolist() == [False, True, True]
 
 
@@ -191,9 +191,9 @@ class TestWideningOf:
         assert sigma_widening(*numbers) == pytest.approx([times], abs=1e-3)
 
     def test_the_sigma_of_a_contradicted_ball_is_wider_and_its_point_stays(self) -> None:
-        calm = solve(group(*views("ab")), POLICY)
+        calm = solve_group(group(*views("ab")), POLICY)
         views_apart = [moved(view, 0.0, 8.0 * place) for place, view in enumerate(views("ab"))]
-        torn = solve(group(*views_apart), POLICY)
+        torn = solve_group(group(*views_apart), POLICY)
         assert torn.chi_square is not None and torn.ball is not None and calm.ball is not None
         times = np.sqrt(torn.chi_square.value)
         assert torn.chi_square.p_value < 0.002 and times > 3
@@ -204,10 +204,10 @@ class TestWideningOf:
 
     def test_gate_and_ball_have_one_sigma(self) -> None:
         of = [moved(view, 0.0, 8.0 * place) for place, view in enumerate(views("ab"))]
-        ball = solve(group(*of), POLICY).ball
+        ball = solve_group(group(*of), POLICY).ball
         assert ball is not None
         for limit, passes in ((ball.sigma_m * 0.999, False), (ball.sigma_m * 1.001, True)):
-            gates = solve(group(*of), replace(POLICY, max_sigma_m=limit)).gates
+            gates = solve_group(group(*of), replace(POLICY, max_sigma_m=limit)).gates
             gate = next(gate for gate in gates if gate.name == "sigma")
             assert (gate.passed, gate.value) == (passes, ball.sigma_m)
 
@@ -216,10 +216,10 @@ class TestResidualsWithout:
     @given(st.integers(0, 10_000), st.integers(0, 1000))
     @settings(max_examples=25, deadline=None)
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
-        of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
+        of, policy = collect_facts_of_views(*random_views(seed)), random_policy(policy_seed)
         judgement = judge_groups(of, policy, MeanCovariance(of))
         used = find_views_in_pairs(of, judgement.valid)
-        rows = chi_square_residuals_without_each_view(of, used, judgement.point, policy)
+        rows = compute_leave_one_out_chi_square(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()
         for row, place in enumerate(np.flatnonzero(used)):
             others = used & (np.arange(len(used)) != place)

@@ -20,7 +20,7 @@ from app.solving.dataset_noise import (
     estimate_noise,
     estimate_sources,
 )
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.truth import noise_used
 
@@ -35,7 +35,7 @@ def fine() -> list[Made]:
 
 
 def told(made: list[Made], policy: Policy) -> DatasetNoise:
-    seen = [NoiseGroup.of(one.group, solve(one.group, policy), policy) for one in made]
+    seen = [NoiseGroup.of(one.group, solve_group(one.group, policy), policy) for one in made]
     return estimate_noise(seen, policy)
 
 
@@ -52,7 +52,7 @@ def test_what_is_estimated_once_it_is_used_is_the_same(fine: list[Made]) -> None
 
 def test_balls_are_asked_with_the_cameras_that_the_lines_make(fine: list[Made]) -> None:
     """Believed to be worse than they are, cameras would explain what the clicks are off."""
-    seen = [NoiseGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in fine]
+    seen = [NoiseGroup.of(one.group, solve_group(one.group, PAPER), PAPER) for one in fine]
     found = estimate_noise(seen, PAPER)
     alone = [miss for group in seen for miss in group.misses(PAPER)]
     asked = [miss for some in found.misses for miss in some]
@@ -64,8 +64,8 @@ def test_the_covariances_are_those_that_solving_makes(fine: list[Made]) -> None:
     calibration = replace(PAPER.calibration, line_sigma_px=0.3, line_share=0.2)
     policy = replace(PAPER, calibration=calibration)
     group = fine[0].group
-    quick = NoiseGroup.of(group, solve(group, PAPER), PAPER).misses(policy)
-    whole = NoiseGroup.of(group, solve(group, policy), policy).misses(policy)
+    quick = NoiseGroup.of(group, solve_group(group, PAPER), PAPER).misses(policy)
+    whole = NoiseGroup.of(group, solve_group(group, policy), policy).misses(policy)
     for one, other in zip(quick, whole, strict=True):
         assert one.known == pytest.approx(other.known, rel=1e-6)
         assert abs(one.miss) == pytest.approx(abs(other.miss), rel=1e-6)

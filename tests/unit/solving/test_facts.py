@@ -19,10 +19,10 @@ from app.solving.facts import (
     LATER,
     NOTHING,
     STEP_PX,
-    Facts,
+    GroupFacts,
+    collect_facts_of_views,
     facts_from_bytes,
     facts_to_bytes,
-    group_facts,
     join_facts,
 )
 from tests.cameras import SIZE
@@ -33,7 +33,7 @@ BALL = (38.0, 2.0, -1.4)
 SEEDS = st.lists(st.integers(0, 10_000), min_size=1, max_size=6)
 
 
-def same(one: Facts, other: Facts) -> bool:
+def same(one: GroupFacts, other: GroupFacts) -> bool:
     return one.groups == other.groups and all(
         getattr(one, name).dtype == getattr(other, name).dtype == np.dtype(kind)
         and getattr(one, name).shape[1:] == shape
@@ -42,12 +42,12 @@ def same(one: Facts, other: Facts) -> bool:
     )
 
 
-def random_facts(seeds: list[int]) -> list[Facts]:
-    return [group_facts(*random_views(seed)) for seed in seeds]
+def random_facts(seeds: list[int]) -> list[GroupFacts]:
+    return [collect_facts_of_views(*random_views(seed)) for seed in seeds]
 
 
 class TestGroupFacts:
-    def facts(self) -> Facts:
+    def facts(self) -> GroupFacts:
         fits = (MarkingFit("a", "tp", (1.0, 3.0, 2.0)), MarkingFit("b", "fp"))
         spread = tuple(np.diag(np.arange(1.0, 9.0)).ravel().tolist())
         views = [given_view(key, camera, BALL) for key, camera in zip("abc", CAMERAS, strict=True)]
@@ -57,7 +57,7 @@ class TestGroupFacts:
             Calibration("given", BEHIND_GOAL),
             Calibration("lines", None, markings=fits[:1]),
         ]
-        return group_facts(views, calibrations)
+        return collect_facts_of_views(views, calibrations)
 
     def test_says_of_each_view_what_the_gates_read(self):
         facts = self.facts()
@@ -102,11 +102,11 @@ class TestGroupFacts:
     def test_an_inferred_ball_counts_as_no_ball(self):
         put = BallAnnotation(point=ImagePoint(9.0, 9.0), inferred=True)
         view = replace(given_view("a", MAIN, BALL), balls=(put,))
-        facts = group_facts([view], [Calibration("given", MAIN)])
+        facts = collect_facts_of_views([view], [Calibration("given", MAIN)])
         assert (facts.view_ball.tolist(), facts.view_ball_px.tolist()) == ([False], [0.0])
 
     def test_a_group_without_views_has_nothing(self):
-        assert same(group_facts([], []), replace(NOTHING, groups=1))
+        assert same(collect_facts_of_views([], []), replace(NOTHING, groups=1))
 
 
 class TestJoin:
@@ -150,7 +150,7 @@ CAMERAS = MAIN, BEHIND_GOAL, OPPOSITE
 
 class TestPart:
     def test_rows_of_a_column_are_those_of_all_of_it_read_before_or_not(self) -> None:
-        parts = [group_facts(*random_views(seed)) for seed in range(12)]
+        parts = [collect_facts_of_views(*random_views(seed)) for seed in range(12)]
         kept = np.arange(12) % 3 != 1
         part, whole = join_facts(parts).part(kept), join_facts(parts).only(kept)
         for name in ("view_covariance", "pair_moved", "pair_point", "view_known"):
@@ -177,7 +177,7 @@ class TestAgreement:
     def test_without_any_the_bytes_are_those_of_before_it_came(self) -> None:
         """Facts that were kept before have no such column, and decode."""
         views, calibrations = random_views(3)
-        bare = group_facts(views, [replace(item, paint=None) for item in calibrations])
+        bare = collect_facts_of_views(views, [replace(item, paint=None) for item in calibrations])
         assert np.isnan(bare.view_agreement).all() and len(bare.view_agreement)
         counts = [len(bare.view_group), len(bare.mark_view), len(bare.pair_group)]
         before = [getattr(bare, name).ravel() for name in COLUMNS if name not in LATER]
@@ -190,5 +190,5 @@ class TestAgreement:
     def test_comes_back_where_a_view_has_some(self) -> None:
         views, calibrations = random_views(3)
         painted = [replace(calibrations[0], paint=ONE), *calibrations[1:]]
-        found = facts_from_bytes([facts_to_bytes(group_facts(views, painted))])
+        found = facts_from_bytes([facts_to_bytes(collect_facts_of_views(views, painted))])
         assert found.view_agreement[0] == 0.9 * 0.8

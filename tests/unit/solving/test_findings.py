@@ -7,12 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.soccer.annotation import BallAnnotation
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
-from app.soccer.solution import Ball3D, BallFit, Calibration, ChiSquare, Pair, ViewSolution
+from app.soccer.solution import (
+    Ball3D,
+    BallFit,
+    Calibration,
+    ChiSquare,
+    TriangulatedPair,
+    ViewSolution,
+)
 from app.solving.contradiction import Contradiction
-from app.solving.findings import _BY_WEIGHT, _sides_swapped_finding, find_group_findings
+from app.solving.findings import _BY_WEIGHT, _make_sides_swapped_finding, find_group_findings
 from app.solving.sides import SwappedView
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
@@ -27,8 +34,8 @@ def made(keys: str):
     return group(*(given_view(key, CAMERAS[key], BALL) for key in keys))
 
 
-def pair(a: str, b: str, *errors: float, failed: str | None = None) -> Pair:
-    return Pair(a, b, BALL, errors, 40.0, 60.0, failed is None, failed)
+def pair(a: str, b: str, *errors: float, failed: str | None = None) -> TriangulatedPair:
+    return TriangulatedPair(a, b, BALL, errors, 40.0, 60.0, failed is None, failed)
 
 
 def solved(key: str, ratio: float | None = None, *, included: bool = True) -> ViewSolution:
@@ -79,7 +86,7 @@ class TestSeveralBalls:
         two = replace(of.views[1], balls=(*of.views[1].balls, BallAnnotation(box=Box(1, 2, 9, 9))))
         (item,) = found(of.with_view(two))
         assert (item.kind, item.view, item.number, item.threshold) == ("several_balls", "b", 2, 1)
-        assert item.fix == Fix("pick_ball", "b")
+        assert item.fix == SuggestedFix("pick_ball", "b")
 
     def test_a_ball_marked_out_of_view_is_no_second_ball(self) -> None:
         of = made("ab")
@@ -99,7 +106,7 @@ class TestViewDisagrees:
         (item,) = found(made("abc"), pairs=self.PAIRS, views=views)
         assert (item.kind, item.view, item.number) == ("view_disagrees", "c", 35.0)
         assert item.threshold == pytest.approx(TAU)
-        assert item.fix == Fix("exclude_view", "c")
+        assert item.fix == SuggestedFix("exclude_view", "c")
         here = "at best 35.0 px apart here and 20.0 px in B"
         assert f"{here}; at most {TAU:.1f} px is allowed" in item.sentence
 
@@ -139,7 +146,7 @@ class TestMissesBall:
         assert (
             f"61.1 px from the ball of this view; at most {TAU:.1f} px is allowed" in other.sentence
         )
-        assert other.fix == Fix("exclude_view", "c")
+        assert other.fix == SuggestedFix("exclude_view", "c")
 
     @pytest.mark.parametrize("error_px", [None, 0.0, TAU])
     def test_up_to_tau_nothing_is_said(self, error_px: float | None) -> None:
@@ -225,7 +232,7 @@ class TestViewsContradict:
         torn = Contradiction(self.THREE, "c", 0.97, 0.35, None)
         (item,) = found(made("abc"), torn=torn)
         assert (item.view, item.confidence) == ("c", 0.97)
-        assert item.fix == Fix("exclude_view", "c")
+        assert item.fix == SuggestedFix("exclude_view", "c")
         assert "at least 10 ms apart" in item.sentence
 
     def test_no_instant_is_named_where_no_ball_moves_as_far(self) -> None:
@@ -284,16 +291,16 @@ class TestOfTheBall:
 
 class TestSidesSwapped:
     def test_without_an_error_as_labelled_there_is_no_number(self) -> None:
-        finding = _sides_swapped_finding(SwappedView("7_1.png", None, 2.0, 1.0))
+        finding = _make_sides_swapped_finding(SwappedView("7_1.png", None, 2.0, 1.0))
         assert (finding.number, finding.threshold, finding.confidence) == (None, 2.0, 1.0)
         assert "within 2.0 px" in finding.sentence
 
     def test_the_error_as_labelled_is_the_number_of_the_finding(self) -> None:
-        assert _sides_swapped_finding(
+        assert _make_sides_swapped_finding(
             SwappedView("7_1.png", 80.0, 2.0, 0.9)
         ).number == pytest.approx(80.0)
 
     def test_a_main_camera_on_the_far_side_has_no_numbers_and_says_where_it_stands(self) -> None:
-        finding = _sides_swapped_finding(SwappedView("7.png", None, None, 0.9))
+        finding = _make_sides_swapped_finding(SwappedView("7.png", None, None, 0.9))
         assert (finding.number, finding.threshold) == (None, None)
         assert "far side" in finding.sentence

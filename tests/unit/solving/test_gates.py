@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from app.soccer.policy import PAPER, Policy
-from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, PaintFit, Pair
+from app.soccer.solution import (
+    GATES,
+    Ball3D,
+    Calibration,
+    ChiSquare,
+    Gate,
+    PaintFit,
+    TriangulatedPair,
+)
 from app.solving.gates import JudgedView, describe_gates, describe_odds
 from app.solving.judgement import Judgement
 from tests.cameras import looking
@@ -36,8 +44,8 @@ def given(letter: str) -> JudgedView:
     return seen(letter, None, calibration=Calibration("given", None))
 
 
-def pair(a: str, b: str, *errors: float, failed: str | None = None) -> Pair:
-    return Pair(a, b, (0.0, 0.0, 0.0), errors, 40.0, 20.0, failed is None, failed)  # type: ignore[arg-type]
+def pair(a: str, b: str, *errors: float, failed: str | None = None) -> TriangulatedPair:
+    return TriangulatedPair(a, b, (0.0, 0.0, 0.0), errors, 40.0, 20.0, failed is None, failed)  # type: ignore[arg-type]
 
 
 def gates(
@@ -45,7 +53,7 @@ def gates(
     failed: tuple[str, ...] = (),
     *,
     left_out: tuple[str, ...] = (),
-    pairs: tuple[Pair, ...] = (),
+    pairs: tuple[TriangulatedPair, ...] = (),
     ball: Ball3D | None = None,
     baseline: float = math.nan,
     policy: Policy = PAPER,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.facts import Facts, group_facts, join_facts
+from app.solving.facts import GroupFacts, collect_facts_of_views, join_facts
 from app.solving.judgement import (
     PASSES,
     Judgement,
@@ -26,14 +26,14 @@ from app.solving.judgement import (
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
-def judged(facts: Facts, policy: Policy = PAPER) -> Judgement:
+def judged(facts: GroupFacts, policy: Policy = PAPER) -> Judgement:
     return judge_groups(facts, policy, MeanCovariance(facts))
 
 
-def facts(views: int = 2, **changes: object) -> Facts:
+def facts(views: int = 2, **changes: object) -> GroupFacts:
     """A group whose views all see the ball, with a pair of the first two that is in good order."""
     pairs = 1 if views > 1 else 0
-    made = Facts(
+    made = GroupFacts(
         groups=1,
         view_group=np.zeros(views, np.int64),
         view_included=np.ones(views, bool),
@@ -66,7 +66,7 @@ def facts(views: int = 2, **changes: object) -> Facts:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
-def three(**changes: object) -> Facts:
+def three(**changes: object) -> GroupFacts:
     """Three views with a pair of each two, in good order."""
     pairs = {
         "pair_group": np.zeros(3, np.int64),
@@ -93,7 +93,7 @@ STRICTER: dict[str, Callable[[float | None], float]] = {
 """A stricter value of each threshold."""
 
 
-def _pairs_of_groups(facts: Facts, judgement: Judgement) -> np.ndarray:
+def _pairs_of_groups(facts: GroupFacts, judgement: Judgement) -> np.ndarray:
     """How many valid pairs each group has."""
     return np.bincount(facts.pair_group[judgement.valid], minlength=facts.groups)
 
@@ -107,7 +107,7 @@ class TestJudge:
     @settings(max_examples=40, deadline=None)
     def test_a_table_is_judged_as_each_of_its_groups_alone_bit_by_bit(self, seeds, seed):
         policy = random_policy(seed)
-        parts = [group_facts(*random_views(seed)) for seed in seeds]
+        parts = [collect_facts_of_views(*random_views(seed)) for seed in seeds]
         together, alone = (
             judged(join_facts(parts), policy),
             [judged(part, policy) for part in parts],
@@ -121,7 +121,7 @@ class TestJudge:
     @settings(max_examples=40, deadline=None)
     def test_where_only_the_first_gate_matters_the_first_is_the_same(self, seeds, seed):
         policy = random_policy(seed)
-        found = join_facts([group_facts(*random_views(seed)) for seed in seeds])
+        found = join_facts([collect_facts_of_views(*random_views(seed)) for seed in seeds])
         jac = compute_view_jac(found, policy.jac_gamma_percent)
         standing, uncertainty = find_first_failed_gates(found, jac, policy), MeanCovariance(found)
         told = judge_known_failures(found, policy, uncertainty, jac, standing, first_alone=True)
@@ -132,12 +132,12 @@ class TestJudge:
         sigma, compared = GATES.index("sigma"), 0
         for seed in range(200):
             views, calibrations = random_views(seed)
-            whole = group_facts(views, calibrations)
+            whole = collect_facts_of_views(views, calibrations)
             judgement = judged(whole, policy)
             counted = sorted(set(whole.pair_view[judgement.valid].ravel().tolist()))
             if not counted or len(counted) == len(views):
                 continue
-            rest = group_facts(
+            rest = collect_facts_of_views(
                 [views[place] for place in counted], [calibrations[place] for place in counted]
             )
             alone = judged(rest, policy)
@@ -147,7 +147,10 @@ class TestJudge:
 
     @pytest.mark.parametrize("threshold", STRICTER)
     def test_each_stricter_threshold_stops_some_and_lets_nothing_more_through(self, threshold):
-        whole, stopped = join_facts([group_facts(*random_views(seed)) for seed in range(150)]), 0
+        whole, stopped = (
+            join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(150)]),
+            0,
+        )
         for seed in range(12):
             policy = random_policy(seed)
             stricter = STRICTER[threshold](getattr(policy, threshold))
@@ -160,7 +163,7 @@ class TestJudge:
         assert stopped
 
     def test_random_groups_and_policies_reach_every_gate(self):
-        whole = join_facts([group_facts(*random_views(seed)) for seed in range(150)])
+        whole = join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(150)])
         first = np.concatenate([judged(whole, random_policy(seed)).first for seed in range(12)])
         assert set(first.tolist()) == set(range(PASSES + 1))
 

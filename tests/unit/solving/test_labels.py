@@ -13,12 +13,12 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.labels import (
     GAMMA_SHARE,
     MISFIT,
-    _markings_on_minority_half,
+    _find_markings_on_minority_half,
     _order_by_suspicion,
     _pitch_half,
     find_suspects,
 )
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, PITCH, click
@@ -28,7 +28,7 @@ GAMMA = GAMMA_SHARE * SIZE.diagonal
 
 
 def suspects(lines):
-    observations = observations_of_lines(make_lines(lines), PITCH, SIZE)
+    observations = make_observations(make_lines(lines), PITCH, SIZE)
     fit = PROBLEM.search(observations)
     return observations, fit, find_suspects(PROBLEM, observations, fit)
 
@@ -76,7 +76,7 @@ class TestFindSuspects:
 class TestOrder:
     @given(st.lists(st.sampled_from(MARKINGS), unique=True))
     def test_the_minority_lies_on_one_half_and_is_no_more_than_the_other(self, markings):
-        few = _markings_on_minority_half(markings)
+        few = _find_markings_on_minority_half(markings)
         halves = {_pitch_half(name) for name in few}
         assert len(halves) <= 1
         assert None not in halves
@@ -87,7 +87,7 @@ class TestOrder:
     def test_the_minority_is_tried_first_then_what_fits_worst(self, largest):
         order = _order_by_suspicion(largest)
         assert sorted(order) == sorted(largest)
-        few = _markings_on_minority_half(tuple(largest))
+        few = _find_markings_on_minority_half(tuple(largest))
         assert set(order[: len(few)]) == set(few)
         for part in (order[: len(few)], order[len(few) :]):
             errors = [largest[name] for name in part]

@@ -11,15 +11,15 @@ from app.solving.line_noise import (
     LinePrior,
     calibrated_log_sigma,
     collect_line_evidence,
+    compute_line_noise,
     estimate_line_noise,
+    fit_cost_minimum,
     interpolate_cost,
     jackknife_variance,
-    line_noise,
-    lowest_cost_vertex,
-    posterior_variance,
+    log_sigma_posterior_variance,
     sigma_prior_cost,
 )
-from app.solving.observations import weights_of_points
+from app.solving.observations import compute_point_weights
 
 MARKINGS, EACH, UNKNOWNS = 14, 6, 4
 NO_PRIOR = np.zeros(UNKNOWNS)
@@ -39,7 +39,7 @@ def fitted(share, sigma=1.0, seed=0):
 
 def noise_of(share, sigma=1.0, seed=0):
     jacobian, residuals, marking, off = fitted(share, sigma, seed)
-    return line_noise(residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.1)), off
+    return compute_line_noise(residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.1)), off
 
 
 def held(share):
@@ -107,7 +107,7 @@ class TestLineNoise:
         for seed in range(400):
             jacobian, residuals, marking, off = fitted(share, 0.5, seed)
             known = LinePrior(0.5, 0.05, share)
-            found = line_noise(residuals, jacobian, marking, NO_PRIOR, known).parameters
+            found = compute_line_noise(residuals, jacobian, marking, NO_PRIOR, known).parameters
             apart.append(off @ np.linalg.solve(found, off))
         assert 0.925 < np.mean(np.array(apart) < limit) < 0.975
         assert np.median(apart) == pytest.approx(half, rel=0.15)
@@ -127,12 +127,12 @@ class TestLineNoise:
 
     def test_a_perfect_fit_is_not_believed_beyond_the_floor(self):
         jacobian, residuals, marking, _ = fitted(0.0)
-        found = line_noise(0 * residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.5))
+        found = compute_line_noise(0 * residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.5))
         assert found.variance >= 0.25
 
     def test_markings_of_one_point_have_nothing_to_share(self):
         jacobian, residuals, _, _ = fitted(0.0)
-        found = line_noise(
+        found = compute_line_noise(
             residuals, jacobian, np.arange(len(residuals)), NO_PRIOR, LinePrior(1.0, 0.1)
         )
         plain = np.linalg.inv(jacobian.T @ jacobian) * (residuals**2).mean()
@@ -141,7 +141,7 @@ class TestLineNoise:
     def test_a_prior_stands_in_for_what_the_points_do_not_show(self):
         jacobian, residuals, marking, _ = fitted(0.0)
         blind = jacobian * [1, 1, 1, 0]
-        found = line_noise(
+        found = compute_line_noise(
             residuals, blind, marking, np.array([0, 0, 0, 25.0]), LinePrior(1.0, 0.1)
         )
         assert found.parameters[3, 3] == pytest.approx(0.04)
@@ -160,11 +160,13 @@ class TestWeights:
         jacobian = jacobian + 0.3 * rng.normal(size=jacobian.shape)
         shared = np.sqrt(self.SHARE) * rng.normal(size=len(self.SIZES))[marking]
         errors = shared + np.sqrt(1 - self.SHARE) * rng.normal(size=len(marking))
-        weights = weights_of_points(marking, share_of_fit)
+        weights = compute_point_weights(marking, share_of_fit)
         weighted = jacobian.T * weights
         off = np.linalg.solve(weighted @ jacobian, weighted @ errors)
         known = LinePrior(1.0, 0.1, self.SHARE)
-        noise = line_noise(errors - jacobian @ off, jacobian, marking, NO_PRIOR, known, weights)
+        noise = compute_line_noise(
+            errors - jacobian @ off, jacobian, marking, NO_PRIOR, known, weights
+        )
         return off, noise.parameters
 
     def errors_and_held(self, share_of_fit):
@@ -183,7 +185,7 @@ class TestWeights:
 @given(st.floats(-0.49, 0.49), st.floats(0.1, 9.0), st.floats(-5.0, 5.0))
 def test_the_lowest_point_of_a_parabola_is_found(off: float, bend: float, least: float) -> None:
     cost = least + bend * (np.arange(7) - 3 - off) ** 2
-    assert lowest_cost_vertex(cost, 3) == (
+    assert fit_cost_minimum(cost, 3) == (
         pytest.approx(off, abs=1e-9),
         pytest.approx(least, abs=1e-9),
     )
@@ -192,11 +194,11 @@ def test_the_lowest_point_of_a_parabola_is_found(off: float, bend: float, least:
 @pytest.mark.parametrize("at", [0, 3])
 def test_at_an_end_it_is_the_end(at: int) -> None:
     cost = np.arange(4.0) if at == 0 else np.arange(4.0)[::-1]
-    assert lowest_cost_vertex(cost, at) == (0.0, 0.0)
+    assert fit_cost_minimum(cost, at) == (0.0, 0.0)
 
 
 def test_a_flat_ground_has_no_lowest_point() -> None:
-    assert lowest_cost_vertex(np.full(3, 7.0), 1) == (0.0, 7.0)
+    assert fit_cost_minimum(np.full(3, 7.0), 1) == (0.0, 7.0)
 
 
 def test_the_jackknife_of_means_is_the_variance_of_their_mean() -> None:
@@ -221,8 +223,8 @@ def test_a_sigma_of_few_numbers_is_as_much_wider_as_fishers_quantile_is(numbers:
 
 
 def test_the_prior_counts_as_the_two_numbers_that_it_is_worth_and_a_scatter_as_it_is() -> None:
-    assert posterior_variance(0.0, 0, spread=0.5) == pytest.approx(0.25)
-    assert posterior_variance(0.0, 50) == pytest.approx(1 / 101)
-    assert posterior_variance(0.3, 50) == 0.3
+    assert log_sigma_posterior_variance(0.0, 0, spread=0.5) == pytest.approx(0.25)
+    assert log_sigma_posterior_variance(0.0, 50) == pytest.approx(1 / 101)
+    assert log_sigma_posterior_variance(0.3, 50) == 0.3
     cost = sigma_prior_cost(np.log([1.0, 2.0, 4.0]), expected=2.0, spread=np.log(2))
     assert cost == pytest.approx([0.5, 0.0, 0.5])

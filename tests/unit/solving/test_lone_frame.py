@@ -16,11 +16,11 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
 from app.solving.calibrate import (
+    add_lone_frame_covariance,
     analyse_lone_frame,
     calibrate,
     calibrate_view,
     compute_view_keys,
-    with_lone_covariance,
 )
 from app.solving.calibration_findings import find_pitch_findings_of_lone_frame
 from app.solving.lone_frame import PRIORS, LoneFrame
@@ -58,7 +58,7 @@ class TestLoneFrame:
 
     def test_lines_that_tell_the_pitch_are_heard(self) -> None:
         _, _, lone = alone(click(WIDE, 1.0, 3, Pitch(100.0, 66.0)))
-        found = lone.other_pitch(PITCH)
+        found = lone.clearly_different_pitch(PITCH)
         assert found is not None
         assert (found.length, found.width) == pytest.approx((100.0, 66.0), abs=1.0)
         assert (lone.sizes_sigma < 1.0).all()
@@ -66,7 +66,7 @@ class TestLoneFrame:
     def test_on_the_pitch_in_use_no_other_is_told(self) -> None:
         for seed in range(5):
             _, _, lone = alone(click(WIDE, 1.0, seed))
-            assert lone.other_pitch(PITCH) is None
+            assert lone.clearly_different_pitch(PITCH) is None
             assert (np.abs([lone.pitch.length - 105, lone.pitch.width - 68]) < 1.5).all()
 
     def test_an_end_alone_leaves_the_length_open(self) -> None:
@@ -86,7 +86,7 @@ class TestLoneFrame:
 
     @pytest.mark.parametrize("aspect", [4 / 3, 3 / 4])
     def test_in_a_stretched_picture_the_truth_is_within_reach(self, aspect: float) -> None:
-        squeezed = PictureGeometry(aspect).camera_of_shown_picture(WIDE, SIZE)
+        squeezed = PictureGeometry(aspect).camera_of_annotated_picture(WIDE, SIZE)
         told = [alone(click(squeezed, 1.0, seed)) for seed in range(10)]
         assert sum(off_by(camera, WIDE, clicked) < INSIDE for camera, clicked, _ in told) == 0
         assert sum(off_by(camera, WIDE, lone.covariance) < INSIDE for camera, _, lone in told) >= 8
@@ -108,13 +108,13 @@ class TestLoneFrame:
         lines = click(WIDE, 1.0)
         found = calibrate(lines, PITCH, SIZE, PAPER.calibration)
         assert analyse_lone_frame(found, lines, PITCH, SIZE, PAPER.calibration) is None
-        assert with_lone_covariance(found, None) is found
+        assert add_lone_frame_covariance(found, None) is found
         assert PAPER.calibration.lone_frames == STRICT.calibration.lone_frames == "exact"
 
     def test_the_camera_itself_stays(self) -> None:
         lines = click(WIDE, 1.0, 3, Pitch(98.0, 64.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
-        told = with_lone_covariance(found, analyse_lone_frame(found, lines, PITCH, SIZE, ANY))
+        told = add_lone_frame_covariance(found, analyse_lone_frame(found, lines, PITCH, SIZE, ANY))
         assert told == replace(found, covariance=told.covariance)
         assert told.covariance != found.covariance
 

@@ -10,8 +10,8 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import (
     PictureEstimate,
     PictureFrame,
-    choose_frames,
     estimate_match_picture,
+    select_informative_frames,
 )
 from app.solving.picture_camera import picture_to_warp
 from tests.cameras import SIZE, looking
@@ -27,7 +27,7 @@ def frames(picture, count=6, noise_px=0.8):
         for index in range(count)
     ]
     return [
-        PictureFrame(click(picture.camera_of_shown_picture(camera, SIZE), noise_px, seed), SIZE)
+        PictureFrame(click(picture.camera_of_annotated_picture(camera, SIZE), noise_px, seed), SIZE)
         for seed, camera in enumerate(cameras)
     ]
 
@@ -81,6 +81,6 @@ class TestChooseFrames:
         monkeypatch.setattr("app.solving.match_picture.MAX_FRAMES", 3)
         many = frames(WIDE, 4)
         poor = PictureFrame(make_lines(dict(list(many[0].lines.items())[:3])), SIZE)
-        chosen = choose_frames([poor, *many])
+        chosen = select_informative_frames([poor, *many])
         assert len(chosen) == 3 and chosen == sorted(chosen)
         assert 0 not in chosen

@@ -5,15 +5,15 @@ import pytest
 
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import calibrate, calibrate_near
-from app.solving.camera_positions import PositionPrior, position_prior_of_match
+from app.solving.calibrate import calibrate, calibrate_near_position
+from app.solving.camera_positions import PositionPrior, make_match_position_prior
 from app.solving.match_position import (
     NO_PLACES,
     FramePlace,
     FramePlaces,
+    calibrate_with_match_position,
     find_camera_place,
     guess_matches,
-    share_position,
 )
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, PITCH, click
@@ -128,7 +128,7 @@ class TestSharePosition:
         for seed in range(6):
             lines = few(seed)
             found = calibrate(lines, PITCH, SIZE, POLICY)
-            both = share_position(found, match, lines, PITCH, SIZE, POLICY)
+            both = calibrate_with_match_position(found, match, lines, PITCH, SIZE, POLICY)
             alone.append(np.linalg.norm(found.camera.position - STAND))
             shared.append(np.linalg.norm(both.camera.position - STAND))
         assert np.mean(shared) < 0.5 * np.mean(alone)
@@ -140,9 +140,9 @@ class TestSharePosition:
         apart = []
         for prior in (
             PositionPrior(near, np.full(3, 0.2), 4.0),
-            position_prior_of_match(near, np.full(3, 0.2)),
+            make_match_position_prior(near, np.full(3, 0.2)),
         ):
-            found = calibrate_near(alone, prior, lines, PITCH, SIZE, POLICY)
+            found = calibrate_near_position(alone, prior, lines, PITCH, SIZE, POLICY)
             apart.append(np.linalg.norm(found.camera.position - near))
         assert apart[1] < 0.9 * apart[0]
 
@@ -150,23 +150,23 @@ class TestSharePosition:
         wrong = others(np.array([-2.0, 85.0, -21.0]))
         lines = frame(38.0, 1300.0)
         alone = calibrate(lines, PITCH, SIZE, POLICY)
-        found = share_position(alone, wrong, lines, PITCH, SIZE, POLICY)
+        found = calibrate_with_match_position(alone, wrong, lines, PITCH, SIZE, POLICY)
         assert found.camera.position == pytest.approx(alone.camera.position, abs=0.2)
 
     def test_a_prior_that_does_not_give_way_is_dropped_where_the_lines_contradict_it(self):
         lines = frame(38.0, 1300.0)
         alone = calibrate(lines, PITCH, SIZE, POLICY)
         stiff = PositionPrior(off(0.0, 25.0, -7.0), np.full(3, 0.1), 1e9)
-        assert calibrate_near(alone, stiff, lines, PITCH, SIZE, POLICY) is alone
+        assert calibrate_near_position(alone, stiff, lines, PITCH, SIZE, POLICY) is alone
 
     def test_a_replay_is_left_alone(self, match):
         lines = click(BEHIND_GOAL, 1.0)
         alone = calibrate(lines, PITCH, SIZE, POLICY)
-        assert share_position(alone, match, lines, PITCH, SIZE, POLICY) is alone
+        assert calibrate_with_match_position(alone, match, lines, PITCH, SIZE, POLICY) is alone
 
     def test_without_others_nothing_changes(self):
         alone = calibrate(few(0), PITCH, SIZE, POLICY)
-        assert share_position(alone, NO_PLACES, few(0), PITCH, SIZE, POLICY) is alone
+        assert calibrate_with_match_position(alone, NO_PLACES, few(0), PITCH, SIZE, POLICY) is alone
 
 
 NEAR_STAND = np.array([0.3, 60.0, -14.0])

@@ -12,7 +12,7 @@ from app.features.groups.solution_schemas import camera_sigma
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.polyline import clip_polyline
 from app.soccer.annotation import make_lines
-from app.soccer.finding import Fix
+from app.soccer.finding import SuggestedFix
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
@@ -20,8 +20,8 @@ from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.solving.calibrate import calibrate_view, compute_paint_search_key, compute_view_key
-from app.solving.paint_camera import step_to_paint
-from app.solving.solve import solve
+from app.solving.paint_camera import write_paint_step
+from app.solving.solve import solve_group
 from tests.balls import box_around
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, click
@@ -239,7 +239,7 @@ class TestKey:
 
 
 def kinds(group: Group, policy=TOUCHLINE):
-    said = solve(group, policy).findings
+    said = solve_group(group, policy).findings
     return {item.view: item for item in said if item.kind in ("no_paint", "paint_disagrees")}
 
 
@@ -251,19 +251,19 @@ class TestFindings:
         assert kinds(read(clicked())) == {}
         assert kinds(clicked()) == {}
         lines = replace(TOUCHLINE, calibration=PAPER.calibration)
-        assert solve(clicked(), TOUCHLINE).findings == solve(clicked(), lines).findings
+        assert solve_group(clicked(), TOUCHLINE).findings == solve_group(clicked(), lines).findings
 
     def test_lines_that_changed_since_ask_for_another_reading(self):
         group = read(clicked(), sought_for="another")
         found = kinds(group)["a"]
         assert "changed since its paint was read" in found.sentence
-        assert found.fix == Fix("read_paint", "a")
+        assert found.fix == SuggestedFix("read_paint", "a")
 
     @pytest.mark.parametrize(
         ("reason", "kind", "words", "fix"),
         [
             ("no_paint", "no_paint", "Too little paint", None),
-            ("no_frame", "no_paint", "missing", Fix("read_paint", "a")),
+            ("no_frame", "no_paint", "missing", SuggestedFix("read_paint", "a")),
             ("paint_disagrees", "paint_disagrees", "does not lie where", None),
         ],
     )
@@ -277,18 +277,18 @@ class TestFindings:
 class TestSolve:
     def test_a_known_calibration_of_clicks_or_paint_changes_no_bit(self):
         group = read(clicked())
-        whole = solve(group, TOUCHLINE)
+        whole = solve_group(group, TOUCHLINE)
         known = {
             view.calibration_key: view.calibration
             for policy in (replace(TOUCHLINE, calibration=CLICKS), TOUCHLINE)
-            for view in solve(group, policy).views
+            for view in solve_group(group, policy).views
         }
         assert len(known) == 3
-        assert solve(group, TOUCHLINE, known) == whole
+        assert solve_group(group, TOUCHLINE, known) == whole
 
     def test_the_ball_is_where_it_is_more_exactly(self):
         group = read(clicked())
-        before, after = solve(group, PAPER).ball, solve(group, TOUCHLINE).ball
+        before, after = solve_group(group, PAPER).ball, solve_group(group, TOUCHLINE).ball
         assert after.sigma_m < before.sigma_m
 
 
@@ -322,7 +322,7 @@ def problem(seed=5):
 
 def step_of(parts, strict):
     moved = np.empty(8)
-    step_to_paint(*parts, ROUNDS, DAMPING, strict, SOFT_PX, SIGMAS, STRICT_PX, moved)
+    write_paint_step(*parts, ROUNDS, DAMPING, strict, SOFT_PX, SIGMAS, STRICT_PX, moved)
     return moved
 
 

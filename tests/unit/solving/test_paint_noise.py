@@ -16,7 +16,7 @@ from app.solving.lone_frame import (
     LINE_SIGMA_M,
     PAINT_SIZE_SIGMA_M,
 )
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import painted_terms, size_terms
 from app.solving.resect import ResectionProblem
@@ -31,10 +31,10 @@ TRUE = PROBLEM.resection.parameters(MAIN)
 def seen_by(camera, pitch=PITCH):
     """Places on the grass markings of a pitch, and how they lie beside those of the plan."""
     grass = {name: at for name, at in click(camera, pitch=pitch).items() if name[:4] != "Goal"}
-    observed = observations_of_lines(grass, pitch, SIZE)
+    observed = make_observations(grass, pitch, SIZE)
     curve_points = CurvePoints(observed.pixels, observed.marking, np.ones(len(observed.pixels)))
     seen = measure_offsets(PROBLEM, TRUE, curve_points, np.full(len(observed.pixels), 0.1), PITCH)
-    places = MAIN.on_ground(observed.pixels + np.array(MAIN.principal_point))
+    places = MAIN.project_to_ground(observed.pixels + np.array(MAIN.principal_point))
     return seen, places
 
 

@@ -14,7 +14,7 @@ from app.solving.calibrate import (
     calibrate_station,
     compute_calibration_key,
 )
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.picture_camera import PictureProblem, estimate_picture, picture_to_warp
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
@@ -27,12 +27,12 @@ BOTH = PictureGeometry(1.1, (-0.2, 0.1))
 
 
 def shown(picture, camera=BEHIND_GOAL, noise_px=0.0, seed=0):
-    return click(picture.camera_of_shown_picture(camera, SIZE), noise_px, seed)
+    return click(picture.camera_of_annotated_picture(camera, SIZE), noise_px, seed)
 
 
 def fitted(picture, lines):
     problem = ResectionProblem.of(SIZE, POLICY)
-    return PictureProblem.of(problem, observations_of_lines(lines, PITCH, SIZE), picture)
+    return PictureProblem.of(problem, make_observations(lines, PITCH, SIZE), picture)
 
 
 class TestRows:
@@ -62,7 +62,7 @@ class TestEstimatePicture:
     def test_the_lines_of_one_view_say_what_was_done(self, truth):
         problem = ResectionProblem.of(SIZE, POLICY)
         found = estimate_picture(
-            problem, observations_of_lines(shown(truth, noise_px=0.3), PITCH, SIZE), OPEN
+            problem, make_observations(shown(truth, noise_px=0.3), PITCH, SIZE), OPEN
         )
         off = np.abs(picture_to_warp(found) - picture_to_warp(truth))
         assert (off < 4 * np.array(found.sigma)).all()
@@ -72,8 +72,7 @@ class TestEstimatePicture:
         problem = ResectionProblem.of(SIZE, POLICY)
         known = replace(STRETCHED, sigma=(0.004, 0.02, 0.02))
         assert (
-            estimate_picture(problem, observations_of_lines(shown(BOTH), PITCH, SIZE), known)
-            is known
+            estimate_picture(problem, make_observations(shown(BOTH), PITCH, SIZE), known) is known
         )
 
 

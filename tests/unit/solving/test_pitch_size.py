@@ -11,11 +11,11 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import (
     PitchEstimate,
     PitchFrame,
-    choose_frames,
     eliminate_camera,
     eliminate_own_numbers,
     estimate_pitch,
     estimate_sigmas_of_shared_numbers,
+    select_informative_frames,
 )
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
@@ -129,7 +129,7 @@ class TestChooseFrames:
         narrow = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0)
         telling = frames(Pitch(), 4, noise_px=0.0)
         many = [PitchFrame(click(narrow), SIZE)] * 6 + telling
-        chosen = choose_frames(many)
+        chosen = select_informative_frames(many)
         assert len(chosen) == 4 and np.isin(chosen, [6, 7, 8, 9]).sum() >= 3
 
 

@@ -4,7 +4,7 @@ import pytest
 from app.geometry.resection import X, Z
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import observations_of_lines
+from app.solving.observations import make_observations
 from app.solving.resect import POOR_PX, QUICK, THOROUGH, ResectionProblem
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, OPPOSITE, PITCH, click
@@ -30,15 +30,15 @@ class TestResect:
 
         monkeypatch.setattr(ResectionProblem, "_search_all_stages", note)
         few = make_lines({name: lines[name] for name in FEW[:3]} | {FEW[3]: lines[FEW[3]][:2]})
-        PROBLEM.resect(observations_of_lines(few, PITCH, SIZE))
-        PROBLEM.resect(observations_of_lines(lines, PITCH, SIZE))
+        PROBLEM.resect(make_observations(few, PITCH, SIZE))
+        PROBLEM.resect(make_observations(lines, PITCH, SIZE))
         assert plans == [THOROUGH, QUICK]
 
     def test_a_poor_fit_is_never_worse_than_the_thorough_search_finds(self):
         camera = looking((0.5, 70.0, -14.0), (34.0, -4.0, 0.0), 2400.0, bend=BEND)
         lines = dict(click(camera, 0.5))
         lines["Side line left"] = lines.pop("Side line right")
-        observations = observations_of_lines(make_lines(lines), PITCH, SIZE)
+        observations = make_observations(make_lines(lines), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         assert PROBLEM.distances(fit.parameters, observations).max() > POOR_PX * PROBLEM.unit
         assert fit.cost <= PROBLEM._search_all_stages(observations, THOROUGH).cost
@@ -47,13 +47,13 @@ class TestResect:
 class TestRefineMain:
     @pytest.mark.parametrize("camera", [BEHIND_GOAL, OPPOSITE], ids=["behind goal", "opposite"])
     def test_a_replay_is_left_alone(self, camera):
-        observations = observations_of_lines(click(camera, 1.0), PITCH, SIZE)
+        observations = make_observations(click(camera, 1.0), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         assert PROBLEM.refine_with_main_prior(fit, observations) is fit
 
     def test_a_camera_that_its_lines_determine_hardly_moves_even_in_an_unusual_stadium(self):
         unusual = looking((9.0, 95.0, -27.0), (34.0, -4.0, 0.0), 3200.0, bend=BEND)
-        observations = observations_of_lines(click(unusual, 0.5, seed=2), PITCH, SIZE)
+        observations = make_observations(click(unusual, 0.5, seed=2), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         refined = PROBLEM.refine_with_main_prior(fit, observations)
         spread = PROBLEM.line_noise(fit.parameters, observations).parameters
@@ -66,7 +66,7 @@ class TestRefineMain:
         before, after = [], []
         for seed in range(20):
             clicks = click(usual, 1.5, seed)
-            observations = observations_of_lines(
+            observations = make_observations(
                 make_lines({name: clicks[name] for name in FEW}), PITCH, SIZE
             )
             fit = PROBLEM.resect(observations)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.geometry.bundle import ray_gaps
+from app.geometry.bundle import ray_pair_distances_px
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera, projection_jacobians
 from app.soccer.frames import ImagePoint
@@ -22,7 +22,9 @@ def rig_of(seed: int = 0, **of_cameras):
 
 
 def gaps(rig, parameters) -> float:
-    return float(np.median(ray_gaps(parameters, rig.rays.of_cameras(0, 1)[0])[0]))
+    return float(
+        np.median(ray_pair_distances_px(parameters, rig.rays.select_common_points(0, 1)[0])[0])
+    )
 
 
 def off_px(rig, parameters) -> list[float]:

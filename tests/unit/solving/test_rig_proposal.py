@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.bundle import best_points, linearize, ray_gaps
+from app.geometry.bundle import linearize, optimize_points, ray_pair_distances_px
 from app.geometry.resection import parameters_from_camera
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
@@ -99,7 +99,7 @@ def gaps_of(seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     given = {key: off(camera, rng.normal(size=8) * ERRORS) for key, camera in TRUTH.items()}
     rig, _ = make_rig(cameras(lines=False, given=given), frames(120), Pitch(), PAPER)
-    balls = best_points(TRUE, rig.rays, np.inf)
+    balls = optimize_points(TRUE, rig.rays, np.inf)
     covariances = np.array(
         [
             compute_error_covariance(
@@ -108,9 +108,9 @@ def gaps_of(seed: int) -> np.ndarray:
             for row, camera in enumerate(rig.cameras)
         ]
     )
-    rays, _ = rig.rays.of_cameras(0, 1)
-    _, signed, free = ray_gaps(rig.start, rays)
-    at = linearize(rig.start, best_points(rig.start, rays, np.inf), rays)
+    rays, _ = rig.rays.select_common_points(0, 1)
+    _, signed, free = ray_pair_distances_px(rig.start, rays)
+    at = linearize(rig.start, optimize_points(rig.start, rays, np.inf), rays)
     order = np.argsort(rays.point, kind="stable").reshape(-1, 2)
     slopes = np.einsum("nsi,nsia->nsa", free.reshape(-1, 2, 2), at.by_camera[order])
     carried = np.einsum("nsa,nsab,nsb->n", slopes, covariances[rays.camera[order]], slopes)
@@ -124,7 +124,7 @@ def rig():
 
 class TestErrorCovariance:
     def test_moves_balls_in_the_mean_square_as_far_as_the_error_does(self, rig):
-        camera, balls = rig.cameras[0], best_points(TRUE, rig.rays, np.inf)
+        camera, balls = rig.cameras[0], optimize_points(TRUE, rig.rays, np.inf)
         covariance = compute_error_covariance(camera, TRUE[0], balls)
         moved = camera.camera.project(balls) - TRUTH["cam1"].project(balls)
         rng = np.random.default_rng(5)
@@ -137,7 +137,7 @@ class TestErrorCovariance:
 
     def test_any_error_is_possible(self, rig):
         covariance = compute_error_covariance(
-            rig.cameras[0], TRUE[0], best_points(TRUE, rig.rays, np.inf)
+            rig.cameras[0], TRUE[0], optimize_points(TRUE, rig.rays, np.inf)
         )
         lengths = np.sqrt(np.diag(covariance))
         assert np.linalg.eigvalsh(covariance / np.outer(lengths, lengths))[0] > 1e-6
@@ -151,5 +151,5 @@ class TestErrorCovariance:
         camera = replace(rig.cameras[0], camera=rig.cameras[0].with_parameters(TRUE[0]))
         own = camera.parameters
         assert (
-            compute_error_covariance(camera, own, best_points(TRUE, rig.rays, np.inf)) == 0
+            compute_error_covariance(camera, own, optimize_points(TRUE, rig.rays, np.inf)) == 0
         ).all()

@@ -11,7 +11,7 @@ from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.sides import SwappedView, find_swaps, turn_camera
+from app.solving.sides import SwappedView, find_swapped_views, turn_camera
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
@@ -35,7 +35,7 @@ TURNED = sight("b", BEHIND_GOAL, labelled=turn_camera(BEHIND_GOAL))
 def swaps(
     *sights: BallObservation, first: BallObservation | None = A, **changes: float
 ) -> tuple[SwappedView, ...]:
-    return find_swaps(first, sights, PITCH, replace(PAPER, **changes))
+    return find_swapped_views(first, sights, PITCH, replace(PAPER, **changes))
 
 
 class TestTurnedCamera:
@@ -78,16 +78,16 @@ class TestFindSwaps:
         assert swaps(A, TURNED, C, min_baseline_m=1000.0) == ()
 
     def test_a_view_whose_lines_fit_badly_is_still_told_that_it_is_turned(self):
-        (found,) = find_swaps(A, (A, C), PITCH, PAPER, doubtful=(TURNED,))
+        (found,) = find_swapped_views(A, (A, C), PITCH, PAPER, doubtful=(TURNED,))
         assert (found.view, found.turned_error_px) == ("b", pytest.approx(0.0, abs=1e-3))
-        (alone,) = find_swaps(A, (A,), PITCH, PAPER, doubtful=(TURNED,))
+        (alone,) = find_swapped_views(A, (A,), PITCH, PAPER, doubtful=(TURNED,))
         assert alone.view == "b"
 
     def test_a_view_whose_lines_fit_badly_says_nothing_of_others(self):
-        assert find_swaps(A, (A,), PITCH, PAPER, doubtful=(B, C)) == ()
-        assert find_swaps(None, (TURNED,), PITCH, PAPER, doubtful=()) == ()
+        assert find_swapped_views(A, (A,), PITCH, PAPER, doubtful=(B, C)) == ()
+        assert find_swapped_views(None, (TURNED,), PITCH, PAPER, doubtful=()) == ()
         wrong = sight("c", OPPOSITE, labelled=turn_camera(OPPOSITE))
-        named = find_swaps(A, (A, B), PITCH, PAPER, doubtful=(wrong,))
+        named = find_swapped_views(A, (A, B), PITCH, PAPER, doubtful=(wrong,))
         assert [swap.view for swap in named] == ["c"]
 
     def test_a_main_camera_on_the_far_side_is_the_one_to_turn(self):

@@ -10,10 +10,10 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Station, View
 from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import PAPER, STRICT
-from app.soccer.solution import Calibration, MarkingFit, Suspect
+from app.soccer.solution import Calibration, MarkingFit, SuspectLabel
 from app.solving.calibrate import calibrate_station
 from app.solving.calibration_findings import find_calibration_findings
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.balls import BALL_M
 from tests.cameras import SIZE, looking, wide
 from tests.unit.solving.conftest import (
@@ -54,7 +54,7 @@ class TestPoint:
         views = [given_view(key, camera, BALL) for key, camera in cameras]
         views[1] = shifted(views[1], 2.0, 3.0)
         mean, best = (
-            solve(group(*views), replace(PAPER, point=point)) for point in ("mean", "best")
+            solve_group(group(*views), replace(PAPER, point=point)) for point in ("mean", "best")
         )
         assert (mean.point, mean.mean_ball, best.point) == ("mean", None, "best")
         assert best.mean_ball == mean.ball
@@ -82,7 +82,7 @@ class TestWideLenses:
             box = Box(left, top, right - left, bottom - top)
             station = Station(key, SIZE, given=camera)
             views.append(View(key, station, (BallAnnotation(box=box),)))
-        return solve(group(*views), PAPER)
+        return solve_group(group(*views), PAPER)
 
     def test_the_ball_is_where_it_is(self, solved):
         assert solved.passes
@@ -115,36 +115,38 @@ class TestWideLenses:
         }
         views = [given_view(key, camera, BALL) for key, camera in self.CAMERAS.items()]
         wrong = [replace(one, station=replace(one.station, given=bare[one.key])) for one in views]
-        found = solve(group(*wrong), PAPER)
+        found = solve_group(group(*wrong), PAPER)
         assert np.linalg.norm(np.array(found.ball.point) - BALL) > 1.0
 
 
 class TestSolve:
     def test_exact_annotations_give_the_exact_ball(self, clean):
-        solution = solve(clean, PAPER)
+        solution = solve_group(clean, PAPER)
         assert solution.passes
         assert np.allclose(solution.ball.point, BALL, atol=0.02)
         assert solution.first_failing is None
 
     def test_every_calibrated_pair_is_kept(self, clean):
-        pairs = {(pair.a, pair.b) for pair in solve(clean, PAPER).pairs}
+        pairs = {(pair.a, pair.b) for pair in solve_group(clean, PAPER).pairs}
         assert pairs == {("7.png", "7_1.png"), ("7.png", "7_2.png"), ("7_1.png", "7_2.png")}
 
     def test_known_calibrations_change_no_bit(self, clean):
-        cold = solve(clean, PAPER)
+        cold = solve_group(clean, PAPER)
         known = {item.calibration_key: item.calibration for item in cold.views}
-        assert solve(clean, PAPER, known) == cold
+        assert solve_group(clean, PAPER, known) == cold
 
     def test_known_calibrations_are_not_computed_again(self, clean):
-        cold = solve(clean, PAPER)
+        cold = solve_group(clean, PAPER)
         marked = {
             item.calibration_key: replace(item.calibration, reason="kept") for item in cold.views
         }
-        assert all(item.calibration.reason == "kept" for item in solve(clean, PAPER, marked).views)
+        assert all(
+            item.calibration.reason == "kept" for item in solve_group(clean, PAPER, marked).views
+        )
 
     def test_the_mean_is_over_valid_pairs_only(self):
         wrong = shifted(given_view("c", OPPOSITE, BALL), 0.0, 60.0)
-        solution = solve(
+        solution = solve_group(
             group(given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL), wrong), PAPER
         )
         assert solution.ball.views == ("a", "b")
@@ -156,7 +158,7 @@ class TestSolve:
         center = clean.views[0].balls[0].box.center
         loose = replace(loose, x=center.x - 20.0, y=center.y - 18.0)
         changed = clean.with_view(replace(clean.views[0], balls=(BallAnnotation(box=loose),)))
-        fit = solve(changed, PAPER).view("7.png").ball
+        fit = solve_group(changed, PAPER).view("7.png").ball
         depth = MAIN.pitch_to_camera(np.array([BALL]))[0, 2]
         assert fit.optimized_diameter_px == pytest.approx(BALL_M * 2200.0 / depth, rel=0.03)
         assert fit.size_ratio == pytest.approx(38.0 / fit.optimized_diameter_px)
@@ -164,7 +166,7 @@ class TestSolve:
 
     def test_a_view_that_a_person_left_out_takes_no_part(self, clean):
         without = clean.with_view(replace(clean.views[1], included=False))
-        solution = solve(without, PAPER)
+        solution = solve_group(without, PAPER)
         assert {pair.a for pair in solution.pairs} | {pair.b for pair in solution.pairs} == {
             "7.png",
             "7_2.png",
@@ -172,7 +174,7 @@ class TestSolve:
         assert solution.view("7_1.png").failed == "excluded"
 
     def test_one_view_alone_puts_the_ball_where_its_box_says(self, clean):
-        fit = solve(clean, PAPER).view("7_2.png").ball
+        fit = solve_group(clean, PAPER).view("7_2.png").ball
         # A box of the true size: the rest is the distortion of the ball's own picture.
         assert fit.monocular_error_m < 0.05 * fit.depth_m
         assert np.linalg.norm(np.array(fit.monocular) - BALL) == pytest.approx(
@@ -182,7 +184,7 @@ class TestSolve:
     def test_points_without_a_box_are_enough(self):
         views = [given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)]
         points = [replace(one, balls=(BallAnnotation(point=one.balls[0].center),)) for one in views]
-        solution = solve(group(*points), PAPER)
+        solution = solve_group(group(*points), PAPER)
         assert solution.passes
         assert solution.views[0].ball.size_ratio is None
         assert solution.views[0].ball.monocular is None
@@ -191,7 +193,7 @@ class TestSolve:
 
 class TestGates:
     def first(self, *views, policy=PAPER):
-        gate = solve(group(*views), policy).first_failing
+        gate = solve_group(group(*views), policy).first_failing
         return (gate.name, gate.view) if gate else None
 
     def test_a_group_short_of_views_names_the_view_without_a_camera(self, clean):
@@ -226,7 +228,7 @@ class TestGates:
     @pytest.mark.parametrize("make", [view, given_view], ids=["from lines", "given"])
     @pytest.mark.parametrize("other", [BALL, (30.0, 2.0, -1.4)], ids=["one ball", "two balls"])
     def test_a_picture_that_is_there_twice_has_no_baseline(self, make, other):
-        found = solve(group(make("7.png", MAIN, BALL), make("7_1.png", MAIN, other)), PAPER)
+        found = solve_group(group(make("7.png", MAIN, BALL), make("7_1.png", MAIN, other)), PAPER)
         assert found.first_failing.name == "baseline"
         assert (found.first_failing.value, found.first_failing.sentence) == (
             0.0,
@@ -240,7 +242,7 @@ class TestGates:
     def test_an_error_just_below_tau_passes_and_one_above_does_not(self):
         a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
         errors = [
-            max(solve(group(a, shifted(b, 0.0, dy)), PAPER).pairs[0].errors_px)
+            max(solve_group(group(a, shifted(b, 0.0, dy)), PAPER).pairs[0].errors_px)
             for dy in (10.0, 40.0)
         ]
         assert errors[0] < TAU < errors[1]
@@ -255,7 +257,7 @@ class TestGates:
 
     def test_a_given_camera_without_lines_is_not_measured(self):
         views = given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)
-        gate = solve(group(*views), PAPER).gates[1]
+        gate = solve_group(group(*views), PAPER).gates[1]
         assert (gate.passed, gate.value, gate.sentence) == (
             True,
             None,
@@ -264,19 +266,19 @@ class TestGates:
 
     def test_nine_of_twelve_is_not_above_three_quarters(self, clean):
         exactly = replace(PAPER, min_jac=1.0)
-        assert solve(clean, exactly).first_failing.name == "jac"
+        assert solve_group(clean, exactly).first_failing.name == "jac"
 
 
 class TestFindings:
     def kinds(self, *views, policy=PAPER):
-        return [item.kind for item in solve(group(*views), policy).findings]
+        return [item.kind for item in solve_group(group(*views), policy).findings]
 
     def test_a_clean_group_has_none(self, clean):
         assert self.kinds(*clean.views) == []
 
     def test_a_view_in_no_valid_pair_disagrees(self):
         wrong = shifted(given_view("c", OPPOSITE, BALL), 0.0, 60.0)
-        found = solve(
+        found = solve_group(
             group(given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL), wrong), PAPER
         ).findings
         assert [(item.kind, item.view, item.fix.action) for item in found] == [
@@ -288,7 +290,9 @@ class TestFindings:
         twice = replace(clean.views[0], balls=clean.views[0].balls * 2)
         assert "several_balls" in self.kinds(twice, *clean.views[1:])
         ball = next(
-            one for one in solve(group(twice, *clean.views[1:]), PAPER).gates if one.name == "ball"
+            one
+            for one in solve_group(group(twice, *clean.views[1:]), PAPER).gates
+            if one.name == "ball"
         )
         assert ball.sentence.endswith("several in A")
 
@@ -309,7 +313,9 @@ class TestFindings:
     def test_an_implausible_ball_is_said_with_its_number(self, place, words):
         wide = looking((3.0, 80.0, -20.0), (38.0, 0.0, -10.0), 700.0)
         side = looking((90.0, 20.0, -20.0), (38.0, 0.0, -10.0), 500.0)
-        found = solve(group(given_view("a", wide, place), given_view("b", side, place)), PAPER)
+        found = solve_group(
+            group(given_view("a", wide, place), given_view("b", side, place)), PAPER
+        )
         (finding,) = [item for item in found.findings if item.kind == "implausible_ball"]
         assert words in finding.sentence
         assert finding.number > finding.threshold
@@ -326,7 +332,7 @@ class TestFindings:
         other = replace(other, principal_point=(959 / 2, (round(size.height * factor) - 1) / 2))
         seen = given_view("a", MAIN, BALL)
         view = replace(seen, station=replace(seen.station, given=other))
-        found = solve(group(view, given_view("b", OPPOSITE, BALL)), PAPER)
+        found = solve_group(group(view, given_view("b", OPPOSITE, BALL)), PAPER)
         finding = found.findings[0]
         assert finding.kind == "camera_size"
         assert f"--size 960x{round(size.height * factor)}" in finding.sentence
@@ -342,7 +348,7 @@ class TestSidesSwapped:
         replay = clean.views[1]
         lines = {opposite_marking(name): points for name, points in replay.station.lines.items()}
         turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
-        found = solve(group(clean.views[0], turned, clean.views[2]), PAPER).findings
+        found = solve_group(group(clean.views[0], turned, clean.views[2]), PAPER).findings
         assert [(item.kind, item.view, item.fix.action) for item in found] == [
             ("sides_swapped", "7_1.png", "swap_sides")
         ]
@@ -352,7 +358,7 @@ class TestSidesSwapped:
         main = clean.views[0]
         lines = {opposite_marking(name): points for name, points in main.station.lines.items()}
         turned = replace(main, station=replace(main.station, lines=make_lines(lines)))
-        found = solve(group(turned, clean.views[1]), PAPER).findings
+        found = solve_group(group(turned, clean.views[1]), PAPER).findings
         assert [(item.kind, item.view) for item in found] == [("sides_swapped", "7.png")]
 
     def test_views_that_are_all_labelled_from_the_other_end_agree_and_are_still_wrong(self, clean):
@@ -360,7 +366,7 @@ class TestSidesSwapped:
         for one in clean.views[:2]:
             lines = {opposite_marking(name): points for name, points in one.station.lines.items()}
             turned.append(replace(one, station=replace(one.station, lines=make_lines(lines))))
-        solution = solve(group(*turned), PAPER)
+        solution = solve_group(group(*turned), PAPER)
         assert solution.passes
         (finding,) = [item for item in solution.findings if item.kind == "sides_swapped"]
         assert (finding.view, finding.fix.action) == ("7.png", "swap_sides")
@@ -372,20 +378,20 @@ class TestSidesSwapped:
         lines = {opposite_marking(name): points for name, points in replay.station.lines.items()}
         turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
         loose = replace(PAPER, tau_percent=100.0)
-        solution = solve(group(clean.views[0], turned), loose)
+        solution = solve_group(group(clean.views[0], turned), loose)
         assert [pair.valid for pair in solution.pairs] == [True]
         assert "sides_swapped" in [item.kind for item in solution.findings]
 
     def test_another_instant_is_not_taken_for_another_side(self, clean):
         other = view("7_1.png", BEHIND_GOAL, (40.0, -9.0, -0.11))
-        found = solve(group(clean.views[0], other), PAPER).findings
+        found = solve_group(group(clean.views[0], other), PAPER).findings
         assert [item.kind for item in found] == ["not_synchronous"]
 
 
 class TestExpectedBall:
     def test_a_view_without_a_ball_says_where_it_should_show_it(self, clean):
         blind = replace(clean.views[2], balls=())
-        solved = solve(group(*clean.views[:2], blind), PAPER).view("7_2.png")
+        solved = solve_group(group(*clean.views[:2], blind), PAPER).view("7_2.png")
         assert solved.ball is None
         assert not solved.included
         assert np.allclose(solved.expected.place, OPPOSITE.project(np.array([BALL]))[0], atol=1.0)
@@ -394,7 +400,7 @@ class TestExpectedBall:
         )
 
     def test_its_uncertainty_is_that_of_the_ball_seen_from_there(self, clean):
-        solution = solve(clean, PAPER)
+        solution = solve_group(clean, PAPER)
         covariance = np.array(solution.view("7_2.png").expected.covariance).reshape(2, 2)
         assert np.allclose(covariance, covariance.T)
         sigmas = np.sqrt(np.linalg.eigvalsh(covariance))
@@ -403,26 +409,27 @@ class TestExpectedBall:
     def test_without_a_3d_ball_nothing_is_expected(self, clean):
         alone = [replace(view, balls=()) for view in clean.views[1:]]
         assert all(
-            view.expected is None for view in solve(group(clean.views[0], *alone), PAPER).views
+            view.expected is None
+            for view in solve_group(group(clean.views[0], *alone), PAPER).views
         )
 
     def test_a_ball_that_was_put_where_the_others_see_it_confirms_nothing(self, clean):
         blind = replace(clean.views[2], balls=())
-        before = solve(group(*clean.views[:2], blind), PAPER)
+        before = solve_group(group(*clean.views[:2], blind), PAPER)
         put = BallAnnotation(box=before.view("7_2.png").expected.box, inferred=True)
-        after = solve(group(*clean.views[:2], replace(blind, balls=(put,))), PAPER)
+        after = solve_group(group(*clean.views[:2], replace(blind, balls=(put,))), PAPER)
         assert (after.ball, after.pairs) == (before.ball, before.pairs)
         assert not after.view("7_2.png").included
         gate = next(gate for gate in after.gates if gate.name == "ball")
         assert gate.sentence == "in 2 views, placed in C (not counted)"
-        alone = solve(group(clean.views[0], replace(clean.views[1], balls=(put,))), PAPER)
+        alone = solve_group(group(clean.views[0], replace(clean.views[1], balls=(put,))), PAPER)
         assert alone.first_failing.name == "ball"
 
 
 def left_out(marking, distances):
     """A calibration that left a marking out, whose points lie so far from where it should be."""
     fit = MarkingFit(marking, "fp", distances, used=False)
-    suspect = Suspect(marking, None, 0.5, max(distances))
+    suspect = SuspectLabel(marking, None, 0.5, max(distances))
     return Calibration("lines", MAIN, markings=(fit,), suspects=(suspect,))
 
 
@@ -433,7 +440,7 @@ class TestCalibrationFindings:
         points[2] = ImagePoint(points[2].x, points[2].y + 25)
         lines = {**station.lines, "Big rect. right main": tuple(points)}
         moved = replace(clean.views[0], station=replace(station, lines=lines))
-        found = solve(group(moved, *clean.views[1:]), PAPER).findings
+        found = solve_group(group(moved, *clean.views[1:]), PAPER).findings
         assert [(item.kind, item.marking, item.fix.index) for item in found] == [
             ("bad_point", "Big rect. right main", 2)
         ]
@@ -452,7 +459,7 @@ class TestCalibrationFindings:
         station = clean.views[0].station
         fewer = {name: at for name, at in station.lines.items() if name != "Side line top"}
         partial = replace(clean.views[0], station=replace(station, lines=fewer))
-        found = solve(group(partial, *clean.views[1:]), PAPER).findings
+        found = solve_group(group(partial, *clean.views[1:]), PAPER).findings
         assert [(item.kind, item.marking) for item in found] == [
             ("visible_not_annotated", "Side line top")
         ]
@@ -462,7 +469,7 @@ class TestCalibrationFindings:
         lines = dict(station.lines)
         lines["Circle left"] = lines.pop("Circle right")
         wrong = replace(clean.views[0], station=replace(station, lines=make_lines(lines)))
-        found = solve(group(wrong, *clean.views[1:]), PAPER).findings
+        found = solve_group(group(wrong, *clean.views[1:]), PAPER).findings
         assert [(item.kind, item.suggested) for item in found] == [("wrong_label", "Circle right")]
 
 
@@ -470,4 +477,4 @@ class TestBallInGroup:
     def test_a_ball_box_without_area_still_has_a_centre(self, clean):
         dot = BallAnnotation(box=Box(*clean.views[0].balls[0].box.center, 0.0, 0.0))
         changed = clean.with_view(replace(clean.views[0], balls=(dot,)))
-        assert solve(changed, PAPER).view("7.png").ball.size_ratio is None
+        assert solve_group(changed, PAPER).view("7.png").ball.size_ratio is None

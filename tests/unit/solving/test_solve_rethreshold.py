@@ -8,12 +8,12 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, Policy
 from app.soccer.solution import Solution
-from app.solving.facts import Facts
+from app.solving.facts import GroupFacts
 from app.solving.solve import (
     differs_only_in_smaller_tau,
     has_unchanged_pairs,
     rethreshold_solution,
-    solve,
+    solve_group,
     solve_with_facts,
 )
 from tests.cameras import SIZE
@@ -48,7 +48,7 @@ def apart(*pixels: float, given: bool = True) -> Group:
 def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None, Solution]:
     """Retold under a policy, and solved."""
     then, facts = solve_with_facts(found, before, {})
-    now = solve(found, policy)
+    now = solve_group(found, policy)
     if not has_unchanged_pairs(facts, before, policy)[0]:
         return None, now
     return rethreshold_solution(then, facts.view_diagonal.tolist(), policy), now
@@ -64,7 +64,7 @@ class TestHasSmallerTau:
 
 class TestUndecided:
     def test_a_pair_between_the_two_taus_is_decided_anew(self):
-        facts: Facts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
+        facts: GroupFacts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
         error = facts.pair_errors.max() / SIZE.diagonal * 100
         assert not has_unchanged_pairs(facts, PAPER, with_tau(0.99 * error))[0]
         assert has_unchanged_pairs(facts, PAPER, with_tau(1.01 * error))[0]
@@ -94,7 +94,7 @@ class TestRetold:
     def test_a_view_that_counts_and_is_missed_is_told_or_left_to_the_solver(self):
         """A and C disagree by more than tau, and each of them agrees with B."""
         of = apart(0.9 * TAU_PX, 0.0, -0.9 * TAU_PX)
-        solution = solve(of, PAPER)
+        solution = solve_group(of, PAPER)
         errors = [seen.ball.error_px / TAU_PX for seen in solution.views if seen.ball is not None]
         told, solved = again(of, PAPER, with_tau(0.99 * max(errors)))
         assert told is None or told == solved
@@ -108,4 +108,4 @@ class TestRetold:
         assert rethreshold_solution(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
 
 
-PLAIN = solve(apart(0.0, 8 * TAU_PX), PAPER).findings[0]
+PLAIN = solve_group(apart(0.0, 8 * TAU_PX), PAPER).findings[0]

@@ -22,7 +22,7 @@ from app.solving.triangulate import (
     BallObservation,
     CameraNumbers,
     collect_ball_observations,
-    stack_pairs,
+    stack_pair_arrays,
     triangulate_observation_pairs,
 )
 from tests.cameras import SIZE
@@ -44,7 +44,7 @@ class TestOf:
         assert found.picture is None
 
     def test_a_changed_picture_has_the_camera_that_took_it(self):
-        changed = PictureGeometry(1.2).camera_of_shown_picture(BEHIND_GOAL, SIZE)
+        changed = PictureGeometry(1.2).camera_of_annotated_picture(BEHIND_GOAL, SIZE)
         whole = np.arange(121.0).reshape(11, 11)
         calibration = Calibration(
             "lines", changed, covariance=KNOWN, picture_covariance=tuple(whole.ravel())
@@ -271,7 +271,7 @@ class TestMeet:
 class TestLinesOfSight:
     def test_come_in_the_order_that_triangulation_takes(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", OPPOSITE, BALL)
-        P_a, P_b, pixels_a, pixels_b = stack_pairs([a, b], [b, a])
+        P_a, P_b, pixels_a, pixels_b = stack_pair_arrays([a, b], [b, a])
         assert np.array_equal(P_a, [MAIN.P, OPPOSITE.P])
         assert np.array_equal(P_b, [OPPOSITE.P, MAIN.P])
         assert np.array_equal(pixels_a, [a.ideal_center, b.ideal_center])

@@ -21,7 +21,7 @@ from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M
 from app.solving.paint_camera import PaintProblem, measure_offsets
-from app.solving.paint_noise import CROWN, INWARD, TERMS, painted_shift
+from app.solving.paint_noise import CROWN, INWARD, TERMS, compute_paint_shift
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import (
     PaintSightings,
@@ -62,7 +62,7 @@ def painted(
         if name not in GOAL_PARTS:
             line = pitch.sample(name, 0.7, 0.7)
             which = np.full(len(line), number)
-            seen = camera.project(line + painted_shift(line[:, :2], which, values, pitch))
+            seen = camera.project(line + compute_paint_shift(line[:, :2], which, values, pitch))
             inside = ((seen > 0) & (seen < (SIZE.width, SIZE.height))).all(axis=1)
             places.append(seen[inside])
             marking.append(which[inside])
@@ -101,15 +101,15 @@ def test_a_shorter_pitch_with_a_crown_is_found_within_its_sigma():
         assert abs(value - truth) < WITHIN * sigma and sigma < 0.05
     away = found.position - truths[0][X : Z + 1]
     assert away @ np.linalg.solve(found.position_covariance, away) < WITHIN**2
-    other = found.other_pitch()
+    other = found.clearly_different_pitch()
     assert other is not None and other.length == pytest.approx(101, abs=0.7)
-    assert found.frames == len(frames) and found.knows_sizes == (True, True)
+    assert found.frames == len(frames) and found.are_sizes_known == (True, True)
 
 
 def test_the_planned_pitch_is_left_alone():
     _, frames = film(PLAN, laid())
     found = shown_by(frames)
-    assert found.other_pitch() is None
+    assert found.clearly_different_pitch() is None
     assert found.crown[0] == pytest.approx(0, abs=WITHIN * found.crown[1])
 
 
@@ -139,7 +139,7 @@ def test_lines_are_drawn_where_the_pitch_has_them():
     name = MARKINGS[np.bincount(frames[-1].sightings.curve).argmax()]
     line = pitch.sample(name, 0.2, 0.2)
     which = np.full(len(line), MARKINGS.index(name))
-    there = truth.project(line + painted_shift(line[:, :2], which, laid(crown=0.15), pitch))
+    there = truth.project(line + compute_paint_shift(line[:, :2], which, laid(crown=0.15), pitch))
     there = there[((there > 0) & (there < (SIZE.width, SIZE.height))).all(axis=1)]
     drawn = camera.project(found.line(name))
     apart = np.hypot(*(there[:, None] - drawn[None]).T)
@@ -152,7 +152,7 @@ def test_a_size_that_somebody_measured_is_no_unknown():
     _, frames = film(measured, laid())
     found = find_tripod_pitch(frames, SIZE, measured, POLICY)
     assert found is not None
-    assert found.pitch == measured and found.knows_sizes == (False, False)
+    assert found.pitch == measured and found.are_sizes_known == (False, False)
 
 
 def test_too_few_frames_and_frames_of_several_places_show_none():

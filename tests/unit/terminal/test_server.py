@@ -42,7 +42,13 @@ from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
 from app.terminal.remote import write_evaluation
-from app.terminal.server import ABLE, ServerPlace, _command_error, connect_to_server, read_token
+from app.terminal.server import (
+    ABLE,
+    ServerPlace,
+    _translate_client_error,
+    connect_to_server,
+    read_token,
+)
 from app.terminal.terminal import INTERRUPTED
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
@@ -439,11 +445,11 @@ class TestRefusals:
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
         server = ServerPlace("http://127.0.0.1:8000", None)
         said = RequestError("there is no dataset crossland", None, 404)
-        assert _command_error(server, said).message == "there is no dataset crossland"
+        assert _translate_client_error(server, said).message == "there is no dataset crossland"
         broken = UnreachableError("the SSL handshake failed")
         assert (
             "has a TLS certificate that cannot be verified"
-            in _command_error(server, broken).message
+            in _translate_client_error(server, broken).message
         )
 
     @pytest.mark.parametrize("named", ["tables", "figures"])

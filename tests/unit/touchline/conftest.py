@@ -19,7 +19,7 @@ from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import open_output_folder, write_zip
 from app.formats.parquet import write_parquet
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.scenes import make_scenes
 
 HASH = "6f1ed002ab5595859014ebf0951522d9" * 2
@@ -31,7 +31,9 @@ def records() -> list[ExportRecord]:
     found = []
     for number, scene in enumerate(make_scenes(groups=4, seed=3, faults=False)[:3]):
         views = {view.key: "train" if number else "test" for view in scene.group.views}
-        found.append(ExportRecord(scene.group, solve(scene.group, PAPER), "accepted", splits=views))
+        found.append(
+            ExportRecord(scene.group, solve_group(scene.group, PAPER), "accepted", splits=views)
+        )
     return found
 
 

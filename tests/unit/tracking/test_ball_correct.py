@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from app.soccer.pitch import Pitch
-from app.tracking.ball_correct import NEAR_FRAMES, TrackPatch, correct_track, patched
-from app.tracking.ball_track import BallEvent, BallMeasurements, BallTrack, Correction
+from app.tracking.ball_correct import NEAR_FRAMES, TrackPatch, apply_patches, correct_track
+from app.tracking.ball_track import BallEvent, BallMeasurements, BallTrack, EventCorrection
 from tests.unit.tracking.test_ball_solve import BOTH, FRAMES, PLACES, RIGHT, seen, tracked
 
 GIVEN = seen(BOTH)
@@ -31,11 +31,11 @@ def alone() -> BallTrack:
 def solved(
     track: BallTrack,
     measurements: BallMeasurements,
-    *said: Correction,
+    *said: EventCorrection,
     known: Sequence[TrackPatch] = (),
 ) -> tuple[BallTrack, tuple[TrackPatch, ...]]:
     patches = correct_track(track, measurements, Pitch(), said, known)
-    return patched(track, measurements, patches, said), patches
+    return apply_patches(track, measurements, patches, said), patches
 
 
 def kinds_near(track: BallTrack, frame: int, reach: int = NEAR_FRAMES) -> list[str]:
@@ -64,7 +64,7 @@ class TestAdded:
     def test_an_event_is_in_the_search_and_the_fit(self, track: BallTrack) -> None:
         frame = quiet_frame(track)
         assert kinds_near(track, frame) == []
-        found, (patch,) = solved(track, GIVEN, Correction(frame, "kick", True))
+        found, (patch,) = solved(track, GIVEN, EventCorrection(frame, "kick", True))
         assert kinds_near(patch.part, frame, 1) == ["kick"]
         row = frame - FRAMES[0]
         assert not np.array_equal(found.velocity[row], track.velocity[row])
@@ -73,7 +73,7 @@ class TestAdded:
 
     def test_the_rest_of_the_track_stays_bit_for_bit(self, track: BallTrack) -> None:
         frame = quiet_frame(track)
-        found, (patch,) = solved(track, GIVEN, Correction(frame, "kick", True))
+        found, (patch,) = solved(track, GIVEN, EventCorrection(frame, "kick", True))
         beside = ~np.isin(track.frames, patch.part.frames)
         assert 0.3 < beside.mean() < 0.9
         for name in ("position", "velocity", "covariance"):
@@ -83,35 +83,35 @@ class TestAdded:
         assert [event for event in found.events if event.frame not in inside] == others
 
     def test_no_step_where_the_part_meets_the_rest(self, track: BallTrack) -> None:
-        found, (patch,) = solved(track, GIVEN, Correction(quiet_frame(track), "kick", True))
+        found, (patch,) = solved(track, GIVEN, EventCorrection(quiet_frame(track), "kick", True))
         for row in (int(patch.part.frames[0] - FRAMES[0]), int(patch.part.frames[-1] - FRAMES[0])):
             off = np.linalg.norm(found.position[row] - track.position[row])
             assert off < 2 * track.sigma[row]
 
     def test_an_event_that_is_there_is_not_added_twice(self, track: BallTrack) -> None:
         event = kick_of(track)
-        found, _ = solved(track, GIVEN, Correction(event.frame + 1, "kick", True))
+        found, _ = solved(track, GIVEN, EventCorrection(event.frame + 1, "kick", True))
         assert kinds_near(found, event.frame) == ["kick"]
 
     def test_an_event_that_measurements_say_nothing_of_stands_where_the_ball_is(
         self, track: BallTrack
     ) -> None:
-        found = patched(track, GIVEN, (), [Correction(FRAMES[50], "out", True)])
+        found = apply_patches(track, GIVEN, (), [EventCorrection(FRAMES[50], "out", True)])
         (event,) = [item for item in found.events if item.kind == "out"]
         assert np.array_equal(event.position, track.position[50])
 
     def test_a_ball_that_one_view_sees_is_where_the_line_is_that_it_crosses(self) -> None:
         pitch = Pitch(length=105.0, width=2 * (float(PLACES[60, 1]) if PLACES[60, 1] > 0 else 34.0))
         base = tracked(ALONE)
-        said = Correction(int(FRAMES[60]), "out", True)
+        said = EventCorrection(int(FRAMES[60]), "out", True)
         patches = correct_track(base, ALONE, pitch, [said])
-        assert patched(base, ALONE, patches, [said]).events
+        assert apply_patches(base, ALONE, patches, [said]).events
 
 
 class TestRemoved:
     def test_an_event_is_not_there_and_the_ball_goes_on_without_it(self, track: BallTrack) -> None:
         event = kick_of(track)
-        found, _ = solved(track, GIVEN, Correction(event.frame, event.kind, False))
+        found, _ = solved(track, GIVEN, EventCorrection(event.frame, event.kind, False))
         assert "kick" not in kinds_near(found, event.frame)
         row = event.frame - FRAMES[0]
         step = [
@@ -130,8 +130,8 @@ class TestRemoved:
             found, _ = solved(
                 track,
                 GIVEN,
-                Correction(event.frame, "kick", False),
-                Correction(event.frame + by, "kick", True),
+                EventCorrection(event.frame, "kick", False),
+                EventCorrection(event.frame + by, "kick", True),
             )
             (moved,) = [
                 item
@@ -143,28 +143,31 @@ class TestRemoved:
 
 class TestPatches:
     def test_corrections_far_apart_are_solved_apart_and_once(self, track: BallTrack) -> None:
-        first, second = Correction(FRAMES[20], "kick", True), Correction(FRAMES[170], "kick", True)
+        first, second = (
+            EventCorrection(FRAMES[20], "kick", True),
+            EventCorrection(FRAMES[170], "kick", True),
+        )
         _, one = solved(track, GIVEN, first)
         _, both = solved(track, GIVEN, second, first, known=one)
         assert both[0] is one[0] and len(both) == 2
 
     def test_those_side_by_side_are_solved_together(self, track: BallTrack) -> None:
-        said = [Correction(int(FRAMES[80 + at]), "kick", True) for at in (0, 9)]
+        said = [EventCorrection(int(FRAMES[80 + at]), "kick", True) for at in (0, 9)]
         _, (patch,) = solved(track, GIVEN, *said)
         assert patch.corrections == tuple(said)
 
     def test_left_out_errors_are_those_of_the_new_part(self, track: BallTrack) -> None:
-        found, (patch,) = solved(track, GIVEN, Correction(quiet_frame(track), "kick", True))
+        found, (patch,) = solved(track, GIVEN, EventCorrection(quiet_frame(track), "kick", True))
         assert found.left_out is not None and track.left_out is not None
         same = found.left_out.px == track.left_out.px
         assert not same[patch.rows].any() and np.delete(same, patch.rows).all()
 
     def test_frames_that_the_track_has_not_are_left_out(self, track: BallTrack) -> None:
-        found, patches = solved(track, GIVEN, Correction(3, "kick", True))
+        found, patches = solved(track, GIVEN, EventCorrection(3, "kick", True))
         assert (patches, found.events) == ((), track.events)
 
     def test_fifty_frames_take_less_than_a_tenth_of_a_second(self, track: BallTrack) -> None:
-        said = Correction(quiet_frame(track), "kick", True)
+        said = EventCorrection(quiet_frame(track), "kick", True)
         solved(track, GIVEN, said)
         began = time.process_time()
         _, (patch,) = solved(track, GIVEN, said)
@@ -180,7 +183,7 @@ class TestOneView:
     ) -> None:
         known = np.flatnonzero(np.isfinite(alone.position).all(axis=1))
         frame = int(FRAMES[known[len(known) // 2]])
-        _, (patch,) = solved(alone, ALONE, Correction(frame, "kick", True))
+        _, (patch,) = solved(alone, ALONE, EventCorrection(frame, "kick", True))
         assert len(patch.part.frames) > 75
 
     def test_a_bounce_that_a_person_saw_gives_a_track_where_there_was_none(self) -> None:
@@ -194,7 +197,7 @@ class TestOneView:
         given = seen({"right": RIGHT}, places=np.vstack([fall, PLACES[count:]]))
         given = given.part(given.frames < FRAMES[count])
         base = tracked(given)
-        said = Correction(int(FRAMES[touch]), "bounce", True)
+        said = EventCorrection(int(FRAMES[touch]), "bounce", True)
         found, _ = solved(base, given, said)
         assert found.reason is None
         assert "bounce" in kinds_near(found, said.frame, 1)
@@ -202,19 +205,19 @@ class TestOneView:
 
 class TestNonsense:
     def test_every_frame_at_once(self, track: BallTrack) -> None:
-        said = [Correction(int(frame), "kick", True) for frame in FRAMES]
+        said = [EventCorrection(int(frame), "kick", True) for frame in FRAMES]
         found, (patch,) = solved(track, GIVEN, *said)
         assert len(patch.part.frames) == len(FRAMES)
         assert np.isfinite(found.position).all()
 
     def test_a_bounce_of_a_ball_that_rolls(self, track: BallTrack) -> None:
         rolls = [row for row, mode in enumerate(track.mode) if mode == "roll" and 30 < row < 160]
-        found, _ = solved(track, GIVEN, Correction(int(FRAMES[rolls[0]]), "bounce", True))
+        found, _ = solved(track, GIVEN, EventCorrection(int(FRAMES[rolls[0]]), "bounce", True))
         assert "bounce" in kinds_near(found, int(FRAMES[rolls[0]]))
 
     def test_no_measurement_at_all(self) -> None:
         nothing = GIVEN.part(np.zeros(0, dtype=int))
         base = BallTrack.none(FRAMES, FRAMES / 25.0, "nothing")
-        said = [Correction(int(FRAMES[3]), "kick", True)]
+        said = [EventCorrection(int(FRAMES[3]), "kick", True)]
         assert correct_track(base, nothing, Pitch(), said) == ()
-        assert replace(patched(base, nothing, (), said), events=()).reason == "nothing"
+        assert replace(apply_patches(base, nothing, (), said), events=()).reason == "nothing"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.geometry.arrays import FloatArray
-from app.tracking.ball_fit_kernels import factor, inverse_blocks, solve_factored
+from app.tracking.ball_fit_kernels import factor_block_tridiagonal, inverse_blocks, solve_factored
 
 SIZE, COUNT = 3, 5
 
@@ -29,7 +29,7 @@ def blocks() -> tuple[FloatArray, FloatArray, FloatArray]:
 def test_a_system_is_solved(blocks: tuple[FloatArray, FloatArray, FloatArray]) -> None:
     diagonal, beside, whole = blocks
     right = np.arange(COUNT * SIZE, dtype=float)
-    found = solve_factored(factor(diagonal, beside), right)
+    found = solve_factored(factor_block_tridiagonal(diagonal, beside), right)
     assert np.allclose(whole @ found, right)
 
 
@@ -37,7 +37,7 @@ def test_blocks_of_the_inverse_are_those_of_the_whole(
     blocks: tuple[FloatArray, FloatArray, FloatArray],
 ) -> None:
     diagonal, beside, whole = blocks
-    own, right_of = inverse_blocks(factor(diagonal, beside))
+    own, right_of = inverse_blocks(factor_block_tridiagonal(diagonal, beside))
     inverse = np.linalg.inv(whole).reshape(COUNT, SIZE, COUNT, SIZE)
     for at in range(COUNT):
         assert np.allclose(own[at], inverse[at, :, at])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.geometry.arrays import FloatArray
-from app.tracking.ball_follow import expected_diameter, follow_ball
+from app.tracking.ball_follow import expected_ball_diameter, follow_ball
 from app.tracking.ball_run import (
     BallClick,
     BallRun,
@@ -189,12 +189,12 @@ class TestExpectedDiameter:
         camera = MAIN
         x, y = camera.project(np.array([[5.0, 3.0, -0.11]]))[0]
         far = np.linalg.norm(camera.position - (5.0, 3.0, -0.11))
-        size = expected_diameter(camera, x, y)
+        size = expected_ball_diameter(camera, x, y)
         assert size is not None
         assert abs(size / (0.22 * camera.focal_length[0] / far) - 1) < 0.05
 
     def test_the_sky_says_nothing(self) -> None:
-        assert expected_diameter(MAIN, 640, -4000) is None
+        assert expected_ball_diameter(MAIN, 640, -4000) is None
 
 
 class TestMending:

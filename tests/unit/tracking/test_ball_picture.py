@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.tracking.ball_picture import BallColour, disc, find_ball, find_like, fit_disc, likeness
+from app.tracking.ball_picture import (
+    BallColour,
+    find_ball,
+    find_similar_ball,
+    fit_disc,
+    make_ball_template,
+    match_template,
+)
 from tests.drawn_balls import drawn, grass
 
 PLACES = [(60.0, 50.0), (60.37, 50.0), (60.5, 49.5), (59.81, 50.24)]
@@ -64,8 +71,8 @@ class TestFitDisc:
 class TestLikeness:
     def test_is_highest_where_the_ball_is_and_its_contrast_one(self) -> None:
         picture = drawn([(60, 50, 8.0)], noise=1.0)
-        template = disc(8.0)
-        alike, contrast = likeness(BallColour.of(picture, 60, 50, 8).grey(picture), template)
+        template = make_ball_template(8.0)
+        alike, contrast = match_template(BallColour.of(picture, 60, 50, 8).grey(picture), template)
         row, column = np.unravel_index(int(alike.argmax()), alike.shape)
         reach = template.shape[0] // 2
         assert (column + reach, row + reach) == (60, 50)
@@ -79,10 +86,10 @@ class TestFindLike:
     GREY = BallColour.of(PICTURE, 60.3, 50.6, 8.0).grey(drawn([(40.4, 30.2, 8.0)], seed=4))
 
     def test_a_click_beside_it_snaps_to_its_centre(self) -> None:
-        spot = find_like(self.GREY, 42.0, 29.0, 8.0)
+        spot = find_similar_ball(self.GREY, 42.0, 29.0, 8.0)
         assert np.hypot(spot.x - 40.4, spot.y - 30.2) < 0.4 and spot.sigma_px < 1.0
 
     def test_where_nothing_looks_like_it_the_click_counts(self) -> None:
         for x, y in ((90.0, 70.0), (1.0, 1.0)):
-            spot = find_like(self.GREY, x, y, 8.0)
+            spot = find_similar_ball(self.GREY, x, y, 8.0)
             assert (spot.x, spot.y, spot.diameter, spot.sigma_px) == (x, y, 8.0, 2.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.tracking.ball_rays import BallRays, ball_rays, slopes_of
+from app.tracking.ball_rays import BallRays, build_ball_rays, estimate_ray_velocities
 from tests.cameras import looking
 
 CAMERA = looking((0.0, 62.0, -16.0), (0.0, 0.0, 0.0), 2000.0, bend=0.01)
@@ -25,7 +25,7 @@ def flight(times: np.ndarray) -> np.ndarray:
 
 
 def rays_of(pixels: np.ndarray, times: np.ndarray = TIMES, camera: Camera = CAMERA) -> BallRays:
-    return ball_rays(times.tolist(), pixels.tolist(), [camera] * len(times))
+    return build_ball_rays(times.tolist(), pixels.tolist(), [camera] * len(times))
 
 
 class TestBallRays:
@@ -68,7 +68,7 @@ class TestSlopesOf:
     def test_they_are_those_of_the_path(self) -> None:
         times = TIMES[TIMES < 2.9]
         rays = rays_of(seen(flight(times), 0.0), times)
-        moved, turned, _ = slopes_of(rays)
+        moved, turned, _ = estimate_ray_velocities(rays)
         assert np.allclose(moved, 0.0)
         expected = np.gradient(rays.directions, times, axis=0)
         assert np.allclose(turned[5:-5], expected[5:-5], rtol=0.02, atol=1e-5)
@@ -77,10 +77,10 @@ class TestSlopesOf:
         times = np.arange(0, 40, 0.04)
         still = np.tile((3.0, 2.0, -0.11), (len(times), 1))
         rays = rays_of(seen(still, 1.0), times)
-        _, turned, variance = slopes_of(rays)
+        _, turned, variance = estimate_ray_velocities(rays)
         assert np.mean(turned**2) * 3 == pytest.approx(2 * np.mean(variance), rel=0.25)
 
     def test_nothing_is_said_across_a_gap(self) -> None:
         times = np.array([0.0, 1.0, 2.0])
         rays = rays_of(seen(flight(times), 0.0), times)
-        assert not slopes_of(rays)[1].any()
+        assert not estimate_ray_velocities(rays)[1].any()

@@ -7,13 +7,18 @@ import pytest
 
 from app.soccer.pitch import Pitch
 from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
-from app.tracking.ball_search import changed_views, knots_of, louder, search
+from app.tracking.ball_search import (
+    build_knots,
+    find_likeliest_history,
+    find_view_changes,
+    inflate_ray_noise,
+)
 from tests.unit.tracking.test_ball_solve import BALL, BOTH, LEFT, PLACES, RIGHT, TIMES, seen
 
 
 class TestKnots:
     def test_rays_go_through_the_ball(self) -> None:
-        knots = knots_of(seen(BOTH, noise=0.0), TIMES, np.zeros(2))
+        knots = build_knots(seen(BOTH, noise=0.0), TIMES, np.zeros(2))
         off = PLACES[knots.at] - knots.centres
         assert np.abs(np.einsum("rij,rj->ri", knots.across, off)).max() < 1e-6
         assert np.allclose(np.einsum("rij,rj->ri", knots.across, knots.along), 0.0)
@@ -22,16 +27,16 @@ class TestKnots:
         given = seen(BOTH)
         late = np.array([view == "right" for view in given.views])
         times = given.times + np.where(late, 0.013, 0.0)
-        knots = knots_of(replace(given, times=times), TIMES, np.zeros(2))
+        knots = build_knots(replace(given, times=times), TIMES, np.zeros(2))
         assert len(knots.times) == 2 * len(TIMES) and (np.diff(knots.starts) == 1).all()
-        moved = knots_of(replace(given, times=times), TIMES, np.array([0.0, -0.013]))
+        moved = build_knots(replace(given, times=times), TIMES, np.array([0.0, -0.013]))
         assert len(moved.times) == len(TIMES)
 
     def test_a_size_says_the_distance(self) -> None:
         given = seen({"left": LEFT}, noise=0.0)
         far = np.linalg.norm(PLACES - LEFT.position, axis=1)
         sizes = 0.226 * 1100.0 / LEFT.pitch_to_camera(PLACES)[:, 2]
-        knots = knots_of(
+        knots = build_knots(
             replace(given, sizes=sizes, size_sigma=np.full(len(sizes), 1.0)), TIMES, np.zeros(1)
         )
         assert knots.far == pytest.approx(far, rel=1e-6)
@@ -41,7 +46,7 @@ class TestKnots:
 class TestChangedViews:
     def test_it_is_where_a_view_comes_or_goes(self) -> None:
         given = seen(BOTH, hide=[("left", 40, 60), ("left", 80, 90), ("right", 80, 90)])
-        changed = changed_views(knots_of(given, TIMES, np.zeros(2)))
+        changed = find_view_changes(build_knots(given, TIMES, np.zeros(2)))
         assert np.flatnonzero(changed).tolist() == [40, 60]
 
 
@@ -53,8 +58,8 @@ class TestLouder:
         given = seen(BOTH)
         of_left = np.array([view == "left" for view in given.views])
         pixels = given.pixels + np.where(of_left[:, None], (0.0, shift), 0.0)
-        knots = knots_of(replace(given, pixels=pixels), TIMES, np.zeros(2))
-        factor = louder(knots, 12.0).noise / knots.noise
+        knots = build_knots(replace(given, pixels=pixels), TIMES, np.zeros(2))
+        factor = inflate_ray_noise(knots, 12.0).noise / knots.noise
         return [float(factor[knots.view == view].mean()) for view in (0, 1)]
 
     def test_rays_that_meet_are_as_noisy_as_they_are_said_to_be(self) -> None:
@@ -69,7 +74,7 @@ class TestLouder:
 
 class TestSearch:
     def test_modes_are_those_of_the_ball(self) -> None:
-        history = search(knots_of(seen(BOTH), TIMES, np.zeros(2)), Pitch())
+        history = find_likeliest_history(build_knots(seen(BOTH), TIMES, np.zeros(2)), Pitch())
         high = -PLACES[:, 2] > 0.6
         assert (history.mode[high] == FLIGHT).mean() > 0.95
         assert {KICK, BOUNCE} <= set(history.event.tolist())
@@ -79,12 +84,14 @@ class TestSearch:
         given = seen(BOTH)
         pixels = given.pixels.copy()
         pixels[70] += (60.0, 0.0)
-        knots = knots_of(replace(given, pixels=pixels), TIMES, np.zeros(2))
-        history = search(knots, Pitch())
+        knots = build_knots(replace(given, pixels=pixels), TIMES, np.zeros(2))
+        history = find_likeliest_history(knots, Pitch())
         assert knots.rows[~history.used].tolist() == [70]
 
     def test_one_view_finds_a_flight_between_kick_and_bounce(self) -> None:
-        history = search(knots_of(seen({"right": RIGHT}), TIMES, np.zeros(1)), Pitch())
+        history = find_likeliest_history(
+            build_knots(seen({"right": RIGHT}), TIMES, np.zeros(1)), Pitch()
+        )
         high = -PLACES[:, 2] > 0.6
         assert (history.mode[high] == FLIGHT).mean() > 0.8
         assert BALL[:, 3].min() < -0.6

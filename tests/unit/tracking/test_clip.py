@@ -34,9 +34,9 @@ def test_small_frames_are_enlarged_and_large_ones_made_smaller(tmp_path: Path, o
     assert (clip.size, clip.work) == (ImageSize(*own), ImageSize(*work))
     assert next(clip.frames()).image.shape == (work[1], work[0], 3)
     camera = looking((0, 60, -15), (10, 0, 0), 900, size=clip.size)
-    read = clip.as_read(camera)
+    read = clip.scale_to_work_size(camera)
     assert read.focal_length[0] == pytest.approx(900 * work[0] / own[0])
-    assert clip.as_shown(read).parameters == pytest.approx(camera.parameters)
+    assert clip.scale_to_video(read).parameters == pytest.approx(camera.parameters)
 
 
 def test_frames_are_numbered_from_nought_with_their_times_and_colours(tmp_path: Path):

@@ -15,25 +15,25 @@ from app.paint.propose import FrameProposal
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking import follow
-from app.tracking.clip import Frame
+from app.tracking.clip import ClipFrame
 from app.tracking.follow import (
     PATCHY_EVERY,
     PATCHY_LEAST_OFTEN,
     PROPOSED_EVERY,
     SAME_VIEW_FRAMES,
     TRACKED,
-    Follower,
+    CameraFollower,
     TrackedFrame,
 )
 from app.tracking.motion import BackgroundMatches
-from app.tracking.picture import Picture, read_frame
+from app.tracking.picture import FramePicture, make_frame_picture
 from tests.tripod_films import render_film
 
 FRAMES = 200
 
 
-def picture(number: int) -> Picture:
-    return read_frame(Frame(number, number / 25, np.zeros((90, 160, 3), np.uint8)))
+def picture(number: int) -> FramePicture:
+    return make_frame_picture(ClipFrame(number, number / 25, np.zeros((90, 160, 3), np.uint8)))
 
 
 def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
@@ -42,7 +42,7 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
     asked: list[int] = []
     black = picture(0)
     frame = TrackedFrame(0, 0.0, TRACKED, seen=PaintAgreement(0.5, 0.5, 100))
-    follower = Follower(Pitch(), CalibrationPolicy())
+    follower = CameraFollower(Pitch(), CalibrationPolicy())
 
     def nothing(*_: object) -> FrameProposal:
         asked.append(now)
@@ -50,7 +50,7 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
 
     monkeypatch.setattr(follow, "propose_in_picture", nothing)
     for now in range(FRAMES):
-        assert follower._another(replace(black, number=now), frame) is frame
+        assert follower._prefer_proposed_camera(replace(black, number=now), frame) is frame
     waits = np.diff(asked).tolist()
     assert waits[0] == 2 * PATCHY_EVERY and waits[1:] == [PATCHY_LEAST_OFTEN] * (len(asked) - 2)
     # A picture that has nothing to do with the one before is another matter.
@@ -66,7 +66,7 @@ class TestWhereOneIsSought:
         """Frames in which a camera was sought, and in which libraries besides the known positions."""
         found: list[tuple[int, tuple[str, ...]]] = []
 
-        def nothing(shown: Picture, *asked: Any) -> FrameProposal:
+        def nothing(shown: FramePicture, *asked: Any) -> FrameProposal:
             found.append((shown.number, tuple(library.name for library in asked[-1])))
             return FrameProposal("nothing", "no straight line is seen on the grass")
 
@@ -75,7 +75,7 @@ class TestWhereOneIsSought:
 
     def lose(self, known: list[Camera], shift_px: float) -> None:
         """Follow frames of black pictures whose background moves."""
-        follower, black = Follower(Pitch(), CalibrationPolicy(), known), picture(0)
+        follower, black = CameraFollower(Pitch(), CalibrationPolicy(), known), picture(0)
         here = np.random.default_rng(0).uniform(0, 90, (50, 2))
         match = BackgroundMatches(here, here + np.array([shift_px, 0.0]))
         for number in range(FRAMES):

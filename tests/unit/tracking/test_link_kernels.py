@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.tracking.link_kernels import meeting_scores
+from app.tracking.link_kernels import score_ray_meetings
 
 ROOM = np.array([(-60.0, 60.0), (-40.0, 40.0), (-45.0, 1.5)])
 
 
 def scores(centres, shifts, live, replay, known=None):
-    return meeting_scores(
+    return score_ray_meetings(
         np.array(centres), np.array(shifts, dtype=float), live,
         np.ones(len(live), bool) if known is None else known,
         0.0, replay, np.zeros(len(replay)), ROOM, 0.25, 16.0, 0.1,

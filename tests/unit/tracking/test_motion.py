@@ -18,9 +18,9 @@ from app.geometry.resection import (
 )
 from app.tracking.motion import (
     BackgroundMatches,
+    apply_background_motion,
     match_background,
-    rotate_camera,
-    turn_to_points,
+    rotate_and_zoom_to_points,
 )
 from tests.unit.paint.lawns import SMALL, TRUE
 
@@ -41,7 +41,7 @@ def test_turn_and_zoom_are_found_whatever_the_distance():
     truth = parameters_from_camera(TRUE, HALF)
     truth[[PAN, TILT, ROLL]] += np.radians([1.5, -0.4, 0.1])
     truth[LOG_FOCAL] += 0.03
-    found, apart = rotate_camera(TRUE, matches_between(truth), HALF)
+    found, apart = apply_background_motion(TRUE, matches_between(truth), HALF)
     assert parameters_from_camera(found, HALF) == pytest.approx(truth, abs=1e-5)
     assert apart < 1e-3
 
@@ -51,7 +51,7 @@ def test_players_who_run_do_not_turn_the_camera():
     truth[PAN] += np.radians(0.5)
     matches = matches_between(truth)
     matches.there[:25] += (9.0, 3.0)
-    found, _ = rotate_camera(TRUE, matches, HALF)
+    found, _ = apply_background_motion(TRUE, matches, HALF)
     assert parameters_from_camera(found, HALF)[:3] == pytest.approx(truth[:3], abs=2e-4)
 
 
@@ -59,8 +59,8 @@ def test_backwards_is_the_way_back():
     truth = parameters_from_camera(TRUE, HALF)
     truth[PAN] += np.radians(2.0)
     matches = matches_between(truth)
-    there, _ = rotate_camera(TRUE, matches, HALF)
-    back, _ = rotate_camera(there, matches.reversed(), HALF)
+    there, _ = apply_background_motion(TRUE, matches, HALF)
+    back, _ = apply_background_motion(there, matches.swap_frames(), HALF)
     start = parameters_from_camera(TRUE, HALF)
     assert parameters_from_camera(back, HALF) == pytest.approx(start, abs=1e-5)
 
@@ -95,7 +95,7 @@ def seen_after(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def turned_to(points: np.ndarray, pixels: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
     parameters, apart = START.copy(), np.empty(len(points))
-    turn_to_points(parameters, points, pixels, HALF, rounds, 0.5, apart)
+    rotate_and_zoom_to_points(parameters, points, pixels, HALF, rounds, 0.5, apart)
     return parameters, apart
 
 

@@ -11,7 +11,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Clip
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
-from app.tracking.shot import Shot, _follow_run, follow_shot
+from app.tracking.shot import FollowedShot, _follow_run, follow_shot
 from tests.tripod_films import Film
 
 PITCH, POLICY = Pitch(), CalibrationPolicy()
@@ -20,19 +20,19 @@ NEAR_PX = 4.0
 
 
 @pytest.fixture(scope="module")
-def followed(film: Film, tmp_path_factory: pytest.TempPathFactory) -> tuple[Clip, Shot]:
+def followed(film: Film, tmp_path_factory: pytest.TempPathFactory) -> tuple[Clip, FollowedShot]:
     """The film, and its frames as they are followed."""
     clip = Clip.open(film.write(tmp_path_factory.mktemp("film")))
     return clip, follow_shot(clip, {}, PITCH, POLICY)
 
 
-def lost(shot: Shot) -> Shot:
+def lost(shot: FollowedShot) -> FollowedShot:
     """A shot whose run has no cameras."""
     frames = [
         TrackedFrame(frame.number, frame.time, LOST) if frame.number in RUN else frame
         for frame in shot.frames
     ]
-    return Shot(frames, shot.matches)
+    return FollowedShot(frames, shot.matches)
 
 
 def turned(frame: TrackedFrame, clip: Clip) -> TrackedFrame:
@@ -47,12 +47,12 @@ def turned(frame: TrackedFrame, clip: Clip) -> TrackedFrame:
 
 def off_px(film: Film, clip: Clip, frame: TrackedFrame) -> float:
     assert frame.camera is not None
-    return film.off_px(frame.number, clip.as_shown(frame.camera))
+    return film.off_px(frame.number, clip.scale_to_video(frame.camera))
 
 
 @pytest.mark.parametrize("run", [RUN, RUN[::-1]], ids=["forwards", "backwards"])
 def test_a_run_is_followed_from_either_end(
-    followed: tuple[Clip, Shot], film: Film, run: range
+    followed: tuple[Clip, FollowedShot], film: Film, run: range
 ) -> None:
     clip, shot = followed[0], lost(followed[1])
     before = [*shot.frames]
@@ -67,7 +67,7 @@ def test_a_run_is_followed_from_either_end(
 
 @pytest.mark.parametrize("run", [RUN, RUN[::-1]], ids=["forwards", "backwards"])
 def test_wrong_cameras_behind_a_run_give_way_to_those_that_agree_better(
-    followed: tuple[Clip, Shot], film: Film, run: range
+    followed: tuple[Clip, FollowedShot], film: Film, run: range
 ) -> None:
     clip, shot = followed[0], lost(followed[1])
     behind = run[-1] + run.step
@@ -79,7 +79,7 @@ def test_wrong_cameras_behind_a_run_give_way_to_those_that_agree_better(
     assert off_px(film, clip, shot.frames[behind]) < NEAR_PX
 
 
-def test_an_annotated_frame_never_gives_way(followed: tuple[Clip, Shot]) -> None:
+def test_an_annotated_frame_never_gives_way(followed: tuple[Clip, FollowedShot]) -> None:
     clip, shot = followed[0], lost(followed[1])
     key = replace(turned(shot.frames[RUN.stop], clip), is_key=True)
     shot.frames[RUN.stop] = key

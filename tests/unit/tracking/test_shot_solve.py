@@ -17,7 +17,7 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.evidence import Evidence
+from app.paint.evidence import DetectedPaint
 from app.paint.snap import SnappedCamera
 from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
@@ -58,7 +58,7 @@ def shot(
         # Of the found camera: the places are the same, and the paint lies where the truth has it.
         apart = truth.project(traced.places) - found.project(traced.places)
         offsets = (apart * traced.normals).sum(axis=1) + noise
-        evidence = Evidence(traced, offsets, sigmas, np.full(len(sigmas), 50.0))
+        evidence = DetectedPaint(traced, offsets, sigmas, np.full(len(sigmas), 50.0))
         snapped = SnappedCamera(found, evidence, 0.1, None, 0.0, None, (SMALL.height, SMALL.width))
         frames.append(TrackedFrame(number, number / 25, TRACKED, found, snapped))
         if number:

@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.tracking.time_map import TimeMap, map_of_instants
+from app.tracking.time_map import TimeMap, fit_map_to_instants
 
 STEP = 0.04
 Pairs = list[tuple[float, float]]
 
 
 def made_of(pairs: Pairs, assumed: float | None = None) -> TimeMap:
-    return map_of_instants(np.array(pairs).reshape(-1, 2), STEP, assumed)
+    return fit_map_to_instants(np.array(pairs).reshape(-1, 2), STEP, assumed)
 
 
 def slow(times: np.ndarray) -> np.ndarray:

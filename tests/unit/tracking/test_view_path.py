@@ -5,7 +5,7 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.solving.sides import turn_camera
-from app.tracking.view_path import ViewPath, compare_paths, view_path
+from app.tracking.view_path import ViewPath, compare_paths, compute_view_path
 from tests.bench.link import at_times, film, made_ball
 
 BALL = made_ball(30.0, seed=7)
@@ -20,7 +20,7 @@ def shown(
     filmed = film(
         at_times(BALL, first + speed * times), times, stand, 1900.0, lag=round(12 / speed)
     )
-    return view_path(times.tolist(), filmed.cameras)
+    return compute_view_path(times.tolist(), filmed.cameras)
 
 
 class TestViewPath:
@@ -30,7 +30,7 @@ class TestViewPath:
             film(at_times(BALL, times), times, LIVE_STAND, 1900.0).cameras
         )
         cameras[10:20] = [None] * 10
-        path = view_path(times.tolist(), cameras)
+        path = compute_view_path(times.tolist(), cameras)
         assert np.diff(path.times).min() >= 0.2 - 1e-9
         assert not ((path.times > 0.39) & (path.times < 0.79)).any()
         first = cameras[0]
@@ -40,7 +40,7 @@ class TestViewPath:
         )
 
     def test_of_no_camera_there_is_none(self) -> None:
-        assert len(view_path([0.0, 1.0], [None, None])) == 0
+        assert len(compute_view_path([0.0, 1.0], [None, None])) == 0
 
 
 class TestLiken:
@@ -57,12 +57,12 @@ class TestLiken:
     def test_one_that_was_tracked_turned_is_like_it_once_it_is_turned(self) -> None:
         times = np.arange(0, 6, 0.04)
         filmed = film(at_times(BALL, 7 + 0.5 * times), times, OPPOSITE, 1900.0, lag=24)
-        replay = view_path(times.tolist(), [turn_camera(one) for one in filmed.cameras])
+        replay = compute_view_path(times.tolist(), [turn_camera(one) for one in filmed.cameras])
         found = compare_paths(shown(2, 14, LIVE_STAND), replay)
         assert found is not None and found.turned and found.apart_m < 3
 
     def test_too_little_is_like_nothing(self) -> None:
         live = shown(2, 14, LIVE_STAND)
-        assert compare_paths(live, view_path([], [])) is None
+        assert compare_paths(live, compute_view_path([], [])) is None
         assert compare_paths(shown(2, 2.5, LIVE_STAND), live) is None
         assert compare_paths(live, shown(7, 7.6, OPPOSITE)) is None

@@ -200,7 +200,7 @@ class TestRecordingReader:
         with closing(RecordingReader(path, index)) as reader:
             reader.read(100)
             monkeypatch.setattr(
-                media_video.FrameReader, "_jump", lambda *_: pytest.fail("sought again")
+                media_video.FrameReader, "_seek_to_frame", lambda *_: pytest.fail("sought again")
             )
             numbers = [101, 102, 110, 130]
             assert [number_of(reader.read(n)[..., ::-1]) for n in numbers] == numbers
@@ -211,14 +211,14 @@ class TestRecordingReader:
         path = write_video(tmp_path / "cam1.ts", "MPG2", COUNT)
         index = index_recording(path, settings)
         began: list[int] = []
-        jump = media_video.FrameReader._jump
+        jump = media_video.FrameReader._seek_to_frame
 
         def watched(self: media_video.FrameReader, start: int, number: int) -> bool:
             done = jump(self, start, number)
             began.append(start)
             return done
 
-        monkeypatch.setattr(media_video.FrameReader, "_jump", watched)
+        monkeypatch.setattr(media_video.FrameReader, "_seek_to_frame", watched)
         ((_, frame),) = read_frames(path, index, [143])
         assert number_of(np.ascontiguousarray(frame[..., ::-1])) == 143
         assert began and began[-1] <= 132

@@ -18,7 +18,7 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.errors import ImageError, StorageError, TooLargeError
-from app.features.recordings.index import index_file, index_now
+from app.features.recordings.index import index_recording_file, index_recording_in_worker
 from app.features.recordings.service import add_recording, get_recording
 from app.video.frames import read_frames
 from app.video.indexing import index_recording
@@ -125,7 +125,9 @@ class TestHugePictures:
         assert path.read_bytes() != small
         recording = add_recording(store, "cup", path, actor="ann")
         with pytest.raises((ImageError, TooLargeError), match=r"^huge\.avi "):
-            index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+            index_recording_in_worker(
+                store, recording.id, progress=lambda *_: None, stop=lambda: None
+            )
         assert not get_recording(store, recording.id).indexed
 
     def test_those_that_grow_amid_the_file_have_the_size_of_the_first(
@@ -148,9 +150,9 @@ class TestFullDisk:
             # A disk on which no file gets any larger.
             resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
             with pytest.raises(StorageError, match=r"index of final\.mp4 cannot be stored"):
-                index_file(path, settings, lambda _: None)
+                index_recording_file(path, settings, lambda _: None)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
         assert list(settings.recordings.iterdir()) == []
-        index_file(path, settings, lambda _: None)
+        index_recording_file(path, settings, lambda _: None)
         assert len(list(settings.recordings.iterdir())) == 1

@@ -9,7 +9,7 @@ import pytest
 from app.config import Settings
 from app.video.indexing import index_recording
 from app.video.shots import (
-    LookedAt,
+    FrameContent,
     analyse_frame,
     choose_frames_for_kind,
     classify_shot,
@@ -19,8 +19,8 @@ from tests.films import Join, freeze, join, rendered, write_film
 from tests.videos import vary_times
 
 
-def looked(grass: float, proposed: bool) -> LookedAt:
-    return LookedAt(grass, proposed)
+def looked(grass: float, proposed: bool) -> FrameContent:
+    return FrameContent(grass, proposed)
 
 
 class TestFindShots:
@@ -56,7 +56,7 @@ class TestFindShots:
         film, _ = join(clips, [Join("logo", 12), Join("logo", 12)])
         index = index_recording(write_film(tmp_path / "film.mp4", film), settings)
 
-        def look(numbers: Sequence[int]) -> list[LookedAt]:
+        def look(numbers: Sequence[int]) -> list[FrameContent]:
             return [looked(0.8, not 60 < number < 110) for number in numbers]
 
         found = find_shots(index, look)
@@ -100,4 +100,4 @@ class TestKindOf:
 class TestLookAt:
     def test_a_picture_without_grass_shows_none(self) -> None:
         grey = np.full((180, 320, 3), 128, np.uint8)
-        assert analyse_frame(grey) == LookedAt(0.0, False)
+        assert analyse_frame(grey) == FrameContent(0.0, False)

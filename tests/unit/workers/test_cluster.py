@@ -14,11 +14,11 @@ import pytest
 from app.errors import ClusterError, InputError, NotFoundError
 from app.workers import cluster
 from app.workers.cluster import (
-    Cluster,
+    ClusterExecutor,
     SchedulerPlace,
-    read_place,
+    parse_scheduler_address,
     read_software_versions,
-    require_same,
+    require_same_versions,
     run_task_on_worker,
 )
 from app.workers.executors import run_tasks
@@ -72,14 +72,14 @@ def place() -> Iterator[SchedulerPlace]:
 class TestReadPlace:
     @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]"])
     def test_this_machine_needs_no_certificates(self, host: str) -> None:
-        assert read_place(f"tcp://{host}:8786", None).keys is None
+        assert parse_scheduler_address(f"tcp://{host}:8786", None).keys is None
 
     @pytest.mark.parametrize("host", ["10.0.0.1", "solve.example.org", "0.0.0.0"])
     def test_another_machine_needs_encryption_and_certificates(self, host: str) -> None:
         with pytest.raises(InputError, match="not encrypted"):
-            read_place(f"tcp://{host}:8786", None)
+            parse_scheduler_address(f"tcp://{host}:8786", None)
         with pytest.raises(InputError, match="needs certificates"):
-            read_place(f"tls://{host}:8786", None)
+            parse_scheduler_address(f"tls://{host}:8786", None)
 
     @pytest.mark.parametrize(
         "address",
@@ -94,17 +94,17 @@ class TestReadPlace:
     )
     def test_what_is_no_address_is_said(self, address: str) -> None:
         with pytest.raises(InputError, match="is not the address of a scheduler"):
-            read_place(address, None)
+            parse_scheduler_address(address, None)
 
     def test_a_key_is_for_its_owner_alone(self, tmp_path: Path) -> None:
         keys = write_keys(tmp_path)
-        assert read_place("tls://solve.example.org:8786", keys).port == 8786
+        assert parse_scheduler_address("tls://solve.example.org:8786", keys).port == 8786
         (keys / "key.pem").chmod(0o640)
         with pytest.raises(InputError, match=r"other users can read .*key\.pem"):
-            read_place("tls://solve.example.org:8786", keys)
+            parse_scheduler_address("tls://solve.example.org:8786", keys)
         (keys / "ca.pem").unlink()
         with pytest.raises(InputError, match=r"ca\.pem cannot be read"):
-            read_place("tls://solve.example.org:8786", keys)
+            parse_scheduler_address("tls://solve.example.org:8786", keys)
 
 
 class TestRequireSame:
@@ -112,7 +112,7 @@ class TestRequireSame:
         other = {**read_software_versions(), "solver": "4", "numpy": "1.0"}
         del other["numba"]
         with pytest.raises(ClusterError) as refused:
-            require_same(read_software_versions(), other, "far")
+            require_same_versions(read_software_versions(), other, "far")
         said = refused.value.message
         assert "the worker at far has solver 4 instead of" in said
         assert "numba missing instead of" in said
@@ -121,7 +121,7 @@ class TestRequireSame:
 
 class TestCluster:
     def test_results_come_back_and_so_do_errors_as_they_are(self, place: SchedulerPlace) -> None:
-        with Cluster(place) as executor:
+        with ClusterExecutor(place) as executor:
             assert sorted(run_tasks(double, range(20), executor)) == list(range(0, 40, 2))
             with pytest.raises(NotFoundError, match="there is no 7") as refused:
                 executor.submit(refuse, 7).result(SECONDS)
@@ -138,7 +138,7 @@ class TestCluster:
         error: type[Exception],
         said: str,
     ) -> None:
-        with Cluster(place) as executor, pytest.raises(error, match=said):
+        with ClusterExecutor(place) as executor, pytest.raises(error, match=said):
             executor.submit(work, 7).result(SECONDS)
 
     def test_what_is_lost_while_it_is_fetched_is_done_again(
@@ -157,7 +157,7 @@ class TestCluster:
             return fetch(sent, timeout)
 
         monkeypatch.setattr(Sent, "result", lose_the_first)
-        with Cluster(place) as workers:
+        with ClusterExecutor(place) as workers:
             assert workers.submit(double, 4).result(SECONDS) == 8
         assert lost
 
@@ -173,7 +173,7 @@ class TestCluster:
             await asyncio.sleep(SECONDS)
 
         monkeypatch.setattr(cluster, "_LEAVE_S", 0.1)
-        executor = Cluster(place)
+        executor = ClusterExecutor(place)
         with monkeypatch.context() as stuck:
             stuck.setattr(Client, "_close", hang)
             executor.shutdown()
@@ -184,7 +184,7 @@ class TestCluster:
     def test_a_worker_of_another_version_does_nothing(
         self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        with Cluster(place) as executor:
+        with ClusterExecutor(place) as executor:
             asked: Future[int] = executor.submit(
                 run_task_on_worker, {**read_software_versions(), "solver": "4"}, double, (1,)
             )
@@ -192,7 +192,7 @@ class TestCluster:
                 asked.result(SECONDS)
         monkeypatch.setattr(cluster, "read_software_versions", of_another_version)
         with pytest.raises(ClusterError, match="has solver 4 instead of 5"):
-            Cluster(place)
+            ClusterExecutor(place)
 
     def test_a_scheduler_that_goes_while_it_is_greeted_is_waited_for(
         self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
@@ -207,7 +207,7 @@ class TestCluster:
                 raise RuntimeError("it said half of its name")
             return greet(*words, **named)
 
-        with Cluster(place) as workers:
+        with ClusterExecutor(place) as workers:
             monkeypatch.setattr(distributed, "Client", greet_the_second_time)
             workers._lost.set()
             waiting = time.monotonic() + SECONDS
@@ -219,5 +219,5 @@ class TestCluster:
     def test_who_waits_for_nobody_is_told(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
         with pytest.raises(ClusterError, match="no scheduler answers at") as refused:
-            Cluster(SchedulerPlace("tcp://127.0.0.1:9"))
+            ClusterExecutor(SchedulerPlace("tcp://127.0.0.1:9"))
         assert refused.value.hint == "Start one: touchline scheduler tcp://127.0.0.1:9"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.dialects.dialect import dialect_in
+from app.db.dialects.dialect import get_session_dialect
 from app.db.store import Store
 
 
@@ -11,8 +11,8 @@ class TestFaults:
     def test_a_sound_file_has_no_fault(self, filled: Store) -> None:
         with filled.read() as session:
             assert (
-                dialect_in(session).file_faults(session),
-                dialect_in(session).count_lost_references(session),
+                get_session_dialect(session).find_file_faults(session),
+                get_session_dialect(session).count_lost_references(session),
             ) == ([], 0)
 
     @pytest.mark.file_of_sqlite("a reference that is lost, which PostgreSQL lets nobody write")
@@ -20,4 +20,4 @@ class TestFaults:
         with filled.read() as session:
             session.execute(text("PRAGMA defer_foreign_keys = ON"))
             session.execute(text("UPDATE view SET station_id = 99"))
-            assert dialect_in(session).count_lost_references(session) == 3
+            assert get_session_dialect(session).count_lost_references(session) == 3

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import insert, select, text
 
 from app.config import Settings
-from app.db.backup import back_up
+from app.db.backup import back_up_home
 from app.db.dialects import postgresql
 from app.db.restore import restore_database
 from app.db.store import Store
@@ -115,7 +115,7 @@ class TestWrite:
 class TestGlance:
     def test_each_statement_is_a_transaction(self, own_store: Store) -> None:
         began = text("SELECT now()")
-        with own_store.read_one() as session:
+        with own_store.read_for_one_statement() as session:
             assert session.scalar(began) < session.scalar(began)
         with own_store.read() as session:
             assert session.scalar(began) == session.scalar(began)
@@ -179,7 +179,7 @@ class TestRights:
 class TestInterrupted:
     def test_a_statement_ends_when_nobody_wants_it_any_more(self, own_store: Store) -> None:
         began = time.monotonic()
-        with own_store.read() as session, postgresql.DIALECT.interrupted(session, lambda: True):
+        with own_store.read() as session, postgresql.DIALECT.interrupt_when(session, lambda: True):
             session.execute(text("SELECT pg_sleep(600)"))
         assert time.monotonic() - began < 300
 
@@ -202,7 +202,7 @@ class TestCopies:
     def test_are_made_by_the_server_and_the_command_is_named(
         self, own_store: Store, tmp_path
     ) -> None:
-        for copy in (back_up, restore_database):
+        for copy in (back_up_home, restore_database):
             with pytest.raises(InputError) as caught:
                 copy(own_store.settings, tmp_path / "x.zip")
             assert caught.value.hint is not None

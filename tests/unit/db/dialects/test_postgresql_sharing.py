@@ -39,7 +39,7 @@ def words(own_store: Store) -> queue.Queue[str]:
 
 def end(own_store: Store, begins: str) -> None:
     """End the connections whose last statement begins so."""
-    with own_store.read_one() as session:
+    with own_store.read_for_one_statement() as session:
         assert all(session.scalars(text(OTHERS.format(begins))).all())
 
 

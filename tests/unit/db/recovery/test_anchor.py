@@ -10,15 +10,15 @@ from sqlalchemy import Engine, text
 from structlog.testing import capture_logs
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of, make_engine
+from app.db.dialects.dialect import get_dialect, make_engine
 from app.db.log import NewLogEntry, append_entries
 from app.db.recovery import anchor
 from app.db.recovery.anchor import (
     DatabaseAnchor,
-    anchor_file,
-    make_anchor,
+    find_anchor_file,
     read_anchor,
     renew_anchor,
+    write_anchor,
 )
 from app.db.store import Store
 from app.errors import DamagedError
@@ -33,7 +33,7 @@ def anchored(own_store: Store) -> DatabaseAnchor:
 
 def cut_log(own_store: Store, *, after: int) -> None:
     """Take the end of the log away, as only somebody can who changes the schema."""
-    on_file = dialect_of(own_store.settings).is_file
+    on_file = get_dialect(own_store.settings).is_file
     with own_store.write() as session:
         session.execute(text(_OPENED_ON_FILE if on_file else _OPENED_ON_SERVER))
         session.execute(text(f"DELETE FROM log WHERE id > {after}"))
@@ -70,7 +70,7 @@ class TestReadAnchor:
         assert read_anchor(own_store.settings.database_file) == expected
 
     def test_one_that_stays_broken_is_damage(self, own_store: Store) -> None:
-        anchor_file(own_store.settings.database_file).write_bytes(b"{")
+        find_anchor_file(own_store.settings.database_file).write_bytes(b"{")
         with pytest.raises(DamagedError, match="is damaged"):
             read_anchor(own_store.settings.database_file)
 
@@ -93,7 +93,7 @@ class TestRenewAnchor:
         say(own_store, 2)
         file = own_store.settings.database_file
         behind = replace(anchored(own_store), entries=0, hash="")
-        make_anchor(file, behind)
+        write_anchor(file, behind)
         renew_anchor(engine, own_store.settings, alone=False)
         assert anchored(own_store) == behind
         renew_anchor(engine, own_store.settings, alone=True)
@@ -104,13 +104,13 @@ class TestRenewAnchor:
         self, own_store: Store, engine: Engine, value: str
     ) -> None:
         whole = anchored(own_store)
-        make_anchor(own_store.settings.database_file, replace(whole, **{value: "another"}))
+        write_anchor(own_store.settings.database_file, replace(whole, **{value: "another"}))
         renew_anchor(engine, own_store.settings, alone=False)
         assert anchored(own_store) == whole
 
     def test_one_that_is_missing_is_made_anew(self, own_store: Store, engine: Engine) -> None:
         whole = anchored(own_store)
-        anchor_file(own_store.settings.database_file).unlink()
+        find_anchor_file(own_store.settings.database_file).unlink()
         renew_anchor(engine, own_store.settings, alone=False)
         assert anchored(own_store) == whole
 
@@ -161,7 +161,7 @@ class TestBeforeTheCommit:
     ) -> None:
         say(own_store, 5)
         cut_log(own_store, after=3)
-        anchor_file(own_store.settings.database_file).unlink()
+        find_anchor_file(own_store.settings.database_file).unlink()
         say(own_store)
         assert log_ids(own_store) == [1, 2, 3, 4]
 
@@ -179,7 +179,7 @@ class TestAfterTheCommit:
         with capture_logs() as logs:
             for _round in range(2):
                 with monkeypatch.context() as broken:
-                    broken.setattr("app.db.store.move_anchor", refuse)
+                    broken.setattr("app.db.store.overwrite_anchor", refuse)
                     say(own_store)
                     say(own_store)
                 say(own_store)

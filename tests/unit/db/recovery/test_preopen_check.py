@@ -14,7 +14,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.migrate import migrate_database
-from app.db.recovery.preopen_check import log_file
+from app.db.recovery.preopen_check import find_write_ahead_log_file
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
 from tests.unit.db.homes import killed, say
@@ -136,7 +136,7 @@ class TestRequireSound:
         checkpoint(own_store)
         say(own_store, 40)
         settings = killed(own_store, tmp_path / "left")
-        log = log_file(settings.database_file)
+        log = find_write_ahead_log_file(settings.database_file)
         whole = log.read_bytes()
         log.write_bytes(damage(whole))
         refused(settings, r"the log .* ends after \d+ entries, but this home recorded 43")
@@ -150,7 +150,7 @@ class TestRequireSound:
         settings = killed(own_store, tmp_path / "left")
         say(own_store)
         killed(own_store, tmp_path / "left", "touchline.db-wal")
-        log = log_file(settings.database_file)
+        log = find_write_ahead_log_file(settings.database_file)
         log.write_bytes(log.read_bytes()[:-100])
         assert entries(settings) == 5
 
@@ -167,7 +167,7 @@ class TestRequireSound:
     ) -> None:
         say(own_store, 40)
         settings = killed(own_store, tmp_path / "50% of #1")
-        log = log_file(settings.database_file)
+        log = find_write_ahead_log_file(settings.database_file)
         log.write_bytes(cut(log.read_bytes()))
         refused(settings, "but this home recorded 40")
 

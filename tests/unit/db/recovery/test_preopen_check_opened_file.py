@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from app.db.recovery.preopen_check import log_file
+from app.db.recovery.preopen_check import find_write_ahead_log_file
 from app.db.store import Store
 from app.errors import DamagedError
 from tests.databases import Databases
@@ -71,7 +71,7 @@ class TestAFileThatIsTakenAway:
     ) -> None:
         own_store = Store.open(databases.settings(tmp_path / "home"))
         say(own_store, 3)
-        log_file(own_store.settings.database_file).unlink()
+        find_write_ahead_log_file(own_store.settings.database_file).unlink()
         with pytest.raises(DamagedError, match=r"touchline\.db-wal was moved or deleted") as caught:
             say(own_store)
         assert "Stop the server before" in str(caught.value.hint)

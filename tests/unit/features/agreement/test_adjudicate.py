@@ -24,7 +24,7 @@ from app.features.agreement.service import (
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
@@ -43,12 +43,12 @@ from tests.unit.features.independent_annotations.begun import begin_take
 def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> IndependentAnnotation:
     """The take of a person who moves the ball of the first view and accepts."""
     take = begin_take(store, group_id, person=person)
-    state = load(store, take.copy_id)
+    state = load_group_state(store, take.copy_id)
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     if moved:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-        state = submit(
+        state = submit_edit(
             store, take.copy_id, set_ball(view.key, ball), if_match=state.etag, actor=person
         )
     set_verdict(store, take.copy_id, "accepted", None, "seen", if_match=state.etag, actor=person)
@@ -71,7 +71,7 @@ class TestAfterHandIn:
         assert compare_or_adopt_submission(store, first.copy_id) is None
         second = judged(store, state.id, "ben", 2.0)
         assert compare_or_adopt_submission(store, second.copy_id) == "agreed"
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert ball_x(after) == ball_x(state) + 1
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
         assert ("agreement", BY_ITSELF) in kinds(store, state.id)
@@ -100,7 +100,7 @@ class TestAfterHandIn:
             )
             with pytest.raises(OSError, match="power"):
                 compare_or_adopt_submission(store, second.copy_id)
-        assert load(store, state.id).etag == state.etag
+        assert load_group_state(store, state.id).etag == state.etag
         assert list_open_cases(store, state.dataset) == []
         assert (weigh.compare_uncompared_groups(store), weigh.compare_uncompared_groups(store)) == (
             1,
@@ -109,7 +109,7 @@ class TestAfterHandIn:
         assert [one.group for one in list_open_cases(store, state.dataset)] == (
             [state.id] if comes_to == "open" else []
         )
-        moved_by = ball_x(load(store, state.id)) - ball_x(state)
+        moved_by = ball_x(load_group_state(store, state.id)) - ball_x(state)
         assert moved_by == (1.0 if comes_to == "agreed" else 0.0)
 
     def test_what_cannot_be_taken_over_waits_for_a_decision(
@@ -130,7 +130,7 @@ class TestAfterHandIn:
         judged(store, state.id, "ann")
         second = judged(store, state.id, "ben", 40.0)
         assert compare_or_adopt_submission(store, second.copy_id) == "open"
-        assert load(store, state.id).etag == state.etag
+        assert load_group_state(store, state.id).etag == state.etag
         (waiting,) = list_open_cases(store, state.dataset)
         assert (waiting.group, waiting.people) == (state.id, ("ann", "ben"))
         assert waiting.worst > 10
@@ -178,7 +178,7 @@ class TestDecide:
             broken.setattr(weigh, "copy_verdict_to_original", fail)
             with pytest.raises(OSError, match="power"):
                 adjudicate_case(store, state.id, takes[1].id, actor="lea")
-        assert load(store, state.id).etag == state.etag
+        assert load_group_state(store, state.id).etag == state.etag
         assert kinds(store, state.id) == before
         assert not any(get_annotation(store, one.id).settled for one in takes)
         assert [one.group for one in list_open_cases(store, state.dataset)] == [state.id]
@@ -226,7 +226,7 @@ class TestHandBack:
         assert list_open_cases(store, state.dataset) == []
         shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
         assert [one.returned and one.returned.reason for one in shown] == [None, "the spot"]
-        again = load(store, takes[1].copy_id)
+        again = load_group_state(store, takes[1].copy_id)
         set_verdict(
             store, takes[1].copy_id, "deferred", None, "x", if_match=again.etag, actor="ben"
         )

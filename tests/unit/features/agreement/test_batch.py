@@ -9,11 +9,11 @@ import pytest
 from app.db.store import Store
 from app.features.agreement.adjudicate import adjudicate_case, list_open_cases, read_case
 from app.features.agreement.service import compare_or_adopt_submission
-from app.features.batches.leases import BatchMember, Leases
+from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
@@ -30,18 +30,18 @@ def batch(store, fill, make_group) -> Batch:
     for name in (*PEOPLE, "cy"):
         invite(store, name, Role.REVIEWER, actor="local")
     new = NewBatch("twice", annotators=PEOPLE, reviewers=("cy",), verdicts=2)
-    return make_batch(store, load(store, ids[0]).dataset_id, new, actor="lead")
+    return make_batch(store, load_group_state(store, ids[0]).dataset_id, new, actor="lead")
 
 
-def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: float) -> int:
+def annotate(store: Store, leases: LeaseService, batch: Batch, person: str, moved: float) -> int:
     """The copy that somebody gets next, its ball moved and the group accepted."""
     copy = leases.next(batch.id, BatchMember(person)).group
     assert copy is not None
-    state = load(store, copy)
+    state = load_group_state(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    state = submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
+    state = submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return copy
 
@@ -53,7 +53,7 @@ def left(store: Store, person: str) -> int:
 
 
 def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> None:
-    leases = Leases(store)
+    leases = LeaseService(store)
     assert left(store, "ada") == 2
     for moved in (1.0, 1.0):
         copy = annotate(store, leases, batch, "ada", moved)
@@ -71,7 +71,7 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     waiting = list_open_cases(store, batch.dataset_id)
     assert len(waiting) == 1
     group = waiting[0].group
-    assert load(store, group).verdict.state == "unreviewed"
+    assert load_group_state(store, group).verdict.state == "unreviewed"
     case = read_case(store, group, actor="cy")
     after = adjudicate_case(store, group, case.annotations[1].id, actor="cy")
     assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.features.agreement.summary import _agreement_of_all
+from app.features.agreement.summary import _summarize_overall_agreement
 
 PEOPLE = ("ada", "bo", "cy")
 
@@ -19,15 +19,15 @@ def judged(*verdicts: str | None) -> Any:
 
 def test_fleiss_kappa_is_told_where_all_groups_were_judged_by_equally_many() -> None:
     groups = [judged("accepted", "accepted"), judged("rejected", "rejected")]
-    kappa = _agreement_of_all(PEOPLE, groups).kappa
+    kappa = _summarize_overall_agreement(PEOPLE, groups).kappa
     assert kappa is not None and kappa.value == pytest.approx(1.0)
 
 
 def test_where_they_were_judged_by_unequal_numbers_it_is_not() -> None:
     groups = [judged("accepted", "accepted", "accepted"), judged("rejected", "rejected")]
-    assert _agreement_of_all(PEOPLE, groups).kappa is None
+    assert _summarize_overall_agreement(PEOPLE, groups).kappa is None
 
 
 def test_a_group_that_one_alone_judged_says_nothing() -> None:
     groups = [judged("accepted", "accepted"), judged("rejected", "rejected"), judged("accepted")]
-    assert _agreement_of_all(PEOPLE, groups).kappa is not None
+    assert _summarize_overall_agreement(PEOPLE, groups).kappa is not None

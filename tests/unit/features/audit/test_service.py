@@ -24,7 +24,7 @@ from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.replay import _STEPS, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit, submit_edits
+from app.features.groups.submit import load_group_state, submit_edit, submit_edits
 from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
 from app.features.jobs.service import Jobs
@@ -53,7 +53,7 @@ def said(store: Store, fill, make_group) -> int:
     LoginSessions(store).log_in("bob", "three plain words", address="192.0.2.7")
     give_role(store, "demo", bob.id, Role.LEAD, actor="anna")
     begin_thread(store, group, "Behind the post?", actor="anna (token lens)")
-    state = load(store, group)
+    state = load_group_state(store, group)
     set_verdict(store, group, "deferred", None, "unsure", if_match=state.etag, actor="anna")
     return group
 
@@ -132,7 +132,7 @@ class TestAudit:
     def test_edits_of_several_views_at_once_are_told_one_by_one(
         self, store: Store, said: int
     ) -> None:
-        state = load(store, said)
+        state = load_group_state(store, said)
         one, two = (view.key for view in state.group.views[:2])
         edits = [SetLines(one, {"Middle line": None}), set_ball(two, None)]
         state = submit_edits(store, said, edits, if_match=state.etag, actor="anna")
@@ -145,7 +145,7 @@ class TestAudit:
     def test_edits_are_told_by_what_they_set_where_and_whether_they_were_taken_back(
         self, store: Store, said: int
     ) -> None:
-        state = load(store, said)
+        state = load_group_state(store, said)
         key = state.group.views[0].key
         edits = (
             SetLines(key, {"Middle line": None}),
@@ -154,7 +154,7 @@ class TestAudit:
             IncludeView(key, True),
         )
         for edit in edits:
-            state = submit(store, said, edit, if_match=state.etag, actor="anna")
+            state = submit_edit(store, said, edit, if_match=state.etag, actor="anna")
         state = undo_group_edit(store, said, if_match=state.etag, actor="anna")
         redo_group_edit(store, said, if_match=state.etag, actor="anna")
         assert lines(store)[:6] == [
@@ -188,14 +188,14 @@ class TestAudit:
 
 
 def judge(store: Store, state: str, actor: str) -> None:
-    said = load(store, 1)
+    said = load_group_state(store, 1)
     reason = "duplicate_view" if state == "rejected" else None
     set_verdict(store, 1, state, reason, None, if_match=said.etag, actor=actor)
 
 
 def shown(store: Store) -> tuple[str, str | None, list[str]]:
     """Who gave the verdict that counts: in the group, in the queue, and who reviewed at all."""
-    state = load(store, 1).verdict
+    state = load_group_state(store, 1).verdict
     assert state is not None
     row = list_groups(store, 1, "", 10, None, None).items[0]
     return state.actor, row.reviewer, [one.name for one in list_reviewers(store, 1)]

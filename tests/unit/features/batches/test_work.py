@@ -13,7 +13,7 @@ from app.features.agreement.service import compare_or_adopt_submission, compare_
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
 from app.features.batches import leases as leases_module
-from app.features.batches.leases import LASTS, BatchMember, Lease, Leases
+from app.features.batches.leases import LASTS, BatchMember, Lease, LeaseService
 from app.features.batches.progress import list_own_batches, list_team_batches
 from app.features.batches.service import (
     NewBatch,
@@ -27,11 +27,11 @@ from app.features.batches.service import (
     remove_batch,
 )
 from app.features.groups.replay import replay_log
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.independent_annotations.gold import mark_gold_group, unmark_gold_group
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
-    find_independent_annotation_row,
+    find_annotation_of_copy,
 )
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
@@ -70,12 +70,12 @@ def groups(store, fill, make_group) -> list[int]:
 
 @pytest.fixture
 def dataset(groups, store) -> int:
-    return load(store, groups[0]).dataset_id
+    return load_group_state(store, groups[0]).dataset_id
 
 
 @pytest.fixture
-def leases(store, clock) -> Leases:
-    return Leases(store, clock)
+def leases(store, clock) -> LeaseService:
+    return LeaseService(store, clock)
 
 
 def make_gold(store, group: int) -> None:
@@ -85,7 +85,7 @@ def make_gold(store, group: int) -> None:
 
 def judge(store, group: int, actor: str, state: str = "rejected") -> None:
     reason = "ball_hidden" if state == "rejected" else None
-    etag = load(store, group).etag
+    etag = load_group_state(store, group).etag
     set_verdict(store, group, state, reason and "other", NOTED, if_match=etag, actor=actor)
 
 
@@ -193,7 +193,7 @@ class TestLeases:
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
         people = [BatchMember(f"person{number}") for number in range(8)]
         with ThreadPoolExecutor(8) as pool:
-            given = list(pool.map(lambda one: Leases(store).next(batch, one).group, people))
+            given = list(pool.map(lambda one: LeaseService(store).next(batch, one).group, people))
         assert sorted(one for one in given if one) == sorted(groups)
         assert given.count(None) == 2
 
@@ -373,7 +373,7 @@ class TestLeases:
         while not ordinary:
             copy = leases.next(batch, ADA).group
             with store.read() as session:
-                ordinary = find_independent_annotation_row(session, copy).kind == INDEPENDENT
+                ordinary = find_annotation_of_copy(session, copy).kind == INDEPENDENT
             leases.submit(batch, copy, ADA, actor="ada")
         assert get_batch(store, batch).submitted == 0
         compare_uncompared_groups(store)
@@ -430,8 +430,8 @@ class TestOwnPlace:
         batch = make_batch(store, dataset, new, actor="lead").id
         told = []
         for _ in range(3):
-            lease = Leases(store).next(batch, ADA)
-            again = Leases(store).take(batch, lease.group, ADA)
+            lease = LeaseService(store).next(batch, ADA)
+            again = LeaseService(store).take(batch, lease.group, ADA)
             assert (again.place, again.of) == (lease.place, lease.of)
             told.append((lease.place, lease.of))
             judge(store, lease.group, "ada")
@@ -441,12 +441,12 @@ class TestOwnPlace:
         make_gold(store, groups[5])
         new = NewBatch("a", size=3, annotators=["ada"], gold_every=2)
         batch = make_batch(store, dataset, new, actor="lead").id
-        lease = Leases(store).next(batch, ADA)
+        lease = LeaseService(store).next(batch, ADA)
         assert (lease.place, lease.of) == (1, None)
 
     def test_who_works_on_the_groups_themselves_is_told_none(self, store, dataset, groups):
         batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
-        lease = Leases(store).next(batch, ADA)
+        lease = LeaseService(store).next(batch, ADA)
         assert (lease.place, lease.of) == (None, None)
 
 
@@ -470,7 +470,7 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         for minutes, group in ((1, groups[0]), (4, groups[1]), (90, groups[2]), (96, groups[3])):
             at = clock.at + timedelta(minutes=minutes)
-            Leases(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
+            LeaseService(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
         (team,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=2))
         (pace,) = team.people
         assert (pace.name, pace.submitted, pace.minutes) == ("ada", 4, pytest.approx(9))
@@ -489,7 +489,7 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         copies = {}
         for minutes, who in ((1, ADA), (5, ADA), (20, BO)):
-            copies[minutes] = Leases(store).next(batch, who).group
+            copies[minutes] = LeaseService(store).next(batch, who).group
             at = (clock.at + timedelta(minutes=minutes)).isoformat(timespec="microseconds")
             monkeypatch.setattr("app.features.verdicts.service.now", lambda at=at: at)
             judge(store, copies[minutes], who.name)

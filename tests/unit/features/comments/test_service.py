@@ -13,7 +13,7 @@ from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import read_etags
 from app.features.notifications.queries import NotificationKind
-from app.features.notifications.service import notify_person, read_all, read_notifications
+from app.features.notifications.service import mark_as_read, notify_person, read_notifications
 from app.features.people.logins import Login, read_roles
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
@@ -233,9 +233,9 @@ class TestBell:
         (ring,) = read_notifications(store, bob).items
         assert ring.sentence.startswith("local mentioned you in ")
         assert ring.address.startswith(f"/review/{group}?thread=")
-        read_all(store, anna, [ring.id])
+        mark_as_read(store, anna, [ring.id])
         assert read_notifications(store, bob).unread == 1
-        assert read_all(store, bob, [ring.id]).unread == 0
+        assert mark_as_read(store, bob, [ring.id]).unread == 0
         assert read_notifications(store, anna).unread == 1
 
     def test_nobody_is_told_who_is_disabled_or_did_it_themselves(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.store import Store
 from app.features.audit.service import assign_local_work
 from app.features.comments import service as comments
@@ -79,4 +79,4 @@ class TestExamineThreads:
             session.execute(text(forged.format(threads[0])))
         check = examine_threads(store)
         assert (check.ok, check.sentence) == (False, f"1 not as the log says: {threads[0]}")
-        assert check.mend == dialect_of(store.settings).restoring
+        assert check.mend == get_dialect(store.settings).restoring

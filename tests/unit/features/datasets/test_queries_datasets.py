@@ -5,10 +5,10 @@ import pytest
 from app.db.store import Store
 from app.features.datasets.queries import (
     find_dataset,
-    group_ids,
     insert_dataset_row,
     list_dataset_rows,
-    policy_from_row,
+    list_group_ids,
+    parse_stored_policy,
     read_dataset_name,
     read_dataset_names,
     update_policy,
@@ -37,7 +37,10 @@ class TestDatasets:
             update_policy(session, added, STRICT)
             rows = list_dataset_rows(session)
             assert [row.id for row in rows] == [added, 1]
-            assert (policy_from_row(rows[0].policy), rows[0].policy_hash) == (STRICT, STRICT.hash)
+            assert (parse_stored_policy(rows[0].policy), rows[0].policy_hash) == (
+                STRICT,
+                STRICT.hash,
+            )
             assert read_dataset_names(session) == {1: "demo", added: "alder"}
             assert read_dataset_name(session, added) == "alder"
-            assert (group_ids(session, 1), group_ids(session, added)) == ([1], [])
+            assert (list_group_ids(session, 1), list_group_ids(session, added)) == ([1], [])

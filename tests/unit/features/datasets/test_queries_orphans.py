@@ -6,7 +6,7 @@ from sqlalchemy import insert, text
 from app.db.store import Store
 from app.features.datasets.queries import (
     delete_solutions,
-    delete_unused_calibrations_among,
+    delete_unused_calibrations_of_keys,
     list_solution_ids,
     list_unused_calibrations,
 )
@@ -40,13 +40,13 @@ class TestSpareCalibrations:
             assert found == [[1, 2], []]
             delete_solutions(session, [1])
             assert list_unused_calibrations(session) == ["a"]
-            assert delete_unused_calibrations_among(session, KEYS[:2]) == 1
+            assert delete_unused_calibrations_of_keys(session, KEYS[:2]) == 1
             assert filter_stored_calibration_keys(session, KEYS) == {"b", "c"}
 
     def test_only_those_that_were_found_go(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
-            assert delete_unused_calibrations_among(session, KEYS[:2]) == 2
+            assert delete_unused_calibrations_of_keys(session, KEYS[:2]) == 2
             assert filter_stored_calibration_keys(session, KEYS) == {"c"}
 
     def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
@@ -55,5 +55,5 @@ class TestSpareCalibrations:
             session.execute(text("UPDATE queue SET solved = false"))
             assert (
                 list_unused_calibrations(session),
-                delete_unused_calibrations_among(session, KEYS),
+                delete_unused_calibrations_of_keys(session, KEYS),
             ) == ([], 0)

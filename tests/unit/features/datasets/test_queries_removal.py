@@ -3,14 +3,14 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.db.dialects.dialect import dialect_in
+from app.db.dialects.dialect import get_session_dialect
 from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.features.datasets.queries import (
-    count_contents,
-    delete_rows,
+    count_dataset_contents,
+    delete_dataset_rows,
     list_dataset_rows,
-    record_used_ids,
+    reserve_used_ids,
 )
 from app.features.datasets.tables import GroupModel
 from app.features.findings.queries import insert_dismissal
@@ -51,22 +51,22 @@ class TestDismissals:
     def test_they_go_with_their_dataset_once_the_log_says_so(self, dismissed: Store) -> None:
         with dismissed.write() as session:
             append_entries(session, [NewLogEntry("dataset_deleted", "ann", "2026-01-02", {}, 1)])
-            delete_rows(session, 1)
-            assert dialect_in(session).count_lost_references(session) == 0
+            delete_dataset_rows(session, 1)
+            assert get_session_dialect(session).count_lost_references(session) == 0
             assert session.scalar(text("SELECT count(*) FROM dismissal")) == 0
 
 
 class TestRemoval:
     def test_contents_are_counted(self, filled: Store) -> None:
         with filled.read() as session:
-            counts = count_contents(session, 1)
+            counts = count_dataset_contents(session, 1)
             assert (counts["groups"], counts["views"], counts["verdicts"]) == (1, 3, 0)
-            assert set(count_contents(session, 2).values()) == {0}
+            assert set(count_dataset_contents(session, 2).values()) == {0}
 
     def test_everything_that_was_said_goes_and_no_id_comes_again(self, filled: Store) -> None:
         with filled.write() as session:
-            record_used_ids(session)
-            delete_rows(session, 1)
+            reserve_used_ids(session)
+            delete_dataset_rows(session, 1)
             assert list_dataset_rows(session) == []
-            assert dialect_in(session).count_lost_references(session) == 0
+            assert get_session_dialect(session).count_lost_references(session) == 0
             assert find_next_row_id(session, GroupModel) == 2

@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import get_dataset, get_dataset_head, list_datasets
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.solutions.service import list_stale_groups, solve_dataset
@@ -60,7 +60,7 @@ class TestSavePolicy:
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         after = get_dataset(store, "demo")
         assert (after.policy, after.solved) == (STRICT, 0)
-        now = load(store, state.id)
+        now = load_group_state(store, state.id)
         assert now.solution is None
         assert now.etag != state.etag
         assert list_stale_groups(store, "demo") == [state.id]
@@ -78,4 +78,4 @@ class TestSavePolicy:
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         change_policy(store, "demo", PAPER, if_match=None, actor="ann")
         assert get_dataset(store, "demo").solved == 1
-        assert load(store, state.id).solution == state.solution
+        assert load_group_state(store, state.id).solution == state.solution

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import func, select, text
 
-from app.db.dialects.dialect import dialect_in
+from app.db.dialects.dialect import get_session_dialect
 from app.db.log import LogModel, verify_chain
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
@@ -15,7 +15,7 @@ from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, LoginSessions, read_roles
@@ -40,9 +40,9 @@ def two(store: Store, once, fill, make_group, make_static) -> Store:
 
     def make() -> None:
         ids = fill(make_group(7), make_group(8), make_static(10))
-        state = load(store, ids[0])
+        state = load_group_state(store, ids[0])
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, ids[0], set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(store, ids[0], set_ball("7.png", ball), if_match=state.etag, actor="ann")
         other_lines = replace(make_static(10).views[0].station, lines={})
         changed = make_static(10)
         changed = changed.with_view(replace(changed.views[0], station=other_lines))
@@ -91,9 +91,9 @@ class TestDeleteDataset:
         assert contents.counts["groups"] == 3
         assert [item.name for item in list_datasets(two)] == ["other"]
         assert list_groups(two, 2, limit=500) == before
-        assert load(two, before.items[0].id).solution is not None
+        assert load_group_state(two, before.items[0].id).solution is not None
         with two.read() as session:
-            assert dialect_in(session).count_lost_references(session) == 0
+            assert get_session_dialect(session).count_lost_references(session) == 0
             for table in Base.metadata.sorted_tables:
                 if "dataset_id" in table.c and table.name not in ("log", "job"):
                     owners = set(session.scalars(select(table.c.dataset_id)))
@@ -119,7 +119,7 @@ class TestDeleteDataset:
         with pytest.raises(NotFoundError):
             read_history(two, old[0])
         with pytest.raises(NotFoundError):
-            load(two, old[0])
+            load_group_state(two, old[0])
         with two.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
@@ -179,8 +179,8 @@ class TestDeleteDataset:
         with two.read() as session:
             assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
             assert replay_log(session) == read_state_snapshot(session)
-            assert dialect_in(session).count_lost_references(session) == 0
-        assert [one.dataset for one in AccessTokens(two).of_person(person.id)] == ["demo"]
+            assert get_session_dialect(session).count_lost_references(session) == 0
+        assert [one.dataset for one in AccessTokens(two).list_of_person(person.id)] == ["demo"]
 
     def test_verdicts_can_be_deleted_only_with_their_dataset(self, two: Store) -> None:
         delete_dataset(two, "other", confirm="other", actor="eve")

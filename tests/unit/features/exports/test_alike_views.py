@@ -16,9 +16,9 @@ import pytest
 
 import touchline
 from app.errors import InputError
-from app.evaluation.frame import FrameNames, NamedFrame
-from app.features.exports.service import ExportReport, export_dataset, require_possible
-from app.features.groups.submit import load
+from app.evaluation.frame import FrameNameIndex, NamedFrame
+from app.features.exports.service import ExportReport, export_dataset, require_exportable
+from app.features.groups.submit import load_group_state
 from app.features.imports.cameras import import_given_cameras
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
@@ -239,7 +239,7 @@ class TestEveryFormat:
         self, store, fill, tmp_path: Path, name: str
     ) -> None:
         for group_id in fill(*made("alike", tmp_path / "in")):
-            etag = load(store, group_id).etag
+            etag = load_group_state(store, group_id).etag
             set_verdict(store, group_id, "accepted", None, "known", if_match=etag, actor="ann")
         freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
         for out, version in (("live", None), ("frozen", "v1")):
@@ -257,7 +257,7 @@ class TestEveryFormat:
     ) -> None:
         fill(*made("from ISSIA", tmp_path / "in"))
         with pytest.raises(InputError, match=r"358, cam1 and 359, cam1.*different cameras"):
-            require_possible(store, "demo", name, everything=True)
+            require_exportable(store, "demo", name, everything=True)
 
     def test_names_that_no_other_frame_has_stay_what_they_were(
         self, store, fill, tmp_path: Path
@@ -301,7 +301,7 @@ class TestWhatIsWrittenIsFoundAgain:
         fill(*groups)
         export_dataset(store, "demo", name, tmp_path / "out", everything=True, images="copy")
         views = [(group, view) for group in groups for view in group.views]
-        known = FrameNames.of(
+        known = FrameNameIndex.of(
             NamedFrame(number, group.key, view.key, group.match, SIZE)
             for number, (group, view) in enumerate(views)
         )

@@ -14,13 +14,13 @@ import pytest
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.predictions.frames import read_live_truth, read_version_truth
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
 from app.formats.parquet import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.ball_boxes import ball_fit, collect_ball_boxes, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from tests.balls import seen
@@ -42,7 +42,7 @@ def with_a_view_apart(group: Group, number: int) -> Group:
 def mixed(store: Store, fill, make_group) -> Store:
     """A group of two views that agree, and one with a third view in no valid pair."""
     ids = fill(make_group(7), with_a_view_apart(make_group(8), 8))
-    solution = load(store, ids[1]).solution
+    solution = load_group_state(store, ids[1]).solution
     assert solution is not None
     assert [view.included for view in solution.views] == [True, True, False]
     freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
@@ -193,9 +193,11 @@ class TestBoxOfAViewApart:
         assert (found["optimized_diameter_px"], found["optimized_error_m"]) == (None, None)
 
     def test_without_an_annotation_it_has_none(self, mixed: Store) -> None:
-        ids: Any = {item.key: item for item in (load(mixed, 1), load(mixed, 2))}
+        ids: Any = {
+            item.key: item for item in (load_group_state(mixed, 1), load_group_state(mixed, 2))
+        }
         state = ids[f"{MATCH}/8.png"]
         view = replace(state.group.views[2], balls=())
         assert collect_ball_boxes(state.solution, view) == {}
-        assert ball_fit(state.solution, view, everything=True) is None
+        assert find_ball_fit(state.solution, view, everything=True) is None
         assert not has_ball_3d(state.solution, view)

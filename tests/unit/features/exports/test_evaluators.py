@@ -13,7 +13,7 @@ import pytest
 
 from app.db.store import Store
 from app.features.exports.service import export_dataset
-from app.features.file_tools.calibrate import score_files
+from app.features.file_tools.calibrate import score_camera_files
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from tests.foreign_readers import read_by
@@ -68,14 +68,14 @@ class TestSnCalibration:
     def test_our_own_score_reads_it_as_well(self, written, parts: tuple[str, str]) -> None:
         root = written("sn-calibration")
         # The usual size, which is not that of the export: its folders say theirs.
-        found = score_files(*(root / part for part in parts), size=ImageSize(960, 540))
+        found = score_camera_files(*(root / part for part in parts), size=ImageSize(960, 540))
         assert (found["frames"], found["completeness"]) == (4, 1.0)
         assert found["fs5"] > 0.99
 
     def test_our_own_score_knows_the_size_of_one_folder_of_it(self, written) -> None:
         root = written("sn-calibration")
         folders = [root / part / FOLDERS[0] for part in ("lines", "cameras")]
-        found = score_files(*folders, size=ImageSize(960, 540))
+        found = score_camera_files(*folders, size=ImageSize(960, 540))
         assert found["frames"] == 2
         assert found["fs5"] > 0.99
 

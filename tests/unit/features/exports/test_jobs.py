@@ -57,16 +57,16 @@ class TestExpire:
     ) -> None:
         for name, days in (("12", 31), ("13", 29)):
             age(folder, keep(folder, name), days)
-        assert folder.expire(30) == 1
+        assert folder.delete_expired_zips(30) == 1
         old, young = folder.get("12"), folder.get("13")
         assert (old.expired, young.expired) == (True, False)
         assert (old.counts, old.bytes) == ({"cameras": 2}, 22)
         assert [folder.content(name).exists() for name in ("12", "13")] == [False, True]
-        assert folder.expire(30) == 0
+        assert folder.delete_expired_zips(30) == 0
 
     def test_none_expires_where_exports_are_kept_for_good(self, folder: ExportFolder) -> None:
         age(folder, keep(folder, "12"), 4000)
-        assert folder.expire(0) == 0
+        assert folder.delete_expired_zips(0) == 0
         assert folder.content("12").exists()
         assert folder.get("12").expires(0) is None
 
@@ -74,14 +74,14 @@ class TestExpire:
         self, folder: ExportFolder
     ) -> None:
         age(folder, replace(keep(folder, "12"), expired=True), 31)
-        folder.expire(30)
+        folder.delete_expired_zips(30)
         assert not folder.content("12").exists()
 
     def test_what_was_delivered_to_an_object_store_never_expires(
         self, folder: ExportFolder
     ) -> None:
         age(folder, replace(keep(folder, "12"), stored="s3://exports/12.zip"), 31)
-        assert folder.expire(30) == 0
+        assert folder.delete_expired_zips(30) == 0
         assert folder.get("12").expired is False
 
     def test_a_record_that_cannot_be_read_keeps_no_other_from_expiring(
@@ -89,7 +89,7 @@ class TestExpire:
     ) -> None:
         (folder.folder / "11.json").write_text("x")
         age(folder, keep(folder, "12"), 31)
-        assert folder.expire(30) == 1
+        assert folder.delete_expired_zips(30) == 1
 
     def test_a_record_of_an_earlier_version_is_read(self, folder: ExportFolder) -> None:
         values = asdict(keep(folder, "12"))

@@ -15,7 +15,7 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.groups.schemas import GroupDocument
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.routes import GroupRow
@@ -162,7 +162,7 @@ def rows_of(store: Store) -> dict[str, Document]:
 
 def groups_of(store: Store) -> dict[str, Document]:
     ids = [row["id"] for row in rows_of(store).values()]
-    states = [GroupDocument.of(load(store, number)) for number in ids]
+    states = [GroupDocument.of(load_group_state(store, number)) for number in ids]
     return {(said := state.model_dump(mode="json"))["key"]: said for state in states}
 
 

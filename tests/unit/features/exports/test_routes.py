@@ -22,7 +22,7 @@ from app.features.maintenance.upkeep import clean_up
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.export_formats import FORMATS
-from app.media.frames import SentPicture
+from app.media.frames import EncodedPicture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from tests.waiting import SECONDS
@@ -310,9 +310,9 @@ class TestRestart:
         import_groups(services.store, "framed", [framed], source="test", actor="local")
         solve_dataset(services.store, "framed")
 
-        def reader(media: Media, *_: object) -> SentPicture:
+        def reader(media: Media, *_: object) -> EncodedPicture:
             read.append(media.path)
-            return SentPicture.of("image/png", b"a picture")
+            return EncodedPicture.of("image/png", b"a picture")
 
         monkeypatch.setattr(services.frames, "read", reader)
         order = {**ORDER, "dataset": "framed", "all": True, "images": "copy"}

@@ -17,10 +17,10 @@ from app.features.exports.service import (
     TRACKS,
     export_dataset,
     list_formats_with_problems,
-    require_possible,
+    require_exportable,
 )
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -36,7 +36,7 @@ OF_BROADCAST = [name for name in FORMATS if name not in ("issia", "issia-3d", *T
 
 
 def judge(store, group_id, state, reason=None, note=None):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor="ann")
 
 
@@ -114,7 +114,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         state = judge(store, three[1], "accepted")
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, three[1], set_ball("8.png", ball), if_match=state.etag, actor="ben")
+        submit_edit(store, three[1], set_ball("8.png", ball), if_match=state.etag, actor="ben")
         report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"stale": 1}
@@ -131,7 +131,7 @@ class TestExport:
     ) -> None:
         if state == "stale":
             etag = judge(store, three[0], "accepted").etag
-            submit(store, three[0], set_ball("7.png", None), if_match=etag, actor="ben")
+            submit_edit(store, three[0], set_ball("7.png", None), if_match=etag, actor="ben")
         with pytest.raises(InputError) as caught:
             export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert caught.value.hint is None
@@ -162,7 +162,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         etag = judge(store, three[1], "accepted").etag
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
+        submit_edit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
         export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
         assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}
@@ -187,8 +187,8 @@ class TestExport:
     def test_the_chosen_boxes_stand_in_the_labels_and_not_in_the_table(
         self, store, three, tmp_path
     ) -> None:
-        fit = load(store, three[0]).solution.view("7.png").ball
-        annotated = load(store, three[0]).group.view("7.png").ball.box
+        fit = load_group_state(store, three[0]).solution.view("7.png").ball
+        annotated = load_group_state(store, three[0]).group.view("7.png").ball.box
         expected = {
             "annotated": annotated,
             "optimized": fit.optimized_box,
@@ -202,7 +202,7 @@ class TestExport:
                 [box.x, box.y, box.x + box.width, box.y + box.height]
             )
             # The group that fails has no view that takes part.
-            raw = load(store, three[2]).group.view("9.png").ball.box
+            raw = load_group_state(store, three[2]).group.view("9.png").ball.box
             assert ball_corners(out, "9.png")[0] == raw.x
             cells.add(table(out)[0]["ball_bbox"])
         assert len(set(expected.values())) == 3
@@ -230,7 +230,7 @@ class TestExport:
         (name,) = asked
         for run in (
             lambda: export_dataset(store, "demo", form, tmp_path / "out", everything=True, **asked),
-            lambda: require_possible(store, "demo", form, everything=True, **asked),
+            lambda: require_exportable(store, "demo", form, everything=True, **asked),
         ):
             with pytest.raises(
                 InputError, match=f"exports in the format {form} do not use --{name}"
@@ -392,12 +392,12 @@ class TestPossibleFormats:
 
     def test_an_export_that_is_refused_names_the_formats_that_fit(self, store, three) -> None:
         with pytest.raises(InputError, match="is not from ISSIA") as caught:
-            require_possible(store, "demo", "issia", everything=True)
+            require_exportable(store, "demo", "issia", everything=True)
         assert caught.value.hint is not None
         named = caught.value.hint.removesuffix(".").partition(": ")[2].split(", ")
         assert named == OF_BROADCAST
 
     def test_that_nothing_is_accepted_is_no_matter_of_the_format(self, store, three) -> None:
         with pytest.raises(InputError, match="no group has been accepted") as caught:
-            require_possible(store, "demo", "issia")
+            require_exportable(store, "demo", "issia")
         assert caught.value.hint is None

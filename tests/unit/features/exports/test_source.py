@@ -9,7 +9,7 @@ import pytest
 from app.errors import InputError, NotFoundError
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.export_formats import FORMATS, TRACKS
@@ -19,7 +19,7 @@ STATIC = ("issia", "issia-3d")
 
 
 def judge(store, group_id, state, reason=None, note=None):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor="ann")
 
 
@@ -46,8 +46,8 @@ class TestVersionSource:
         self, store, version, tmp_path, name: str
     ) -> None:
         export_dataset(store, "demo", name, tmp_path / "a.zip", version="v1")
-        etag = load(store, 1).etag
-        submit(store, 1, set_ball("7.png", None), if_match=etag, actor="ben")
+        etag = load_group_state(store, 1).etag
+        submit_edit(store, 1, set_ball("7.png", None), if_match=etag, actor="ben")
         judge(store, 2, "rejected", "bad_calibration")
         export_dataset(store, "demo", name, tmp_path / "b.zip", version=version.hash[:12])
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.features.file_tools.calibrate import calibrate_files, score_files
+from app.features.file_tools.calibrate import calibrate_files, score_camera_files
 from app.features.file_tools.matches import estimate_pitch_of_files
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_writer import write_line_files
@@ -124,7 +124,7 @@ class TestCalibrateFiles:
         write(source / "valid", same=click(OPPOSITE, 0.5))
         assert run(source, tmp_path / "out")["calibrated"] == 2
         assert (tmp_path / "out" / "train" / "camera_same.json").is_file()
-        assert score_files(source, tmp_path / "out", size=SIZE)["calibrated"] == 2
+        assert score_camera_files(source, tmp_path / "out", size=SIZE)["calibrated"] == 2
         (source / "valid" / "same.json").unlink()
         run(source, tmp_path / "out")
         assert not (tmp_path / "out" / "valid" / "camera_same.json").exists()
@@ -192,15 +192,15 @@ class TestMatches:
 class TestScoreFiles:
     def test_a_frame_without_a_camera_counts_as_zero(self, lines, tmp_path):
         run(lines, tmp_path / "out")
-        total = score_files(lines, tmp_path / "out", size=SIZE)
+        total = score_camera_files(lines, tmp_path / "out", size=SIZE)
         assert (total["frames"], total["calibrated"], total["completeness"]) == (4, 3, 0.75)
         assert 0.6 < total["jac_0.5"] <= 0.75
         assert total["ms_median"] > 0
 
     def test_markings_called_mislabelled_can_be_left_out(self, lines, tmp_path):
         run(lines, tmp_path / "out")
-        plain = score_files(lines, tmp_path / "out", size=SIZE)
-        without = score_files(
+        plain = score_camera_files(lines, tmp_path / "out", size=SIZE)
+        without = score_camera_files(
             lines, tmp_path / "out", size=SIZE, without=tmp_path / "out" / "findings.json"
         )
         assert without["jac_0.5"] > plain["jac_0.5"]
@@ -214,29 +214,29 @@ class TestScoreFiles:
             InputError,
             match="no camera file has the frame name of a line file: there is a camera of",
         ):
-            score_files(lines, tmp_path / "cameras", size=SIZE)
+            score_camera_files(lines, tmp_path / "cameras", size=SIZE)
 
     def test_cameras_of_others_have_no_times(self, lines, tmp_path):
         run(lines, tmp_path / "out")
         (tmp_path / "out" / "calibrate.json").unlink()
-        assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
+        assert score_camera_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
 
     def test_a_line_file_that_cannot_be_read_counts_as_a_frame(self, lines, tmp_path):
         run(lines, tmp_path / "out")
         (lines / "broken.json").write_text("[")
-        total = score_files(lines, tmp_path / "out", size=SIZE)
+        total = score_camera_files(lines, tmp_path / "out", size=SIZE)
         assert (total["frames"], len(total["problems"])) == (5, 1)
 
     def test_a_folder_without_cameras_is_refused(self, lines, tmp_path):
         (tmp_path / "empty").mkdir()
         with pytest.raises(InputError, match="holds no camera files"):
-            score_files(lines, tmp_path / "empty", size=SIZE)
+            score_camera_files(lines, tmp_path / "empty", size=SIZE)
 
     @pytest.mark.parametrize("text", ["[1]", '{"ms_median": "fast"}'])
     def test_times_that_are_no_numbers_are_passed_over(self, lines, tmp_path, text):
         run(lines, tmp_path / "out")
         (tmp_path / "out" / "calibrate.json").write_text(text)
-        assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
+        assert score_camera_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
 
 
 class TestEstimatePitchOfFiles:

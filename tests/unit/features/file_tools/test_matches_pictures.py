@@ -9,7 +9,11 @@ import pytest
 
 from app.errors import DatasetFormatError
 from app.features.file_tools.calibrate import calibrate_files
-from app.features.file_tools.matches import choose_picture, estimate_picture_of_files, read_picture
+from app.features.file_tools.matches import (
+    choose_picture,
+    estimate_picture_of_files,
+    read_picture_geometry,
+)
 from app.formats.cameras import read_cameras
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
@@ -27,7 +31,7 @@ def write(folder: Path, aspect: float = 1.06, count: int = 4) -> list[LineFile]:
     files = []
     for number in range(count):
         camera = looking(POSITION, (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        shown = PictureGeometry(aspect).camera_of_shown_picture(camera, SIZE)
+        shown = PictureGeometry(aspect).camera_of_annotated_picture(camera, SIZE)
         files.append(LineFile(f"{number}", SIZE, click(shown, 0.7, number, Pitch(goal="middle"))))
     write_line_files(folder, files)
     return files
@@ -77,7 +81,7 @@ class TestPictureFor:
 class TestReadPicture:
     def test_numbers_that_are_absent_are_nothing(self, tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"aspect": 1.25}')
-        assert read_picture(tmp_path / "a.json") == PictureGeometry(1.25)
+        assert read_picture_geometry(tmp_path / "a.json") == PictureGeometry(1.25)
 
     @pytest.mark.parametrize(
         "text", ["[1]", '{"shift": 1}', '{"aspect": "wide"}', '{"sigma": [1]}']
@@ -85,4 +89,4 @@ class TestReadPicture:
     def test_a_file_of_something_else_is_refused(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "a.json").write_text(text)
         with pytest.raises(DatasetFormatError, match="touchline picture --json"):
-            read_picture(tmp_path / "a.json")
+            read_picture_geometry(tmp_path / "a.json")

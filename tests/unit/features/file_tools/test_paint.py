@@ -12,7 +12,11 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.features.file_tools.paint import UniqueNames, measure_paint_agreement_of_files, snap_files
+from app.features.file_tools.paint import (
+    UniqueNameGenerator,
+    measure_paint_agreement_of_files,
+    snap_cameras_to_paint,
+)
 from app.formats.cameras import read_cameras
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
@@ -63,7 +67,9 @@ class TestSnapFiles:
     def test_a_good_picture_is_snapped_and_a_bad_one_is_a_row_with_its_reason(
         self, folder, tmp_path
     ):
-        rows = snap_files(folder / "lines", [folder / "images"], tmp_path, settings=Settings())
+        rows = snap_cameras_to_paint(
+            folder / "lines", [folder / "images"], tmp_path, settings=Settings()
+        )
         by_frame = {row["frame"]: row for row in rows}
         assert {name: row["outcome"] for name, row in by_frame.items()} == {
             "good": "proposed", "grey": "unsure", "small": "nothing",
@@ -99,7 +105,7 @@ class TestSnapFiles:
         (out / "lines").mkdir(parents=True)
         (out / "camera_broken.json").write_text("of an earlier run")
         (out / "lines" / "broken.json").write_text("of an earlier run")
-        rows = snap_files(lines, [images], out, settings=Settings())
+        rows = snap_cameras_to_paint(lines, [images], out, settings=Settings())
         assert {row["frame"]: row["outcome"] for row in rows} == {
             "a/1": "proposed",
             "broken": "nothing",
@@ -110,7 +116,7 @@ class TestSnapFiles:
         assert not (out / "lines" / "broken.json").exists()
 
     def test_invented_names_take_no_other_pictures_name(self):
-        names = UniqueNames()
+        names = UniqueNameGenerator()
         assert [names.name(stem) for stem in ("a", "a", "a_2")] == ["a", "a_2", "a_2_2"]
 
     def test_pictures_without_a_line_file_are_an_error_when_there_is_no_other(
@@ -118,7 +124,7 @@ class TestSnapFiles:
     ):
         (tmp_path / "empty").mkdir()
         with pytest.raises(InputError):
-            snap_files(
+            snap_cameras_to_paint(
                 tmp_path / "empty", [folder / "images"], tmp_path / "out", settings=Settings()
             )
 

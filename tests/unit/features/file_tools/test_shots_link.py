@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.errors import ReviewError
-from app.features.file_tools.shots import link_files, parse_hint
+from app.features.file_tools.shots import link_live_and_replay, parse_hint
 from tests.bench.link import Filmed, made_ball, plant
 from tests.cameras import write_cameras
 
@@ -41,7 +41,7 @@ def views(tmp_path: Path) -> tuple[Path, Path, Path]:
 
 class TestLinkFiles:
     def test_the_map_is_written(self, views: tuple[Path, Path, Path]) -> None:
-        result = link_files(*views)
+        result = link_live_and_replay(*views)
         assert json.loads((views[2] / "link.json").read_text()) == result
         assert result.keys() >= KEYS
         assert result["outcome"] == "linked"
@@ -55,7 +55,7 @@ class TestLinkFiles:
         (live / "camera_00009.json").unlink()
         with (live / "ball.csv").open("a") as file:
             file.write("9000,99.0,,\n9001,1.0,abc,2\n7,0.5,1,1\n9002,0.001,5,5\n")
-        problems = link_files(*views)["problems"]
+        problems = link_live_and_replay(*views)["problems"]
         assert any('x: is "abc", which is not a number' in one for one in problems)
         assert any("7 is listed twice" in one for one in problems)
         assert any("2 of" in one and "have no camera" in one for one in problems)
@@ -67,7 +67,8 @@ class TestLinkFiles:
         lines[5] = ",".join([lines[5].split(",")[0], *lines[4].split(",")[1:]])
         path.write_text("\n".join(lines))
         assert any(
-            "1 frames have the time of another" in one for one in link_files(*views)["problems"]
+            "1 frames have the time of another" in one
+            for one in link_live_and_replay(*views)["problems"]
         )
 
     @pytest.mark.parametrize(
@@ -90,7 +91,7 @@ class TestLinkFiles:
     ) -> None:
         change(views[0])
         with pytest.raises(ReviewError, match=said):
-            link_files(*views)
+            link_live_and_replay(*views)
 
 
 class TestParseHint:

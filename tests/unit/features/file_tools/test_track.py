@@ -11,7 +11,12 @@ import pytest
 
 from app.errors import InputError
 from app.features.file_tools import track
-from app.features.file_tools.track import count_outcomes, frame_to_row, pitch_to_row, track_files
+from app.features.file_tools.track import (
+    count_outcomes,
+    frame_to_row,
+    pitch_to_row,
+    track_cameras_of_clip,
+)
 from app.formats.cameras import read_cameras
 from app.formats.report import ReaderReport
 from app.soccer.frames import ImageSize
@@ -20,7 +25,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import CROWN_SIGMA_M, PAINT_SIZE_SIGMA_M
 from app.solving.paint_noise import CROWN, SIZES, TERMS
 from app.solving.tripod_pitch import SHARED, TripodPitch
-from app.tracking.track import FrameCamera, Track
+from app.tracking.track import CameraTrack, FrameCamera
 from tests.tracked_frames import CAMERA, frame
 from tests.unit.tracking.test_clip import write
 
@@ -49,9 +54,9 @@ def found(monkeypatch: pytest.MonkeyPatch) -> list[FrameCamera]:
         def __init__(self, limits: object) -> None:
             pass
 
-        def run(self, *arguments: object, on_message: Callable[[int], None]) -> Track:
+        def run(self, *arguments: object, on_message: Callable[[int], None]) -> CameraTrack:
             on_message(3)
-            return Track(frames, SHOWN, [frames[1], frames[1], frames[2]])
+            return CameraTrack(frames, SHOWN, [frames[1], frames[1], frames[2]])
 
         def close(self) -> None:
             pass
@@ -142,7 +147,7 @@ def test_lines_that_name_no_file_or_frame_are_refused(
     lines: list[str], message: str, tmp_path: Path
 ):
     with pytest.raises(InputError, match=message):
-        track_files(tmp_path / "clip.mp4", tmp_path / "out", lines)
+        track_cameras_of_clip(tmp_path / "clip.mp4", tmp_path / "out", lines)
 
 
 def test_the_worker_process_reads_clip_and_lines_and_says_what_is_wrong(

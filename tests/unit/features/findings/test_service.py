@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
 from app.features.findings.queries import GroupDismissals, split_open_and_dismissed_kinds
 from app.features.findings.service import (
-    FindingName,
+    FindingReference,
     count_groups,
     iterate_findings_as_json,
     read_findings,
@@ -21,7 +21,7 @@ from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
@@ -71,7 +71,7 @@ class TestDismissedKinds:
 @pytest.fixture
 def found(store: Store, fill, make_group) -> GroupState:
     """A group whose balls do not fit, so that something is found in it."""
-    state = load(store, fill(make_group(9, shift=80.0))[0])
+    state = load_group_state(store, fill(make_group(9, shift=80.0))[0])
     assert state.solution is not None
     assert state.solution.findings
     return state
@@ -82,9 +82,9 @@ def first(state: GroupState) -> Finding:
     return state.solution.findings[0]
 
 
-def name_of(finding: Finding) -> FindingName:
+def name_of(finding: Finding) -> FindingReference:
     names = ("kind", "view", "marking", "suggested", "number")
-    return FindingName(*(getattr(finding, name) for name in names))
+    return FindingReference(*(getattr(finding, name) for name in names))
 
 
 def dismiss(
@@ -105,7 +105,7 @@ def all_of(store: Store, state: GroupState) -> GroupState:
 class TestSetDismissal:
     def test_it_is_kept_with_who_and_when_and_changes_nothing_else(self, store, found) -> None:
         after = dismiss(store, found, first(found), note="checked on the replay")
-        again = load(store, found.id)
+        again = load_group_state(store, found.id)
         for state in (after, again):
             said = state.dismissed[0]
             assert said is not None
@@ -144,7 +144,7 @@ class TestSetDismissal:
         assert ball is not None
         moved = Box(ball.center.x + 200.0, ball.center.y - 90.0, 14.0, 14.0)
         edit = set_ball(found.group.views[0].key, BallAnnotation(box=moved))
-        state = submit(store, found.id, edit, if_match=after.etag, actor="ben")
+        state = submit_edit(store, found.id, edit, if_match=after.etag, actor="ben")
         assert None in state.dismissed
         (row,) = list_groups(store, found.dataset_id, "finding:any").items
         assert row.findings
@@ -175,7 +175,7 @@ class TestFindings:
         number = found.dataset_id
         (closed,) = read_findings(store, number, limit=9, dismissed=True)
         assert len(closed.findings) == 1
-        all_of(store, load(store, found.id))
+        all_of(store, load_group_state(store, found.id))
         assert read_findings(store, number, limit=9, dismissed=False) == []
         counts = [
             count_groups(store, number, None, dismissed=which) for which in (None, True, False)
@@ -200,10 +200,10 @@ class TestVersions:
         self, store, fill, make_group
     ) -> None:
         (number,) = fill(make_group(9, shift=80.0))
-        state = load(store, number)
+        state = load_group_state(store, number)
         set_verdict(store, number, "accepted", None, "seen", if_match=state.etag, actor="ann")
         plain = freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
-        state = dismiss(store, load(store, number), first(state), note="fine")
+        state = dismiss(store, load_group_state(store, number), first(state), note="fine")
         checked = freeze_dataset(store, "demo", FreezeRequest("v2"), actor="ann")
         state = dismiss(store, state, first(state), dismissed=False)
         again = freeze_dataset(store, "demo", FreezeRequest("v3"), actor="ann")

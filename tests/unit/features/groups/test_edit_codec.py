@@ -13,8 +13,8 @@ from app.features.groups.edit_codec import (
     require_point_limits,
     require_point_limits_of_edits,
 )
-from app.features.groups.submit import load, preview, submit
-from app.features.stations.service import load_station, submit_station
+from app.features.groups.submit import load_group_state, solve_edited_group, submit_edit
+from app.features.stations.service import load_station, submit_station_edit
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImagePoint
 
@@ -67,23 +67,23 @@ class TestEveryDoor:
     def test_an_edit_of_too_many_points_is_refused_and_changes_nothing(
         self, store, fill, make_group
     ) -> None:
-        state = load(store, fill(make_group(7))[0])
+        state = load_group_state(store, fill(make_group(7))[0])
         with pytest.raises(TooManyPointsError, match=r"view 7\.png"):
             edit = SetLines("7.png", self.LINES)
-            submit(store, state.id, edit, if_match=state.etag, actor="ann")
-        assert load(store, state.id) == state
+            submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
+        assert load_group_state(store, state.id) == state
 
     def test_a_preview_of_too_many_points_is_refused(self, store, fill, make_group) -> None:
         (group,) = fill(make_group(7))
         with pytest.raises(TooManyPointsError, match=r"view 7\.png"):
             edits = [set_ball("7.png", None), SetLines("7.png", self.LINES)]
-            preview(store, group, lambda _: edits)
+            solve_edited_group(store, group, lambda _: edits)
 
     def test_an_edit_of_a_static_camera_with_too_many_points_is_refused(
         self, store, fill, make_static
     ) -> None:
-        state = load(store, fill(make_static(10))[0])
+        state = load_group_state(store, fill(make_static(10))[0])
         station = load_station(store, state.station_ids["cam1"])
         with pytest.raises(TooManyPointsError, match="camera cam1"):
             edit = SetStationLines(self.LINES)
-            submit_station(store, station.id, edit, if_match=station.etag, actor="ann")
+            submit_station_edit(store, station.id, edit, if_match=station.etag, actor="ann")

@@ -7,7 +7,7 @@ from app.features.groups import group_edits
 from app.features.groups.edit import SetPitch
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.history import read_history, undo_group_edit
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.solutions.service import list_stale_groups
 
 WIDE, USUAL = SetPitch(105.0, 70.0), SetPitch(105.0, 68.0)
@@ -34,7 +34,7 @@ class TestGiveEdits:
         assert found == 3
         assert sorted(list_stale_groups(store, "demo")) == sorted(ids)
         for number in ids:
-            state = load(store, number)
+            state = load_group_state(store, number)
             assert state.group.pitch.width == 70.0
             entry = read_history(store, number)[-1]
             assert (entry.actor, entry.body["why"]) == ("ann", "measured")
@@ -43,14 +43,19 @@ class TestGiveEdits:
 
     def test_what_changes_nothing_leaves_no_trace_but_where_more_is_said(self, store, ids) -> None:
         before = {
-            number: (load(store, number).etag, len(read_history(store, number))) for number in ids
+            number: (load_group_state(store, number).etag, len(read_history(store, number)))
+            for number in ids
         }
         assert give(store, ids, lambda some: dict.fromkeys(some, USUAL), always_logged=ids[1]) == 1
         for number in ids:
             etag, entries = before[number]
             assert len(read_history(store, number)) == entries + (number == ids[1])
-            assert (load(store, number).etag == etag) == (number != ids[1])
+            assert (load_group_state(store, number).etag == etag) == (number != ids[1])
 
     def test_who_has_no_edit_is_left_alone(self, store, ids) -> None:
         assert give(store, ids, lambda some: {ids[2]: WIDE} if ids[2] in some else {}) == 1
-        assert [load(store, number).group.pitch.width for number in ids] == [68.0, 68.0, 70.0]
+        assert [load_group_state(store, number).group.pitch.width for number in ids] == [
+            68.0,
+            68.0,
+            70.0,
+        ]

@@ -16,15 +16,21 @@ from app.features.groups.group_edits import (
     read_last_ball_actors,
 )
 from app.features.groups.history import read_history, undo_group_edit
-from app.features.groups.submit import load, preview, solve_and_keep, submit, submit_edits
-from app.features.imports.edits_export import group_to_merge
+from app.features.groups.submit import (
+    load_group_state,
+    solve_and_store_group,
+    solve_edited_group,
+    submit_edit,
+    submit_edits,
+)
+from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates.queries import (
     NOISE,
     NoiseFactor,
-    factors_to_json,
     find_noise_factor,
-    read_factors,
+    noise_factors_to_json,
+    read_noise_factors,
 )
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups
@@ -49,21 +55,21 @@ def give(store: Store, *factors: NoiseFactor) -> int:
 
 def place(store: Store, group: int, actor: str, ball: BallAnnotation = BALL) -> str:
     """Place the ball of the last view; returns the view's key."""
-    state = load(store, group)
+    state = load_group_state(store, group)
     key = state.group.views[-1].key
-    submit(store, group, set_ball(key, ball), if_match=state.etag, actor=actor)
+    submit_edit(store, group, set_ball(key, ball), if_match=state.etag, actor=actor)
     return key
 
 
 def noise(store: Store, group: int) -> dict[str, float]:
-    return load(store, group).group.noise
+    return load_group_state(store, group).group.noise
 
 
 @pytest.fixture
 def static(store: Store, fill, make_static) -> int:
     """A solved group of static cameras, its balls as the dataset brought them."""
     (group,) = fill(make_static(10))
-    solve_and_keep(store, group)
+    solve_and_store_group(store, group)
     return group
 
 
@@ -71,25 +77,25 @@ class TestGiveFactors:
     def test_balls_have_the_noise_of_their_camera_and_of_who_placed_them(
         self, store: Store, static: int
     ) -> None:
-        before = load(store, static)
+        before = load_group_state(store, static)
         keys = [view.key for view in before.group.views if view.station.key == "cam2"]
         assert give(store, *FACTORS) == 1
         assert noise(store, static) == dict.fromkeys(keys, 2.0)
-        assert list_stale_groups(store, 1) and load(store, static).etag != before.etag
-        after = solve_and_keep(store, static).solution
+        assert list_stale_groups(store, 1) and load_group_state(store, static).etag != before.etag
+        after = solve_and_store_group(store, static).solution
         assert after is not None and after.ball is not None and before.solution is not None
         assert after.ball.point == before.solution.ball.point
         assert after.ball.sigma_m > before.solution.ball.sigma_m
         assert after.best_ball != before.solution.best_ball
 
     def test_taken_back_all_is_as_it_was(self, store: Store, static: int) -> None:
-        before = load(store, static)
+        before = load_group_state(store, static)
         give(store, *FACTORS)
         assert give(store) == 1
-        after = load(store, static)
+        after = load_group_state(store, static)
         assert after.group == before.group and after.solution == before.solution
         with store.read() as session:
-            assert read_factors(session, 1) == ()
+            assert read_noise_factors(session, 1) == ()
             assert [entry.kind for entry in read_history(store, static)] == [
                 "import",
                 "noise",
@@ -105,9 +111,11 @@ class TestGiveFactors:
         import_groups(
             store, "demo", [replace(group, views=views, label="again")], source="b", actor="ann"
         )
-        assert load(store, static).group.label == "again"
+        assert load_group_state(store, static).group.label == "again"
         assert set(noise(store, static).values()) == {2.0}
-        assert "noise" not in str(group_to_merge(load(store, static).group)["views"])
+        assert "noise" not in str(
+            group_to_export_json(load_group_state(store, static).group)["views"]
+        )
 
     def test_who_placed_a_ball_last_counts_and_a_prediction_is_nobodys(
         self, store: Store, static: int
@@ -115,7 +123,7 @@ class TestGiveFactors:
         place(store, static, "eve", OTHER)
         key = place(store, static, "ann")
         give(store, *FACTORS)
-        camera = load(store, static).group.view(key)
+        camera = load_group_state(store, static).group.view(key)
         assert camera is not None
         assert noise(store, static)[key] == find_noise_factor(FACTORS, camera.station.key, "ann")
         place(store, static, "ann", replace(BALL, predicted_by="yolo"))
@@ -131,7 +139,7 @@ class TestGiveFactors:
         monkeypatch.setattr(group_edits, "_BATCH", 1)
         groups = fill(*(make_static(frame) for frame in (10, 11)))
         for group in groups:
-            etag = load(store, group).etag
+            etag = load_group_state(store, group).etag
             set_verdict(store, group, "accepted", None, "by the lines", if_match=etag, actor="ann")
         assert give(store, *FACTORS) == 2
         assert [row.stale for row in list_groups(store, 1, limit=2).items] == [True, True]
@@ -149,7 +157,7 @@ class TestGiveFactors:
             [entry for entry in entries if (entry.group_id is None) == is_whole][-1]
             for is_whole in (True, False)
         )
-        assert whole.body == {"factors": [], "before": factors_to_json(FACTORS)}
+        assert whole.body == {"factors": [], "before": noise_factors_to_json(FACTORS)}
         assert set(own.body["edit"]["noise"].values()) == {1.0}
         assert own.body["inverse"]["noise"] == given
         assert (whole.actor, own.actor) == ("lea", "lea")
@@ -184,11 +192,11 @@ class TestWithNoise:
         give(store, *FACTORS)
         given = noise(store, static)
         key = place(store, static, "ann")
-        own = load(store, static).group.view(key)
+        own = load_group_state(store, static).group.view(key)
         assert own is not None
         wanted = find_noise_factor(FACTORS, own.station.key, "ann")
         assert own.noise == wanted != given.get(key, 1.0)
-        undo_group_edit(store, static, if_match=load(store, static).etag, actor="ann")
+        undo_group_edit(store, static, if_match=load_group_state(store, static).etag, actor="ann")
         assert noise(store, static) == given
 
     def test_a_prediction_that_somebody_accepts_is_not_theirs(
@@ -203,7 +211,7 @@ class TestWithNoise:
     def test_a_preview_keeps_what_the_view_has(self, store: Store, static: int) -> None:
         give(store, *FACTORS)
         key = next(iter(noise(store, static)))
-        group, _ = preview(store, static, lambda _group: [set_ball(key, BALL)])
+        group, _ = solve_edited_group(store, static, lambda _group: [set_ball(key, BALL)])
         assert group.noise[key] == 2.0
 
 
@@ -218,7 +226,7 @@ class TestReadPlaced:
     def test_knows_who_placed_balls_of_several_views_in_one_edit(
         self, store: Store, static: int
     ) -> None:
-        state = load(store, static)
+        state = load_group_state(store, static)
         keys = [view.key for view in state.group.views[:2]]
         edits = [set_ball(key, BALL) for key in keys]
         submit_edits(store, static, edits, if_match=state.etag, actor="ann")

@@ -13,8 +13,8 @@ from app.features.groups.history import (
     read_history,
     undo_group_edit,
 )
-from app.features.groups.submit import load, submit
-from app.features.stations.service import load_station, submit_station
+from app.features.groups.submit import load_group_state, submit_edit
+from app.features.stations.service import load_station, submit_station_edit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 
@@ -30,8 +30,10 @@ class TestReadStep:
     def test_each_edit_tells_its_view_before_and_after_whatever_came_later(
         self, store: Store, state
     ) -> None:
-        edited = submit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ann")
-        edited = submit(
+        edited = submit_edit(
+            store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ann"
+        )
+        edited = submit_edit(
             store,
             state.id,
             SetLines("7_1.png", {"Middle line": HERE}),
@@ -54,9 +56,9 @@ class TestReadStep:
         self, store: Store, fill, make_static
     ) -> None:
         first, second = fill(make_static(10), make_static(11))
-        camera = load_station(store, load(store, first).station_ids["cam1"])
+        camera = load_station(store, load_group_state(store, first).station_ids["cam1"])
         edit = SetStationLines({"Middle line": HERE})
-        submit_station(store, camera.id, edit, if_match=camera.etag, actor="ann")
+        submit_station_edit(store, camera.id, edit, if_match=camera.etag, actor="ann")
         for group in (first, second):
             brought, changed = steps(store, group)
             assert changed.entry.kind == "station_edit"
@@ -68,9 +70,9 @@ class TestReadStep:
         self, store: Store, fill, make_static
     ) -> None:
         (first,) = fill(make_static(10))
-        camera = load_station(store, load(store, first).station_ids["cam1"])
+        camera = load_station(store, load_group_state(store, first).station_ids["cam1"])
         edit = SetStationLines({"Middle line": HERE})
-        submit_station(store, camera.id, edit, if_match=camera.etag, actor="ann")
+        submit_station_edit(store, camera.id, edit, if_match=camera.etag, actor="ann")
         second = fill(make_static(10), make_static(11))[1]
         kinds = [[entry.kind for entry in read_history(store, group)] for group in (first, second)]
         assert kinds == [["import", "station_edit"], ["import"]]

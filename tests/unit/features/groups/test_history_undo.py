@@ -9,7 +9,7 @@ from app.errors import ConflictError
 from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, set_ball
 from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.state import GroupState
-from app.features.groups.submit import submit
+from app.features.groups.submit import submit_edit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 
@@ -17,7 +17,7 @@ BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
 
 def edited(store: Store, state: GroupState, edit: Edit) -> GroupState:
-    return submit(store, state.id, edit, if_match=state.etag, actor="ann")
+    return submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
 
 
 class TestUndo:

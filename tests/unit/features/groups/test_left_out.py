@@ -13,7 +13,7 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.imports.merge import merge_edits
 from app.features.queue.refresh_queries import refresh_queue
@@ -26,14 +26,14 @@ from app.features.versions.verify import verify_version
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.codec import group_inputs_hash, hash_imported_group
+from app.soccer.codec import hash_group_inputs, hash_imported_group
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, LeftOut, Station, View
+from app.soccer.group import Group, Station, View, ViewExclusion
 from tests.balls import seen
 from tests.cameras import SIZE
 from tests.unit.stores import OPPOSITE, drawn
 
-WHY = LeftOut("not_same_instant", "the foot is off the ball")
+WHY = ViewExclusion("not_same_instant", "the foot is off the ball")
 LEAVE = IncludeView("7_1.png", False, WHY.reason, WHY.note)
 
 
@@ -48,15 +48,15 @@ def three_views(group: Group) -> Group:
 @pytest.fixture
 def state(store, fill, make_group):
     (number,) = fill(three_views(make_group(7)))
-    return load(store, number)
+    return load_group_state(store, number)
 
 
 def change(store, edit):
-    return submit(store, 1, edit, if_match=load(store, 1).etag, actor="ann")
+    return submit_edit(store, 1, edit, if_match=load_group_state(store, 1).etag, actor="ann")
 
 
-def why(store) -> LeftOut | None:
-    return load(store, 1).group.view("7_1.png").left_out
+def why(store) -> ViewExclusion | None:
+    return load_group_state(store, 1).group.view("7_1.png").left_out
 
 
 class TestIncludeView:
@@ -113,7 +113,7 @@ class TestUndo:
         left = change(store, LEAVE)
         judged = set_verdict(store, 1, "accepted", note="fine", if_match=left.etag, actor="ann")
         other = change(store, IncludeView("7_1.png", False, "duplicate_view"))
-        assert why(store) == LeftOut("duplicate_view")
+        assert why(store) == ViewExclusion("duplicate_view")
         assert other.stored.inputs_hash == left.stored.inputs_hash
         assert (other.verdict.stale, judged.verdict.stale) == (False, False)
         undo_group_edit(store, 1, if_match=other.etag, actor="ann")
@@ -124,7 +124,7 @@ class TestDigests:
     def test_solving_does_not_read_the_reason(self, make_group) -> None:
         group = make_group(7)
         plain = IncludeView("7_1.png", False).apply(group)
-        assert group_inputs_hash(LEAVE.apply(group)) == group_inputs_hash(plain)
+        assert hash_group_inputs(LEAVE.apply(group)) == hash_group_inputs(plain)
 
     def test_groups_without_a_reason_are_frozen_without_that_field(self, make_group) -> None:
         group = IncludeView("7_1.png", False).apply(make_group(7))
@@ -147,17 +147,19 @@ class TestImport:
         change(store, LEAVE)
         newer = replace(three_views(make_group(7)), label="another label")
         import_groups(store, "demo", [newer], source="again", actor="ann")
-        assert (load(store, 1).group.label, why(store)) == ("another label", WHY)
+        assert (load_group_state(store, 1).group.label, why(store)) == ("another label", WHY)
 
 
 class TestFixed:
     def fixed(self, store) -> tuple[bool, bool]:
         """In the group's document, and in the queue."""
         (row,) = list_groups(store, 1).items
-        return load(store, 1).verdict.fixed, row.fixed
+        return load_group_state(store, 1).verdict.fixed, row.fixed
 
     def judge(self, store, verdict: str, **more) -> None:
-        set_verdict(store, 1, verdict, if_match=load(store, 1).etag, actor="ann", **more)
+        set_verdict(
+            store, 1, verdict, if_match=load_group_state(store, 1).etag, actor="ann", **more
+        )
 
     def test_an_edited_group_that_passes_is_fixed_once_it_is_accepted(self, store, state) -> None:
         change(store, LEAVE)
@@ -171,7 +173,7 @@ class TestFixed:
         moved = tuple(ImagePoint(point.x + 0.2, point.y) for point in points)
         change(store, SetLines("7.png", {name: moved}))
         self.judge(store, "accepted")
-        assert load(store, 1).solution.passes
+        assert load_group_state(store, 1).solution.passes
         assert self.fixed(store) == (True, True)
         with store.write() as session:
             refresh_queue(session, [1])
@@ -183,11 +185,11 @@ class TestFixed:
     def test_after_undo_of_all_edits_a_group_is_not_fixed(self, store, state) -> None:
         left = change(store, LEAVE)
         self.judge(store, "accepted")
-        undo_group_edit(store, 1, if_match=load(store, 1).etag, actor="ann")
+        undo_group_edit(store, 1, if_match=load_group_state(store, 1).etag, actor="ann")
         assert self.fixed(store) == (False, False)
-        redo_group_edit(store, 1, if_match=load(store, 1).etag, actor="ann")
+        redo_group_edit(store, 1, if_match=load_group_state(store, 1).etag, actor="ann")
         assert self.fixed(store) == (True, True)
-        assert left.group == load(store, 1).group
+        assert left.group == load_group_state(store, 1).group
 
     def test_a_rejected_group_is_not_fixed(self, store, state) -> None:
         change(store, LEAVE)

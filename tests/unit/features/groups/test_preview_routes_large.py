@@ -14,7 +14,7 @@ from fastapi import FastAPI
 from app.errors import OverloadedError
 from app.features.groups.preview_routes import NICENESS, LargeGroupSolver
 from app.features.groups.state import read_record
-from app.features.solutions.service import solve_encoded
+from app.features.solutions.service import solve_and_encode
 from app.worker_process import COUNTS
 from tests.waiting import SECONDS
 
@@ -85,7 +85,7 @@ def test_a_group_and_its_solution_travel_whole(app: FastAPI, ready) -> None:
     with app.state.services.store.read() as session:
         stored = read_record(session, 1).stored
     given = stored.group, stored.policy, {}
-    assert ready.solve(solve_encoded, *given) == solve_encoded(*given)
+    assert ready.solve(solve_and_encode, *given) == solve_and_encode(*given)
 
 
 def test_a_process_that_breaks_down_costs_its_large_edit_alone(
@@ -93,7 +93,7 @@ def test_a_process_that_breaks_down_costs_its_large_edit_alone(
 ) -> None:
     before = api.get(f"{API}/groups/1").json()
     with monkeypatch.context() as broken:
-        broken.setattr("app.features.groups.view_routes.solve_encoded", break_down)
+        broken.setattr("app.features.groups.view_routes.solve_and_encode", break_down)
         answer = draw(api, large_lines())
     assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
     assert answer.json()["detail"].startswith("solving this group made its process crash")

@@ -12,12 +12,12 @@ from app.features.groups.group_edits import apply_noise_factors
 from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.match_estimates.queries import NoiseFactor
 from app.features.policies.service import change_policy
-from app.features.stations.service import load_station, submit_station, undo_station
+from app.features.stations.service import load_station, submit_station_edit, undo_station
 from app.features.verdicts.service import set_verdict
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
@@ -30,21 +30,21 @@ from tests.databases import said_for_sqlite
 def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store:
     """A dataset to which everything has been done that can be done."""
     ids = fill(make_group(7), make_group(8), make_static(10), make_static(11))
-    state = load(store, ids[0])
+    state = load_group_state(store, ids[0])
     ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
     for edit in (
         set_ball("7.png", ball),
         SetLines("7_1.png", {"Middle line": None}),
         IncludeView("7_1.png", False),
     ):
-        state = submit(store, ids[0], edit, if_match=state.etag, actor="ann")
+        state = submit_edit(store, ids[0], edit, if_match=state.etag, actor="ann")
     for step in (undo_group_edit, undo_group_edit, redo_group_edit):
         state = step(store, ids[0], if_match=state.etag, actor="ben")
     state = set_verdict(store, ids[0], "rejected", "other", "odd", if_match=state.etag, actor="ben")
-    station = load_station(store, load(store, ids[2]).station_ids["cam2"])
+    station = load_station(store, load_group_state(store, ids[2]).station_ids["cam2"])
     lines = {"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))}
     for _ in range(2):
-        station = submit_station(
+        station = submit_station_edit(
             store, station.id, SetStationLines(lines), if_match=station.etag, actor="ann"
         )
         lines = {"Middle line": None}
@@ -53,8 +53,8 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         apply_noise_factors(
             session, 1, (NoiseFactor("cam2", None, 2.0), NoiseFactor("cam2", "ann", 3.0)), "ann"
         )
-    state = load(store, ids[2])
-    submit(
+    state = load_group_state(store, ids[2])
+    submit_edit(
         store, ids[2], set_ball(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
     )
     _import_changed(store, make_group, make_static)

@@ -13,20 +13,20 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.solution_schemas import SolutionDocument, camera_sigma
 from app.geometry.polyline import distance_to_polyline
 from app.geometry.resection import PARAMETERS, camera_from_parameters, parameters_from_camera
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.group import Group
 from app.soccer.pitch import GOAL_PARTS
 from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, Solution
 from app.solving.jaccard import project_markings
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.cameras import WIDE_LENSES, wide
 from tests.unit.stores import MAIN
 
 
 @pytest.fixture(scope="module")
 def solution(group: Group) -> Solution:
-    return solve(group, PAPER)
+    return solve_group(group, PAPER)
 
 
 class TestSolutionDocument:
@@ -72,7 +72,7 @@ class TestSolutionDocument:
         parts, drawn = set[str](), 0
         for policy in (PAPER, STRICT):
             pitch = policy.calibration.fitted(group.pitch)
-            solved = solve(group, policy)
+            solved = solve_group(group, policy)
             for view, document in zip(
                 group.views, SolutionDocument.of(solved, group).views, strict=True
             ):
@@ -142,7 +142,9 @@ class TestSolutionDocument:
     ) -> None:
         view = group.views[0]
         marking = next(iter(view.station.lines))
-        found = Finding("bad_point", "?", view.key, fix=Fix("drop_marking", view.key, marking))
+        found = Finding(
+            "bad_point", "?", view.key, fix=SuggestedFix("drop_marking", view.key, marking)
+        )
         document = SolutionDocument.of(replace(solution, findings=(found,)), group).findings[0]
         edit = {"edit": "set_lines", "view": view.key, "lines": {marking: None}}
         assert [offer.model_dump() for offer in document.offers] == [

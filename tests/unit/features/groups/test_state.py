@@ -13,9 +13,9 @@ from app.features.groups.state import (
     read_etags,
     read_group_head,
 )
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
-from app.features.stations.service import load_station, submit_station, undo_station
+from app.features.stations.service import load_station, submit_station_edit, undo_station
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
 
@@ -28,7 +28,9 @@ def etags_of(store: Store, *ids: int) -> dict[int, str]:
 class TestReadEtags:
     def test_follows_edits_and_verdicts(self, store: Store, state: GroupState) -> None:
         seen = [state.etag]
-        edited = submit(store, state.id, IncludeView("7.png", False), if_match=seen[0], actor="ann")
+        edited = submit_edit(
+            store, state.id, IncludeView("7.png", False), if_match=seen[0], actor="ann"
+        )
         seen.append(edited.etag)
         assert etags_of(store, state.id) == {state.id: edited.etag}
         judged = set_verdict(store, state.id, "deferred", if_match=edited.etag, actor="ann")
@@ -38,7 +40,7 @@ class TestReadEtags:
 
     def test_what_is_undone_is_not_what_it_was(self, store: Store, state: GroupState) -> None:
         edit = IncludeView("7.png", False)
-        edited = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        edited = submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         undone = undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         assert undone.stored.inputs_hash == state.stored.inputs_hash
         assert etags_of(store, state.id) == {state.id: undone.etag} != {state.id: state.etag}
@@ -48,14 +50,16 @@ class TestReadEtags:
     ) -> None:
         """Its own ETag is another, and whoever went on from the old one would be refused."""
         (one, other) = fill(make_static(10), make_static(11))
-        before = load(store, one)
+        before = load_group_state(store, one)
         station = load_station(store, before.station_ids["cam1"])
         edit = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
-        edited = submit_station(store, station.id, edit, if_match=station.etag, actor="ann")
+        edited = submit_station_edit(store, station.id, edit, if_match=station.etag, actor="ann")
         undone = undo_station(store, station.id, if_match=edited.etag, actor="ann")
         for number in (one, other):
-            assert load(store, number).station_etags["cam1"] == undone.etag != station.etag
-        after = load(store, one)
+            assert (
+                load_group_state(store, number).station_etags["cam1"] == undone.etag != station.etag
+            )
+        after = load_group_state(store, one)
         assert etags_of(store, one) == {one: after.etag} != {one: before.etag}
         # What was said is the same: an edit of another view still goes through.
         assert content_tag_from_etag(after.etag) == content_tag_from_etag(before.etag)
@@ -66,24 +70,24 @@ class TestReadEtags:
 
     def test_without_a_solution_is_another(self, store: Store, fill, make_group) -> None:
         (one,) = fill(make_group(), solved=False)
-        before = load(store, one).etag
+        before = load_group_state(store, one).etag
         assert etags_of(store, one) == {one: before}
         fill()
-        assert etags_of(store, one) == {one: load(store, one).etag} != {one: before}
+        assert etags_of(store, one) == {one: load_group_state(store, one).etag} != {one: before}
 
     def test_counts_the_findings_of_the_solution_and_of_imports(
         self, store: Store, fill, make_group
     ) -> None:
         ids = fill(make_group(7, shift=300.0), make_group(8))
         edit = IncludeView("8.png", False)
-        etag = load(store, ids[1]).etag
-        submit(store, ids[1], edit, if_match=etag, actor="ann")
+        etag = load_group_state(store, ids[1]).etag
+        submit_edit(store, ids[1], edit, if_match=etag, actor="ann")
         # The same group comes with another ball: what a person edited stays, with a finding.
         import_groups(
             store, "demo", [make_group(8, ball=(6.0, 2.0, -0.5))], source="b", actor="ann"
         )
         fill()
-        states = {number: load(store, number) for number in ids}
+        states = {number: load_group_state(store, number) for number in ids}
         assert all(state.solution.findings for state in states.values())
         assert etags_of(store, *ids) == {number: item.etag for number, item in states.items()}
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from sqlalchemy import insert, select
 
-from app.db.dialects.dialect import dialect_in
+from app.db.dialects.dialect import get_session_dialect
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
 from app.features.groups.queries import upsert_unassigned_frames
@@ -66,7 +66,7 @@ class TestRewrite:
             assert [item.group.label for item in iterate_groups(session)] == ["anew"]
             assert list(list_all_unassigned_frames(session)) == []
             assert len(list(iterate_verdicts(session))) == 1
-            assert dialect_in(session).count_lost_references(session) == 0
+            assert get_session_dialect(session).count_lost_references(session) == 0
 
     def test_what_nobody_said_stays_with_the_views_that_are_there_again(
         self, filled: Store

@@ -20,17 +20,22 @@ from app.features.groups import state as state_module
 from app.features.groups.edit import IncludeView, SetBalls, SetLines, SetPicture, set_ball
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, preview, solve_and_keep, submit
+from app.features.groups.submit import (
+    load_group_state,
+    solve_and_store_group,
+    solve_edited_group,
+    submit_edit,
+)
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import queries as solutions
-from app.features.solutions.service import solve_encoded
+from app.features.solutions.service import solve_and_encode
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 from app.soccer.picture import OPEN
 from app.soccer.policy import STRICT
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.databases import said_for_sqlite
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -42,7 +47,7 @@ Fill = Callable[..., list[int]]
 
 
 def change(store, state, edit, **more):
-    return submit(store, state.id, edit, if_match=state.etag, actor="ann", **more)
+    return submit_edit(store, state.id, edit, if_match=state.etag, actor="ann", **more)
 
 
 def four_views(make_group) -> Group:
@@ -59,10 +64,10 @@ def count(store: Store, table: str) -> int:
 class TestLoad:
     def test_an_unknown_group_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError, match="no group 99"):
-            load(store, 99)
+            load_group_state(store, 99)
 
     def test_the_solution_is_the_solvers_to_the_last_bit(self, state) -> None:
-        assert state.solution == solve(state.group, state.policy)
+        assert state.solution == solve_group(state.group, state.policy)
         assert state.solution.passes
 
 
@@ -72,9 +77,9 @@ class TestSubmit:
         assert after.group.view("7.png").balls == (BALL,)
         assert after.revision == state.revision + 1
         assert after.etag != state.etag
-        assert after.solution == solve(after.group, after.policy)
+        assert after.solution == solve_group(after.group, after.policy)
         assert after.solution != state.solution
-        assert load(store, state.id) == after
+        assert load_group_state(store, state.id) == after
 
     @pytest.mark.parametrize("step", ["INSERT ON log", "INSERT ON solution", "UPDATE ON queue"])
     def test_edit_revision_solution_and_log_are_one_transaction(self, store, state, step) -> None:
@@ -86,7 +91,7 @@ class TestSubmit:
             )
         with pytest.raises(StorageError, match="could not carry out"):
             change(store, state, set_ball("7.png", BALL))
-        assert load(store, state.id) == state
+        assert load_group_state(store, state.id) == state
         assert {name: count(store, name) for name in before} == before
 
     def test_an_older_state_is_refused_with_both_etags(self, store, state) -> None:
@@ -95,16 +100,16 @@ class TestSubmit:
             change(store, state, set_ball("7.png", None))
         assert caught.value.base_etag == state.etag
         assert caught.value.current_etag == after.etag
-        assert load(store, state.id) == after
+        assert load_group_state(store, state.id) == after
 
     def test_a_change_during_the_solve_is_seen_before_saving(self, store, state) -> None:
         def slow(group, policy, calibrations):
-            change(store, load(store, state.id), IncludeView("7_1.png", False))
-            return solve_encoded(group, policy, calibrations)
+            change(store, load_group_state(store, state.id), IncludeView("7_1.png", False))
+            return solve_and_encode(group, policy, calibrations)
 
         with pytest.raises(StaleRevisionError):
             change(store, state, set_ball("7.png", BALL), solve=slow)
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert after.group.view("7.png") == state.group.view("7.png")
         assert not after.group.view("7_1.png").included
 
@@ -112,12 +117,12 @@ class TestSubmit:
         def slow(group, policy, calibrations):
             if policy != STRICT:
                 change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
-            return solve_encoded(group, policy, calibrations)
+            return solve_and_encode(group, policy, calibrations)
 
         after = change(store, state, set_ball("7.png", BALL), solve=slow)
         assert after.policy == STRICT
-        assert after.solution == solve(after.group, STRICT)
-        assert load(store, state.id) == after
+        assert after.solution == solve_group(after.group, STRICT)
+        assert load_group_state(store, state.id) == after
         assert [item.kind for item in read_history(store, state.id)] == ["import", "edit"]
 
     def test_of_many_at_once_one_wins_and_nothing_is_mixed(self, store, state) -> None:
@@ -138,7 +143,7 @@ class TestSubmit:
         winners = [item for item in results if not isinstance(item, StaleRevisionError)]
         assert len(results) == 6
         assert len(winners) == 1
-        assert load(store, state.id).group == winners[0].group
+        assert load_group_state(store, state.id).group == winners[0].group
         assert len(read_history(store, state.id)) == 2
 
     def test_two_views_of_one_group_at_once_are_a_conflict_too(self, store, state) -> None:
@@ -147,8 +152,8 @@ class TestSubmit:
             change(store, state, set_ball("7_1.png", BALL))
 
     def test_a_solution_that_arrives_is_no_conflict(self, store, fill, make_group) -> None:
-        unsolved = load(store, fill(make_group(), solved=False)[0])
-        with_solution = solve_and_keep(store, unsolved.id)
+        unsolved = load_group_state(store, fill(make_group(), solved=False)[0])
+        with_solution = solve_and_store_group(store, unsolved.id)
         assert with_solution.etag != unsolved.etag
         after = change(store, unsolved, set_ball("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)
@@ -159,7 +164,7 @@ class TestSubmit:
         assert len(read_history(store, state.id)) == 1
 
     def test_lines_of_a_shared_station_name_the_station(self, store, fill, make_static) -> None:
-        state = load(store, fill(make_static())[0])
+        state = load_group_state(store, fill(make_static())[0])
         with pytest.raises(SharedStationError) as caught:
             change(store, state, SetLines("cam1", {"Middle line": HERE}))
         assert caught.value.station == state.station_ids["cam1"]
@@ -169,14 +174,14 @@ class TestSubmit:
     def test_the_picture_of_a_shared_station_is_as_it_was_taken(
         self, store, fill, make_static
     ) -> None:
-        state = load(store, fill(make_static())[0])
+        state = load_group_state(store, fill(make_static())[0])
         with pytest.raises(
             SharedStationError, match="picture geometry of view cam1 cannot be set"
         ) as caught:
             change(store, state, SetPicture("cam1", OPEN))
         assert "given camera" in str(caught.value.hint)
         with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set"):
-            preview(store, state.id, lambda _group: [SetPicture("cam1", OPEN)])
+            solve_edited_group(store, state.id, lambda _group: [SetPicture("cam1", OPEN)])
 
     def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:
         def refuse(*_):
@@ -197,8 +202,8 @@ class TestSubmit:
 class TestPreview:
     def test_is_what_a_save_would_give_and_saves_nothing(self, store, state) -> None:
         edits = [set_ball("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
-        _, solution = preview(store, state.id, lambda _: edits)
-        assert load(store, state.id) == state
+        _, solution = solve_edited_group(store, state.id, lambda _: edits)
+        assert load_group_state(store, state.id) == state
         after = state
         for edit in edits:
             after = change(store, after, edit)
@@ -206,7 +211,9 @@ class TestPreview:
 
     def test_a_shared_station_may_move_in_it(self, store, fill, make_static) -> None:
         (group_id,) = fill(make_static())
-        _, solution = preview(store, group_id, lambda _: [SetLines("cam1", {"Middle line": None})])
+        _, solution = solve_edited_group(
+            store, group_id, lambda _: [SetLines("cam1", {"Middle line": None})]
+        )
         markings = {item.marking: item.outcome for item in solution.views[0].calibration.markings}
         assert markings["Middle line"] == "fp"
 
@@ -222,17 +229,17 @@ class TestCost:
         self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         decoded: list[object] = []
-        plain = solutions.with_calibrations
+        plain = solutions.attach_calibrations
 
         def counted(*arguments):
             decoded.append(arguments)
             return plain(*arguments)
 
-        monkeypatch.setattr(solutions, "with_calibrations", counted)
+        monkeypatch.setattr(solutions, "attach_calibrations", counted)
         edit = set_ball("7.png", None)
-        done = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        done = submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         assert decoded == []
-        read = load(store, state.id)
+        read = load_group_state(store, state.id)
         assert len(decoded) == 1
         assert (done.etag, done.revision, done.can_undo) == (read.etag, read.revision, True)
         assert done.solution is not None
@@ -251,7 +258,7 @@ class TestCost:
     def test_an_edit_of_four_views_is_one_read_and_one_durable_commit(
         self, store: Store, fill: Fill, make_group, counted: Counted, edit, statements: int
     ) -> None:
-        state = load(store, fill(four_views(make_group))[0])
+        state = load_group_state(store, fill(four_views(make_group))[0])
         with counted(store) as cost:
             change(store, state, edit)
         assert (cost.reads, cost.writes, cost.commits) == (1, 1, 1)
@@ -270,7 +277,7 @@ class TestCost:
         self, store: Store, state: GroupState, counted: Counted
     ) -> None:
         with counted(store) as cost:
-            preview(store, state.id, lambda _: [set_ball("7.png", BALL)])
+            solve_edited_group(store, state.id, lambda _: [set_ball("7.png", BALL)])
         assert (cost.reads, cost.writes) == (1, 0)
         assert cost.statements <= 2
 
@@ -293,5 +300,5 @@ class TestCost:
 
         monkeypatch.setattr(Store, "write", write)
         monkeypatch.setattr(state_module, "read_groups", read_groups)
-        submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
         assert seen == [False]

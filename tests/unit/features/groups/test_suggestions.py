@@ -6,12 +6,12 @@ from app.features.groups import suggestions as remedies
 from app.features.groups.suggested_edits import edit_of_fix, measure_marking_influences
 from app.features.groups.suggestions import find_suggestions
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.soccer.solution import Suspect
-from app.solving.solve import solve
+from app.soccer.solution import SuspectLabel
+from app.solving.solve import solve_group
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
@@ -30,20 +30,20 @@ def spoilt(of, markings=4, pixels=40.0):
 class TestFindRemedies:
     def test_a_group_that_passes_needs_none(self):
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
-        solution = solve(good, PAPER)
+        solution = solve_group(good, PAPER)
         assert solution.passes
         assert find_suggestions(good, PAPER, solution) == []
 
     def bad_point(self):
         """A group that one bad point keeps from passing, and the policy that asks for more."""
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
-        clean = min(found.calibration.jac[0] for found in solve(good, PAPER).views)
+        clean = min(found.calibration.jac[0] for found in solve_group(good, PAPER).views)
         bad = good.with_view(spoilt(good.views[1], markings=1))
         return bad, replace(PAPER, min_jac=clean - 0.01)
 
     def test_what_would_make_it_pass_does_so_when_it_is_done(self):
         bad, policy = self.bad_point()
-        solution = solve(bad, policy)
+        solution = solve_group(bad, policy)
         assert solution.first_failing.name == "jac"
         remedies = find_suggestions(bad, policy, solution)
         assert remedies[0].passes
@@ -52,11 +52,11 @@ class TestFindRemedies:
             if remedy.fix.action == "draw_marking":
                 continue
             edited = edit_of_fix(bad, remedy.fix, remedy.point).apply(bad)
-            assert solve(edited, policy).passes == remedy.passes
+            assert solve_group(edited, policy).passes == remedy.passes
 
     def test_the_sentence_names_the_point_and_how_far_it_moves(self):
         bad, policy = self.bad_point()
-        best = find_suggestions(bad, policy, solve(bad, policy))[0]
+        best = find_suggestions(bad, policy, solve_group(bad, policy))[0]
         marking = sorted(bad.views[1].station.lines)[0]
         assert best.sentence.startswith(f"point 2 of {marking} in B moved ")
 
@@ -68,7 +68,7 @@ class TestFindRemedies:
 
     def test_a_ball_beside_the_other_views_ray_is_looked_for_on_it(self):
         bad = self.with_ball_off(38.0)
-        solution = solve(bad, PAPER)
+        solution = solve_group(bad, PAPER)
         assert solution.first_failing.name == "reprojection"
         remedies = find_suggestions(bad, PAPER, solution)
         assert remedies
@@ -77,20 +77,22 @@ class TestFindRemedies:
 
     def test_no_remedy_puts_a_ball_onto_the_ray_that_would_then_confirm_it(self):
         bad = self.with_ball_off(40.0)
-        (remedy,) = find_suggestions(bad, PAPER, solve(bad, PAPER))
+        (remedy,) = find_suggestions(bad, PAPER, solve_group(bad, PAPER))
         assert (remedy.fix.action, remedy.passes) == ("look_ball", True)
         assert edit_of_fix(bad, remedy.fix, remedy.point) is None
 
     def test_no_ball_is_looked_for_farther_off_than_a_hand_slips(self):
         bad = self.with_ball_off(440.0)
-        solution = solve(bad, PAPER)
+        solution = solve_group(bad, PAPER)
         assert solution.first_failing.name == "reprojection"
         assert find_suggestions(bad, PAPER, solution) == []
 
     def test_no_ball_is_looked_for_where_a_better_cause_is_known(self):
         bad = self.with_ball_off(40.0)
-        solution = solve(bad, PAPER)
-        swapped = Finding("sides_swapped", "Left is right.", "b", fix=Fix("swap_sides", "b"))
+        solution = solve_group(bad, PAPER)
+        swapped = Finding(
+            "sides_swapped", "Left is right.", "b", fix=SuggestedFix("swap_sides", "b")
+        )
         known = replace(solution, findings=(swapped,))
         actions = {remedy.fix.action for remedy in find_suggestions(bad, PAPER, known)}
         assert "look_ball" not in actions
@@ -98,7 +100,7 @@ class TestFindRemedies:
     def undrawn(self):
         """A group whose second view lacks drawn lines, and a policy that asks for them."""
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
-        clean = min(found.calibration.jac[0] for found in solve(good, PAPER).views)
+        clean = min(found.calibration.jac[0] for found in solve_group(good, PAPER).views)
         lines = dict(good.views[1].station.lines)
         missing = sorted(lines)[:2]
         for marking in missing:
@@ -109,7 +111,7 @@ class TestFindRemedies:
 
     def test_lines_that_nobody_drew_are_named_as_what_keeps_a_view_from_passing(self):
         bad, policy, missing = self.undrawn()
-        solution = solve(bad, policy)
+        solution = solve_group(bad, policy)
         assert solution.first_failing.name == "jac"
         best = find_suggestions(bad, policy, solution)[0]
         assert (best.fix.action, best.fix.view, best.passes) == ("draw_marking", "b", True)
@@ -120,14 +122,14 @@ class TestFindRemedies:
     def lengths(self, bad, policy):
         """Of the markings of the second view that nobody drew, pixels at 960 x 540."""
         unit = SIZE.diagonal / np.hypot(960, 540)
-        fits = solve(bad, policy).view("b").calibration.markings
+        fits = solve_group(bad, policy).view("b").calibration.markings
         return {fit.marking: fit.length_px / unit for fit in fits if not fit.distances_px}
 
     def test_where_all_are_stubs_they_are_marked_as_not_visible_and_not_drawn(self, monkeypatch):
         """Two clicks anywhere on a stub of a pixel would pass as well."""
         bad, policy, missing = self.undrawn()
         monkeypatch.setattr(remedies, "STUB_PX", 2000.0)
-        found = find_suggestions(bad, policy, solve(bad, policy))
+        found = find_suggestions(bad, policy, solve_group(bad, policy))
         hides = [remedy for remedy in found if remedy.fix.action == "hide_marking"]
         hidden = sorted(remedy.fix.marking for remedy in hides)
         assert hidden == sorted(self.lengths(bad, policy)) and {*missing} <= {*hidden}
@@ -138,11 +140,11 @@ class TestFindRemedies:
             (offer,) = remedy.offers
             marked = offer.edit.apply(marked)
         assert list(marked.views[1].station.not_visible) == hidden
-        assert solve(marked, policy).passes
+        assert solve_group(marked, policy).passes
 
     def test_stubs_are_those_of_less_than_five_pixels(self):
         bad, policy, _ = self.undrawn()
-        found = find_suggestions(bad, policy, solve(bad, policy))
+        found = find_suggestions(bad, policy, solve_group(bad, policy))
         hidden = {one.fix.marking for one in found if one.fix.action == "hide_marking"}
         short = {name for name, length in self.lengths(bad, policy).items() if length < 5.0}
         assert hidden == short != set()
@@ -150,9 +152,9 @@ class TestFindRemedies:
 
     def test_a_line_that_is_there_under_a_wrong_name_is_not_to_be_drawn_again(self):
         bad, policy, missing = self.undrawn()
-        solution = solve(bad, policy)
+        solution = solve_group(bad, policy)
         seen = solution.view("b")
-        suspects = tuple(Suspect("Middle line", name, 0.9, 50.0) for name in missing)
+        suspects = tuple(SuspectLabel("Middle line", name, 0.9, 50.0) for name in missing)
         doubted = replace(seen, calibration=replace(seen.calibration, suspects=suspects))
         views = tuple(doubted if one is seen else one for one in solution.views)
         remedies = find_suggestions(bad, policy, replace(solution, views=views))
@@ -162,10 +164,10 @@ class TestFindRemedies:
     def test_a_view_that_was_left_out_can_be_used_again(self):
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
         bad = good.with_view(replace(good.views[1], included=False))
-        solution = solve(bad, PAPER)
+        solution = solve_group(bad, PAPER)
         assert solution.first_failing.name == "two_views"
         (remedy,) = find_suggestions(bad, PAPER, solution)
-        assert (remedy.fix, remedy.passes) == (Fix("include_view", "b"), True)
+        assert (remedy.fix, remedy.passes) == (SuggestedFix("include_view", "b"), True)
         assert "B left out by a person" in solution.first_failing.sentence
 
 

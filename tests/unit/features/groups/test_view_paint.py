@@ -13,9 +13,9 @@ from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, preview, submit
-from app.features.groups.view_paint import PaintFollower
-from app.features.paint.service import take_back_paint
+from app.features.groups.submit import load_group_state, solve_edited_group, submit_edit
+from app.features.groups.view_paint import PaintUpdater
+from app.features.paint.service import undo_paint_reading
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.soccer.policy import PAPER
@@ -47,18 +47,18 @@ class Frames:
 
 
 @pytest.fixture
-def paint(painted) -> PaintFollower:
-    return PaintFollower(Frames(painted.settings))
+def paint(painted) -> PaintUpdater:
+    return PaintUpdater(Frames(painted.settings))
 
 
 def without_a_line(store, number=1):
-    view = load(store, number).group.views[0]
+    view = load_group_state(store, number).group.views[0]
     return SetLines(view.key, {next(iter(view.station.lines)): None})
 
 
 def change(store, paint, edit, number=1):
-    at = load(store, number)
-    return submit(store, number, edit, if_match=at.etag, actor="ann", paint=paint)
+    at = load_group_state(store, number)
+    return submit_edit(store, number, edit, if_match=at.etag, actor="ann", paint=paint)
 
 
 class TestFollow:
@@ -71,10 +71,10 @@ class TestFollow:
         truth = scenes()[0].truth.view(key).camera
         assert np.linalg.norm(first.camera.position - truth.position) < 0.25
         assert [entry.kind for entry in read_history(painted, 1)][-2:] == ["edit", "paint"]
-        assert load(painted, 1) == after
+        assert load_group_state(painted, 1) == after
 
     def test_an_edit_of_a_ball_looks_at_no_picture(self, painted, paint, looked):
-        view = load(painted, 1).group.views[0]
+        view = load_group_state(painted, 1).group.views[0]
         change(painted, paint, set_ball(view.key, None))
         assert looked == []
         assert [entry.kind for entry in read_history(painted, 1)][-1] == "edit"
@@ -82,7 +82,7 @@ class TestFollow:
     def test_undo_and_redo_take_it_along(self, painted, paint):
         before = calibrations(painted)
         changed = calibrations_of(change(painted, paint, without_a_line(painted)))
-        state = load(painted, 1)
+        state = load_group_state(painted, 1)
         back = undo_group_edit(painted, 1, if_match=state.etag, actor="ann", paint=paint)
         assert calibrations_of(back) == before
         again = redo_group_edit(painted, 1, if_match=back.etag, actor="ann", paint=paint)
@@ -91,21 +91,21 @@ class TestFollow:
 
     def test_a_preview_shows_what_saving_would(self, painted, paint):
         edit = without_a_line(painted)
-        _, expected = preview(painted, 1, lambda _group: [edit], paint)
+        _, expected = solve_edited_group(painted, 1, lambda _group: [edit], paint)
         assert change(painted, paint, edit).solution == expected
 
     def test_the_log_tells_it_again(self, painted, paint):
         change(painted, paint, without_a_line(painted))
         with painted.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
-        before = load(painted, 1).stored
+        before = load_group_state(painted, 1).stored
         rebuild_tables(painted)
-        assert load(painted, 1).stored == before
+        assert load_group_state(painted, 1).stored == before
 
     def test_taking_back_a_reading_takes_back_the_one_of_the_dataset(self, painted, paint):
         change(painted, paint, without_a_line(painted))
         with painted.write() as session:
-            take_back_paint(session, "demo", actor="ann")
+            undo_paint_reading(session, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert {item.source for item in calibrations(painted)} == {"lines"}
 
@@ -119,7 +119,7 @@ class TestFollow:
         ids=["too many wait", "its process ended", "it took too long"],
     )
     def test_where_no_frame_can_be_read_the_edit_is_saved_all_the_same(self, painted, problem):
-        broken = PaintFollower(Frames(painted.settings, problem))
+        broken = PaintUpdater(Frames(painted.settings, problem))
         after = change(painted, broken, without_a_line(painted))
         assert after.solution.views[0].calibration.source == "lines"
         assert kinds(painted) == ["no_paint"]
@@ -132,7 +132,7 @@ class TestFollow:
     def test_lines_that_make_no_camera_are_not_looked_for_again_and_again(
         self, painted, paint, monkeypatch
     ):
-        view = load(painted, 1).group.views[0]
+        view = load_group_state(painted, 1).group.views[0]
         gone = SetLines(view.key, dict.fromkeys([*view.station.lines][1:]))
         after = change(painted, paint, gone)
         assert after.solution.views[0].calibration.camera is None
@@ -142,8 +142,8 @@ class TestFollow:
     def test_a_view_that_gets_its_first_lines_is_read_with_the_others(
         self, painted, paint, monkeypatch
     ):
-        view = load(painted, 1).group.views[0]
-        state = load(painted, 1)
+        view = load_group_state(painted, 1).group.views[0]
+        state = load_group_state(painted, 1)
         paint_of = {key: item for key, item in state.group.paint.items() if key != view.key}
         bare = replace(state.group, paint=paint_of)
         policy = state.stored.policy.calibration
@@ -154,7 +154,7 @@ class TestFollow:
 
     def test_after_its_reading_was_taken_back_an_edit_reads_no_paint(self, painted, paint, looked):
         with painted.write() as session:
-            take_back_paint(session, "demo", actor="ann")
+            undo_paint_reading(session, "demo", actor="ann")
         change(painted, paint, without_a_line(painted))
         assert looked == []
 

@@ -6,7 +6,7 @@ from hashlib import sha256
 import pytest
 
 from app.errors import ConflictError, ImageError, NotFoundError
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.guidelines.service import (
     add_picture,
     read_guidelines,
@@ -15,7 +15,7 @@ from app.features.guidelines.service import (
 )
 from app.features.imports.upload_queries import UploadWriter
 from app.media import files as media
-from app.media.frames import Frames
+from app.media.frames import FrameProvider
 from tests.integration.conftest import picture
 from tests.unit.features.independent_annotations.begun import begin_take
 
@@ -27,8 +27,8 @@ def upload(store, content: bytes) -> str:
 
 
 @pytest.fixture
-def frames(store) -> Iterator[Frames]:
-    made = Frames(store.settings)
+def frames(store) -> Iterator[FrameProvider]:
+    made = FrameProvider(store.settings)
     yield made
     made.close()
 
@@ -52,7 +52,7 @@ class TestGuidelines:
 
     def test_copies_have_those_of_what_they_are_of(self, store, state) -> None:
         write_guidelines(store, state.dataset, "one", based_on=0, actor="lea")
-        copy = load(store, begin_take(store, state.id, person="ann").copy_id)
+        copy = load_group_state(store, begin_take(store, state.id, person="ann").copy_id)
         assert read_guidelines(store, copy.dataset_id).text == "one"
 
     def test_pictures_go_by_their_digest(self, store, state, frames) -> None:

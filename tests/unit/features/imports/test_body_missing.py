@@ -5,7 +5,7 @@ import pytest
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.body import GONE
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
@@ -19,7 +19,7 @@ def bring(store, groups, **options):
 
 def told(store, group_id: int) -> list[str]:
     solve_dataset(store, "demo")
-    return [item.sentence for item in load(store, group_id).solution.findings]
+    return [item.sentence for item in load_group_state(store, group_id).solution.findings]
 
 
 @pytest.fixture
@@ -59,10 +59,10 @@ class TestNoteGone:
 
     def test_an_edit_stays_and_the_log_replays(self, store, three, make_group) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        etag = load(store, three[1]).etag
-        submit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
+        etag = load_group_state(store, three[1]).etag
+        submit_edit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
         bring(store, [make_group(7)])
-        state = load(store, three[1])
+        state = load_group_state(store, three[1])
         assert (state.group.view("8.png").ball, state.stored.edited_views) == (ball, {"8.png"})
         with store.read() as session:
             assert replay_log(session) == read_state_snapshot(session)

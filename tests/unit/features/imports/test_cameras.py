@@ -12,15 +12,15 @@ from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetLines, SetStationCamera
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import import_groups
 from app.features.imports.sources import ImportSource, import_source
 from app.features.solutions.service import list_stale_groups, solve_dataset
-from app.features.stations.service import load_station, submit_station
+from app.features.stations.service import load_station, submit_station_edit
 from app.formats.camera_json import covariance_to_json
-from app.formats.cameras import camera_file_text
-from app.geometry.arrays import row_by_row
+from app.formats.cameras import format_camera_file
+from app.geometry.arrays import flatten_covariance
 from app.soccer.frames import ImageSize
 from tests.cameras import FULL_HD
 
@@ -35,33 +35,33 @@ class TestIngestCameras:
         self, store, state, opposite, name
     ) -> None:
         report = attach(store, {name.format(match=state.group.match): opposite})
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert (report.changed, report.problems) == (1, [])
         assert after.group.view("7_1.png").station.given == opposite
         assert (after.revision, after.solution) == (2, None)
 
     def test_attaching_the_same_cameras_again_changes_nothing(self, store, state, opposite) -> None:
         attach(store, {"7": opposite})
-        before = load(store, state.id)
+        before = load_group_state(store, state.id)
         report = attach(store, {"7": opposite})
         assert (report.changed, report.unchanged) == (0, 1)
-        assert load(store, state.id) == before
+        assert load_group_state(store, state.id) == before
 
     def test_a_static_camera_changes_for_all_its_groups(
         self, store, fill, make_static, opposite
     ) -> None:
         ids = fill(make_static(10), make_static(11))
         assert attach(store, {"cam1": opposite}).changed == 1
-        assert load(store, ids[1]).group.view("cam1").station.given == opposite
+        assert load_group_state(store, ids[1]).group.view("cam1").station.given == opposite
         assert list_stale_groups(store, "demo") == ids
 
     def test_what_was_known_of_the_camera_before_is_not_known_of_the_new_one(
         self, store, fill, make_static, opposite
     ) -> None:
         (group_id,) = fill(make_static(10))
-        station = load_station(store, load(store, group_id).station_ids["cam1"])
+        station = load_station(store, load_group_state(store, group_id).station_ids["cam1"])
         known = SetStationCamera(station.station.given, (0.5,) * 64)
-        submit_station(store, station.id, known, if_match=station.etag, actor="ann")
+        submit_station_edit(store, station.id, known, if_match=station.etag, actor="ann")
         assert load_station(store, station.id).station.given_covariance == (0.5,) * 64
         attach(store, {"cam1": opposite})
         after = load_station(store, station.id).station
@@ -75,14 +75,14 @@ class TestIngestCameras:
         view, sigmas = state.group.view("7_1.png"), []
         camera = state.solution.view("7_1.png").calibration.camera
         for sigma in (1e-3, 1.0):
-            known = row_by_row(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
-            (tmp_path / "camera_7_1.json").write_text(camera_file_text(camera, known, view.size))
+            known = flatten_covariance(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
+            (tmp_path / "camera_7_1.json").write_text(format_camera_file(camera, known, view.size))
             source = ImportSource("cameras", tmp_path)
             assert import_source(store, "demo", source, store.settings).result.changed == 1
             again = import_source(store, "demo", source, store.settings).result
             assert (again.changed, again.unchanged) == (0, 1)
             solve_dataset(store, "demo")
-            after = load(store, state.id)
+            after = load_group_state(store, state.id)
             station = after.group.view("7_1.png").station
             assert station.given_covariance == pytest.approx(known, rel=1e-9)
             with store.read() as session:
@@ -97,11 +97,11 @@ class TestIngestCameras:
     def test_a_file_that_says_nothing_takes_nothing_of_what_is_known(
         self, store, state, opposite
     ) -> None:
-        known = {"7": covariance_to_json(row_by_row(np.eye(8) * 1e-4), opposite, FULL_HD)}
+        known = {"7": covariance_to_json(flatten_covariance(np.eye(8) * 1e-4), opposite, FULL_HD)}
         options = {"source": "x", "actor": "ann"}
         import_given_cameras(store, "demo", {"7": opposite}, covariances=known, **options)
         assert attach(store, {"7": opposite}).unchanged == 1
-        station = load(store, state.id).group.views[0].station
+        station = load_group_state(store, state.id).group.views[0].station
         assert station.given_covariance is not None
 
     def test_names_that_match_no_view_or_several_are_reported(
@@ -129,7 +129,10 @@ class TestIngestCameras:
         report = attach(store, {"7": opposite})
         assert report.changed == 2
         assert report.problems == ['camera "7" is that of 2 views of this name']
-        assert all(load(store, each).group.view("7.png").station.given == opposite for each in ids)
+        assert all(
+            load_group_state(store, each).group.view("7.png").station.given == opposite
+            for each in ids
+        )
 
     def test_cameras_of_another_size_are_scaled_to_their_views(
         self, store, state, opposite
@@ -140,7 +143,7 @@ class TestIngestCameras:
         report = import_given_cameras(
             store, "demo", {"7": half}, source="x", actor="ann", size=halved
         )
-        given = load(store, state.id).group.view("7.png").station.given
+        given = load_group_state(store, state.id).group.view("7.png").station.given
         assert report.problems == []
         assert given.focal_length == opposite.focal_length
         assert given.principal_point == opposite.principal_point
@@ -156,7 +159,7 @@ class TestIngestCameras:
                 store, "demo", {"7": half}, source="x", actor="ann", size=said, sizes=sizes
             )
             assert len(report.problems) == told
-            given = load(store, state.id).group.view("7.png").station.given
+            given = load_group_state(store, state.id).group.view("7.png").station.given
             assert given.focal_length == opposite.focal_length
 
     def test_a_camera_of_another_size_than_was_said_is_told(self, store, state, opposite) -> None:
@@ -176,19 +179,19 @@ class TestIngestCameras:
         (group_id,) = fill(bare, solved=False)
         attach(store, {"7": opposite})
         import_groups(store, "demo", [replace(bare, label="new")], source="x", actor="ann")
-        after = load(store, group_id)
+        after = load_group_state(store, group_id)
         assert after.group.label == "new"
         assert after.group.view("7.png").station.given == opposite
         assert not after.stored.edited
 
     def test_attaching_cameras_is_no_edit_of_a_person(self, store, state, opposite) -> None:
         attach(store, {"7": opposite})
-        assert not load(store, state.id).stored.edited
-        now = load(store, state.id)
+        assert not load_group_state(store, state.id).stored.edited
+        now = load_group_state(store, state.id)
         edit = SetLines("7.png", {"Middle line": None})
-        submit(store, state.id, edit, if_match=now.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=now.etag, actor="ann")
         attach(store, {"7": replace(opposite, skew=0.5)})
-        assert load(store, state.id).stored.edited
+        assert load_group_state(store, state.id).stored.edited
 
     def test_needs_a_dataset(self, store, opposite) -> None:
         with pytest.raises(NotFoundError):

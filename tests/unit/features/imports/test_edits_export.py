@@ -14,7 +14,7 @@ from app.errors import InputError
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.findings.queries import list_group_findings
-from app.features.findings.service import FindingName, set_dismissal
+from app.features.findings.service import FindingReference, set_dismissal
 from app.features.groups.edit import (
     IncludeView,
     SetLines,
@@ -25,7 +25,7 @@ from app.features.groups.edit import (
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
 from app.features.imports.ingest import (
@@ -38,7 +38,7 @@ from app.features.imports.merge import merge_edits
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
-from app.features.stations.service import load_station, submit_station, undo_station
+from app.features.stations.service import load_station, submit_station_edit, undo_station
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.file_tree import DEFAULT_LIMITS
@@ -72,11 +72,13 @@ def bring_file(store: Store, path: Path, dry_run: bool = False):
 
 
 def edit(store, group_id, change, actor="ann"):
-    return submit(store, group_id, change, if_match=load(store, group_id).etag, actor=actor)
+    return submit_edit(
+        store, group_id, change, if_match=load_group_state(store, group_id).etag, actor=actor
+    )
 
 
 def judge(store, group_id, state, reason=None, note=None, actor="ann"):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor=actor)
 
 
@@ -93,12 +95,12 @@ def assert_replays(store: Store) -> None:
 
 def findings(store: Store, group_id: int) -> list[str]:
     solve_dataset(store, "demo")
-    noticed = load(store, group_id).solution.findings
+    noticed = load_group_state(store, group_id).solution.findings
     return [item.sentence for item in noticed if item.kind == "upstream_changed"]
 
 
 def ball_of(store: Store, group_id: int, view: str):
-    return load(store, group_id).group.view(view).ball
+    return load_group_state(store, group_id).group.view(view).ball
 
 
 @pytest.fixture
@@ -110,13 +112,13 @@ def busy(store, once, fill, make_group, make_static, opposite):
         edit(store, ids[0], set_ball("7.png", BALL))
         edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
         edit(store, ids[1], IncludeView("8_1.png", False))
-        undo_group_edit(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
+        undo_group_edit(store, ids[1], if_match=load_group_state(store, ids[1]).etag, actor="ben")
         judge(store, ids[0], "deferred", actor="ben")
         judge(store, ids[1], "accepted")
         judge(store, ids[2], "accepted", note="seen on video")
-        station = load_station(store, load(store, ids[3]).station_ids["cam2"])
+        station = load_station(store, load_group_state(store, ids[3]).station_ids["cam2"])
         lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
-        submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
+        submit_station_edit(store, station.id, lines, if_match=station.etag, actor="ann")
         import_given_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
         spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
         import_unassigned_frames(store, "demo", spare, source="spare", actor="ann")
@@ -149,8 +151,8 @@ class TestRoundTrip:
         self, store, there, busy, bring, make_group
     ) -> None:
         bring(store, there)
-        assert load(there, 1).stored.edited_views == {"7.png"}
-        assert not load(there, 2).stored.edited
+        assert load_group_state(there, 1).stored.edited_views == {"7.png"}
+        assert not load_group_state(there, 2).stored.edited
         told = [
             entry.body["carried"] for entry in read_history(there, 1) if "carried" in entry.body
         ]
@@ -201,7 +203,7 @@ class TestMerge:
         edit(there, 1, set_ball("7.png", BALL))
         assert bring(there, here).changed == 1
         assert ball_of(here, 1, "7.png") == BALL
-        assert load(here, 1).group.view("7.png").media is not None
+        assert load_group_state(here, 1).group.view("7.png").media is not None
         assert findings(here, 1) == []
         assert_replays(here)
 
@@ -252,17 +254,17 @@ class TestMerge:
         before = ball_of(here, 1, "7.png")
         edit(here, 1, set_ball("7.png", BALL))
         bring(here, there)
-        undo_group_edit(here, 1, if_match=load(here, 1).etag, actor="ann")
+        undo_group_edit(here, 1, if_match=load_group_state(here, 1).etag, actor="ann")
         bring(here, there)
         assert ball_of(there, 1, "7.png") == before
-        assert not load(there, 1).stored.edited
+        assert not load_group_state(there, 1).stored.edited
 
     def test_lines_of_a_view_merge_like_balls(self, both, bring) -> None:
         here, there = both
         edit(there, 1, SetLines("7.png", {"Middle line": None}))
         edit(here, 1, set_ball("7.png", BALL))
         bring(there, here)
-        view = load(here, 1).group.view("7.png")
+        view = load_group_state(here, 1).group.view("7.png")
         assert ("Middle line" in view.station.lines, view.ball) == (False, BALL)
 
     def test_a_static_camera_follows_or_is_a_finding(self, both, bring) -> None:
@@ -318,12 +320,12 @@ class TestMerge:
 
 
 def station(store: Store):
-    return load_station(store, load(store, 2).station_ids["cam2"])
+    return load_station(store, load_group_state(store, 2).station_ids["cam2"])
 
 
 def edit_station(store: Store, change) -> None:
     found = station(store)
-    submit_station(store, found.id, change, if_match=found.etag, actor="ann")
+    submit_station_edit(store, found.id, change, if_match=found.etag, actor="ann")
 
 
 class TestVerdicts:
@@ -332,7 +334,7 @@ class TestVerdicts:
         judge(there, 1, "rejected", "bad_calibration", actor="ben")
         judge(here, 1, "accepted")
         bring(there, here)
-        state = load(here, 1)
+        state = load_group_state(here, 1)
         assert {item.actor: item.state for item in state.verdicts} == {
             "ann": "accepted",
             "ben": "rejected",
@@ -340,7 +342,7 @@ class TestVerdicts:
         assert state.verdict.state == "accepted"
         judge(there, 1, "deferred", actor="ben")
         bring(there, here)
-        assert load(here, 1).verdict.state == "deferred"
+        assert load_group_state(here, 1).verdict.state == "deferred"
         assert_replays(here)
 
     def test_a_verdict_on_another_state_is_stale(self, both, bring) -> None:
@@ -348,14 +350,14 @@ class TestVerdicts:
         edit(here, 1, set_ball("7.png", BALL))
         judge(there, 1, "accepted")
         bring(there, here)
-        assert load(here, 1).verdict.stale
+        assert load_group_state(here, 1).verdict.stale
 
 
 class TestDismissals:
     def dismiss(self, store, actor: str, *, dismissed: bool = True):
-        state = load(store, 1)
+        state = load_group_state(store, 1)
         finding = state.solution.findings[0]
-        named = FindingName(finding.kind, finding.view, finding.marking, finding.suggested)
+        named = FindingReference(finding.kind, finding.view, finding.marking, finding.suggested)
         sent = {"dismissed": dismissed, "if_match": state.etag, "actor": actor}
         return set_dismissal(store, 1, named, **sent)
 
@@ -365,19 +367,19 @@ class TestDismissals:
             edit(store, 1, set_ball("7.png", BALL))
         self.dismiss(there, "ben")
         bring(there, here)
-        said = load(here, 1).dismissed[0]
+        said = load_group_state(here, 1).dismissed[0]
         assert said is not None
         assert said.actor == "ben"
-        etag = load(here, 1).etag
+        etag = load_group_state(here, 1).etag
         bring(there, here)
-        assert load(here, 1).etag == etag
+        assert load_group_state(here, 1).etag == etag
         self.dismiss(here, "ann", dismissed=False)
         bring(there, here)
-        assert load(here, 1).dismissed[0] is None
+        assert load_group_state(here, 1).dismissed[0] is None
         self.dismiss(there, "ben", dismissed=False)
         self.dismiss(there, "ben")
         bring(there, here)
-        assert load(here, 1).dismissed[0] is not None
+        assert load_group_state(here, 1).dismissed[0] is not None
 
 
 class TestBrokenFiles:
@@ -430,7 +432,7 @@ class TestBrokenFiles:
             view["media"] = ["/etc/passwd", None, None]
         (tmp_path / "out" / GROUPS).write_text(json.dumps(record))
         bring_file(there, tmp_path / "out")
-        assert [view.media for view in load(there, 1).group.views] == [None, None]
+        assert [view.media for view in load_group_state(there, 1).group.views] == [None, None]
 
     def test_a_file_that_is_no_export_is_refused(self, there, tmp_path) -> None:
         (tmp_path / "out").mkdir()

@@ -11,7 +11,7 @@ from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import (
     UnassignedFrame,
@@ -20,7 +20,7 @@ from app.features.imports.ingest import (
     import_unassigned_frames,
     read_unassigned_frames,
 )
-from app.features.stations.service import load_station, submit_station
+from app.features.stations.service import load_station, submit_station_edit
 from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
@@ -70,14 +70,14 @@ class TestIngest:
     ) -> None:
         (group,) = fill(make_group())
         take = begin_take(store, group, person="ann")
-        name = load(store, take.copy_id).dataset
+        name = load_group_state(store, take.copy_id).dataset
         with pytest.raises(ConflictError, match="independent annotations"):
             import_groups(store, name, [make_group(7)], source="test", actor="lea")
-        assert load(store, take.copy_id).group == load(store, group).group
+        assert load_group_state(store, take.copy_id).group == load_group_state(store, group).group
 
     def test_a_group_comes_back_as_it_went_in(self, store, fill, make_group) -> None:
         group = make_group()
-        state = load(store, fill(group, solved=False)[0])
+        state = load_group_state(store, fill(group, solved=False)[0])
         assert state.group == group
         assert (state.revision, state.number, state.dataset) == (1, 1, "demo")
         assert state.solution is None
@@ -86,7 +86,7 @@ class TestIngest:
         ids = fill(make_static(10), make_static(11), make_static(12), solved=False)
         counts = rows(store)
         assert (counts["groups"], counts["view"], counts["station"]) == (3, 9, 3)
-        first, last = load(store, ids[0]), load(store, ids[2])
+        first, last = load_group_state(store, ids[0]), load_group_state(store, ids[2])
         assert first.station_ids == last.station_ids
         assert last.group == make_static(12)
 
@@ -171,7 +171,7 @@ class TestIngest:
         monkeypatch.chdir(tmp_path)
         group = make_group()
         view = replace(group.views[0], media=Media("data/7.png"))
-        state = load(store, fill(group.with_view(view), solved=False)[0])
+        state = load_group_state(store, fill(group.with_view(view), solved=False)[0])
         media = state.group.views[0].media
         assert media is not None
         assert media.path == str(tmp_path / "data/7.png")
@@ -182,7 +182,7 @@ class TestAChangedSource:
         (group_id,) = fill(make_group())
         changed = with_ball(make_group(), "7.png", 300.0)
         report = again(store, changed)
-        state = load(store, group_id)
+        state = load_group_state(store, group_id)
         assert (report.changed, report.findings) == (1, 0)
         assert state.group == changed
         assert state.revision == 2
@@ -192,13 +192,13 @@ class TestAChangedSource:
         self, store: Store, fill, state: GroupState, make_group
     ) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
         report = again(store, with_ball(make_group(), "7.png", 300.0))
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert (report.changed, report.findings) == (1, 1)
         assert after.group.view("7.png").balls == (ball,)
         fill()
-        solution = load(store, state.id).solution
+        solution = load_group_state(store, state.id).solution
         finding = next(item for item in solution.findings if item.kind == "upstream_changed")
         assert finding.view == "7.png"
         assert "7.png" in finding.sentence
@@ -207,7 +207,7 @@ class TestAChangedSource:
         self, store, fill, state, make_group
     ) -> None:
         edit = IncludeView("7.png", False)
-        submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)
         again(store, changed)
         before = rows(store)
@@ -220,40 +220,42 @@ class TestAChangedSource:
         self, store, fill, state, make_group
     ) -> None:
         edit = set_ball("7.png", None)
-        submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         changed = with_ball(make_group(), "7_1.png", 300.0)
         report = again(store, changed)
-        after = load(store, state.id)
+        after = load_group_state(store, state.id)
         assert report.findings == 0
         assert after.group.view("7.png").balls == ()
         assert after.group.view("7_1.png") == changed.view("7_1.png")
 
     def test_lines_follow_beside_an_edited_ball(self, store, fill, state, make_group) -> None:
         edit = set_ball("7.png", None)
-        submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         view = make_group().views[0]
         lines = make_lines({"Middle line": [(1.0, 2.0), (3.0, 4.0)]})
         changed = replace(view, station=replace(view.station, lines=lines))
         again(store, make_group().with_view(changed))
-        after = load(store, state.id).group.view("7.png")
+        after = load_group_state(store, state.id).group.view("7.png")
         assert after.station.lines == lines
         assert after.balls == ()
 
     def test_an_edit_that_was_undone_counts_as_no_edit(
         self, store, fill, state, make_group
     ) -> None:
-        edited = submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
+        edited = submit_edit(
+            store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann"
+        )
         undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)
         assert again(store, changed).findings == 0
-        assert load(store, state.id).group == changed
+        assert load_group_state(store, state.id).group == changed
 
     def test_a_finding_goes_when_the_source_says_what_the_person_said(
         self, store, fill, state, make_group
     ) -> None:
         agreed = with_ball(make_group(), "7.png", 333.0)
         ball = agreed.view("7.png").balls[0]
-        submit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
         again(store, with_ball(make_group(), "7.png", 300.0))
         again(store, agreed)
         assert rows(store)["import_finding"] == 0
@@ -263,28 +265,28 @@ class TestAChangedSource:
     ) -> None:
         one = replace(make_group(), views=make_group().views[:1])
         again(store, one)
-        assert [view.key for view in load(store, state.id).group.views] == ["7.png"]
+        assert [view.key for view in load_group_state(store, state.id).group.views] == ["7.png"]
         again(store, make_group())
-        back = load(store, state.id)
+        back = load_group_state(store, state.id)
         assert back.group == make_group()
         edit = set_ball("7_1.png", None)
-        submit(store, state.id, edit, if_match=back.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=back.etag, actor="ann")
         report = again(store, one)
         assert report.findings == 1
-        kept = load(store, state.id).group
+        kept = load_group_state(store, state.id).group
         assert [view.key for view in kept.views] == ["7.png", "7_1.png"]
 
     def test_views_that_people_edited_do_not_add_up_beyond_what_a_group_may_have(
         self, store, state, make_group, monkeypatch
     ) -> None:
-        submit(store, state.id, set_ball("7_1.png", None), if_match=state.etag, actor="ann")
-        before = load(store, state.id).group
+        submit_edit(store, state.id, set_ball("7_1.png", None), if_match=state.etag, actor="ann")
+        before = load_group_state(store, state.id).group
         monkeypatch.setattr("app.features.imports.ingest.MAX_VIEWS", 2)
         view = make_group().views[0]
         other = replace(make_group(), views=(view, replace(view, key="other.png")))
         report = again(store, other)
         assert (report.changed, report.findings) == (0, 0)
-        assert load(store, state.id).group == before
+        assert load_group_state(store, state.id).group == before
         (problem,) = report.problems
         assert "would have 3 views with those that people edited, a group may have 2" in problem
 
@@ -299,8 +301,8 @@ class TestAChangedSource:
             store,
             group.with_view(replace(view, station=moved)),
         )
-        assert [load(store, number).solution for number in ids] == [None, None]
-        assert load(store, ids[1]).group.views[0].station.lines == moved.lines
+        assert [load_group_state(store, number).solution for number in ids] == [None, None]
+        assert load_group_state(store, ids[1]).group.views[0].station.lines == moved.lines
 
     def test_a_static_camera_that_changed_counts_as_changed_once(
         self, store, fill, make_static, monkeypatch
@@ -314,10 +316,10 @@ class TestAChangedSource:
         self, store, fill, make_static
     ) -> None:
         ids = fill(with_switch(make_static(10), "lines"))
-        before, counts = load(store, ids[0]), rows(store)
+        before, counts = load_group_state(store, ids[0]), rows(store)
         report = again(store, without_lines(make_static(10)))
         assert (report.new, report.changed, report.unchanged) == (0, 0, 1)
-        after = load(store, ids[0])
+        after = load_group_state(store, ids[0])
         assert after.group == before.group
         assert after.group.views[0].station.lines != {}
         assert after.group.views[0].station.calibration == "lines"
@@ -332,7 +334,7 @@ class TestAChangedSource:
         view = group.views[0]
         moved = replace(view, station=replace(view.station, given=opposite))
         report = again(store, group.with_view(moved))
-        station = load(store, ids[0]).group.views[0].station
+        station = load_group_state(store, ids[0]).group.views[0].station
         assert report.changed == 1
         assert (station.given, station.lines) == (
             opposite, make_static(10).views[0].station.lines,
@@ -345,10 +347,10 @@ class TestAChangedSource:
         (group_id,) = fill(make_static(10))
         if camera_alone:
             import_given_cameras(store, "demo", {"cam1": opposite}, source="x", actor="ann")
-        station_id = load(store, group_id).station_ids["cam1"]
+        station_id = load_group_state(store, group_id).station_ids["cam1"]
         station = load_station(store, station_id)
         edit = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
-        submit_station(store, station_id, edit, if_match=station.etag, actor="ann")
+        submit_station_edit(store, station_id, edit, if_match=station.etag, actor="ann")
         edited, group = load_station(store, station_id), without_lines(make_static(10))
         if camera_alone:
             view = group.views[0]
@@ -363,11 +365,11 @@ class TestAChangedSource:
         self, store, fill, make_static
     ) -> None:
         (group_id,) = fill(make_static(10))
-        station_id = load(store, group_id).station_ids["cam1"]
+        station_id = load_group_state(store, group_id).station_ids["cam1"]
         lines = {"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))}
         station = load_station(store, station_id)
         edit = SetStationLines(lines)
-        submit_station(store, station_id, edit, if_match=station.etag, actor="ann")
+        submit_station_edit(store, station_id, edit, if_match=station.etag, actor="ann")
         group = make_static(10)
         view = group.views[0]
         upstream = replace(view.station, lines=make_lines({"Middle line": [(1, 2), (3, 4)]}))
@@ -375,7 +377,7 @@ class TestAChangedSource:
         assert report.findings == 1
         assert "Side line left" in load_station(store, station_id).station.lines
         fill()
-        kinds = [item.kind for item in load(store, group_id).solution.findings]
+        kinds = [item.kind for item in load_group_state(store, group_id).solution.findings]
         assert "upstream_changed" in kinds
 
     def test_the_log_has_each_import_of_a_group(self, store, state, make_group) -> None:
@@ -384,13 +386,13 @@ class TestAChangedSource:
 
     def test_an_edit_of_lines_stays(self, store, state, make_group) -> None:
         edit = SetLines("7.png", {"Middle line": None})
-        submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         view = make_group().views[0]
         lines = make_lines({"Middle line": [(1.0, 2.0), (3.0, 4.0)]})
         changed = replace(view, station=replace(view.station, lines=lines))
         report = again(store, make_group().with_view(changed))
         assert report.findings == 1
-        assert "Middle line" not in load(store, state.id).group.views[0].station.lines
+        assert "Middle line" not in load_group_state(store, state.id).group.views[0].station.lines
 
 
 class TestMissingGroups:

@@ -10,12 +10,12 @@ import pytest
 
 from app.errors import DatasetFormatError, InputError
 from app.features.imports.body import MAX_POINTS
-from app.features.imports.edits_export import group_to_merge
+from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.merge_parse import (
     FORMAT,
     FORMAT_VERSION,
     HEAD,
-    _station_of_record,
+    _parse_station_record,
     parse_group,
     read_merge_header,
 )
@@ -62,24 +62,24 @@ class TestStation:
     def test_lines_that_were_proposed_are_lines_that_it_has(self) -> None:
         lines = {"Middle line": [[1, 2], [3, 4]]}
         value = {**station_to_json(Station("cam1", ImageSize(96, 54))), "lines": lines}
-        assert _station_of_record({**value, "proposed": ["Middle line"]}).proposed == (
+        assert _parse_station_record({**value, "proposed": ["Middle line"]}).proposed == (
             "Middle line",
         )
         for wrong in (["Circle left"], "Middle line", ["Middle line", "Middle line"], [7]):
             with pytest.raises(
                 InputError, match="names lines as proposed that the view does not have"
             ):
-                _station_of_record({**value, "proposed": wrong})
+                _parse_station_record({**value, "proposed": wrong})
 
     def test_lines_have_no_more_points_than_those_of_other_imports(self) -> None:
         points = [[float(place), 2.0] for place in range(MAX_POINTS // 2)]
         value = station_to_json(Station("cam1", ImageSize(96, 54)))
         lines = {"Middle line": points, "Side line top": points}
-        assert len(_station_of_record({**value, "lines": lines}).lines) == 2
+        assert len(_parse_station_record({**value, "lines": lines}).lines) == 2
         with pytest.raises(
             InputError, match="1,001 points in the lines of cam1, and a view may have 1,000"
         ):
-            _station_of_record({**value, "lines": {**lines, "Side line left": points[:1]}})
+            _parse_station_record({**value, "lines": {**lines, "Side line left": points[:1]}})
 
 
 class TestParseGroup:
@@ -90,7 +90,7 @@ class TestParseGroup:
     def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
         self, shared: Any, said: str
     ) -> None:
-        group = group_to_merge(make_scenes(groups=1, seed=3, faults=False)[0].group)
+        group = group_to_export_json(make_scenes(groups=1, seed=3, faults=False)[0].group)
         more = {"base": None, "views": {}, "stations": {}, "log": [], "verdicts": []}
         value = {"group": group, "pitches": [], "bases": [], **more}
         assert len(parse_group(value, {}).group.views) == 2

@@ -14,7 +14,7 @@ from sqlalchemy import select
 from app.config import Settings
 from app.db.store import Store
 from app.errors import JobCancelled
-from app.features.findings.queries import read_noticed_by_imports
+from app.features.findings.queries import read_import_notices
 from app.features.imports.picture_check import NAMED, PictureCheck
 from app.features.imports.sources import ImportSource, import_source
 from app.features.queue.tables import QueueModel
@@ -214,7 +214,7 @@ class TestImport:
             (tmp_path / "instances_default.json").write_text(json.dumps(value))
             found = import_source(store, "demo", source, store.settings, dry_run=dry_run)
             with store.read() as session:
-                noticed = read_noticed_by_imports(session, [1])[1]
+                noticed = read_import_notices(session, [1])[1]
                 (row,) = session.execute(select(QueueModel.findings)).all()
             assert bool(row.findings.strip(",")) == bool(noticed)
             return found.values()["findings"], [f"{one.kind} {one.sentence}" for one in noticed]

@@ -9,7 +9,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import get_dataset
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.queue.service import list_groups
 from app.features.verdicts.bulk import NO_PICTURE, Refusal, give_verdicts, plan_verdicts
 from app.features.verdicts.service import set_verdict
@@ -52,30 +52,30 @@ class TestQueue:
 
 class TestSetVerdict:
     def test_a_bare_acceptance_is_refused(self, store: Store, ids: list[int]) -> None:
-        state = load(store, ids[2])
+        state = load_group_state(store, ids[2])
         assert state.solution is not None and state.solution.passes
         with pytest.raises(InputError, match="no picture") as caught:
             set_verdict(store, ids[2], "accepted", if_match=state.etag, actor="ann")
         assert caught.value.pointer == "/note"
-        assert load(store, ids[2]).verdict.state == "unreviewed"
+        assert load_group_state(store, ids[2]).verdict.state == "unreviewed"
 
     def test_with_a_note_it_is_accepted_and_overrides_no_gate(
         self, store: Store, ids: list[int]
     ) -> None:
-        etag = load(store, ids[2]).etag
+        etag = load_group_state(store, ids[2]).etag
         set_verdict(store, ids[2], "accepted", note="seen on tape", if_match=etag, actor="ann")
-        verdict = load(store, ids[2]).verdict
+        verdict = load_group_state(store, ids[2]).verdict
         assert (verdict.state, verdict.note, verdict.override) == ("accepted", "seen on tape", None)
 
     @pytest.mark.parametrize("state", ["deferred", "rejected"])
     def test_other_verdicts_need_none(self, store: Store, ids: list[int], state: str) -> None:
         reason = "duplicate_view" if state == "rejected" else None
-        etag = load(store, ids[2]).etag
+        etag = load_group_state(store, ids[2]).etag
         set_verdict(store, ids[2], state, reason, if_match=etag, actor="ann")
-        assert load(store, ids[2]).verdict.state == state
+        assert load_group_state(store, ids[2]).verdict.state == state
 
     def test_one_picture_is_enough(self, store: Store, ids: list[int]) -> None:
-        etag = load(store, ids[1]).etag
+        etag = load_group_state(store, ids[1]).etag
         set_verdict(store, ids[1], "accepted", if_match=etag, actor="ann")
 
 
@@ -90,4 +90,4 @@ class TestBulk:
         assert (done.changed, done.refused) == (2, (Refusal(NO_PICTURE, 1),))
         done = give_verdicts(store, dataset, "", "accepted", note="seen on tape", actor="ann")
         assert done.refused == ()
-        assert load(store, ids[2]).verdict.state == "accepted"
+        assert load_group_state(store, ids[2]).verdict.state == "accepted"

@@ -18,7 +18,7 @@ from app.features.datasets.service import dataset_id, get_dataset, list_datasets
 from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import (
     UnassignedFrame,
     import_groups,
@@ -43,7 +43,7 @@ Make = Callable[..., Group]
 
 def groups_of(store: Store, dataset: str) -> dict[str, Group]:
     page = list_groups(store, get_dataset(store, dataset).id, limit=500)
-    groups = (load(store, row.id).group for row in page.items)
+    groups = (load_group_state(store, row.id).group for row in page.items)
     return {group.key: group for group in groups}
 
 
@@ -298,8 +298,8 @@ class TestDryRun:
         import_source(store, "demo", source, store.settings)
         first = list_groups(store, get_dataset(store, "demo").id, limit=1).items[0].id
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        state = load(store, first)
-        submit(store, first, set_ball(state.group.views[0].key, ball), if_match=state.etag,
+        state = load_group_state(store, first)
+        submit_edit(store, first, set_ball(state.group.views[0].key, ball), if_match=state.etag,
                actor="ben")  # fmt: skip
         labels = json.loads(root.read_text())
         for number in (1, 2):

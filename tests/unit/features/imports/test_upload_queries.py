@@ -24,7 +24,7 @@ from app.features.imports.upload_queries import (
     get_upload,
     list_uploads,
     make_safe_file_name,
-    save_upload,
+    mark_upload_permanent,
     upload_path,
 )
 
@@ -275,7 +275,7 @@ class TestKeepUpload:
         upload, abort = send(settings, by="ann"), UploadWriter.abort
 
         def slow(writer: UploadWriter) -> None:
-            save_upload(settings, upload.id)
+            mark_upload_permanent(settings, upload.id)
             abort(writer)
 
         monkeypatch.setattr(UploadWriter, "abort", slow)
@@ -287,7 +287,7 @@ class TestKeepUpload:
 class TestExpireUploads:
     def test_old_ones_go_and_those_that_a_dataset_reads_stay(self, settings: Settings) -> None:
         old, kept, new = (send(settings, f"{name}.zip") for name in ("old", "kept", "new"))
-        save_upload(settings, kept.id)
+        mark_upload_permanent(settings, kept.id)
         then = (datetime.now(UTC) - timedelta(days=8)).isoformat()
         for upload in (old, kept):
             path = settings.uploads / upload.id / "upload.json"
@@ -334,7 +334,7 @@ class TestExpireUploads:
 class TestDeleteUpload:
     def test_is_refused_while_frames_are_read_from_it(self, settings: Settings) -> None:
         upload = send(settings)
-        save_upload(settings, upload.id)
+        mark_upload_permanent(settings, upload.id)
         with pytest.raises(InputError, match="reads its frames"):
             delete_upload(settings, upload.id)
         other = send(settings, "b.zip")

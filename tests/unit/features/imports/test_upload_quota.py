@@ -18,7 +18,7 @@ from app.features.imports.upload_queries import (
     UploadWriter,
     delete_upload,
     list_uploads,
-    save_upload,
+    mark_upload_permanent,
 )
 from app.features.imports.upload_quota import count_used_bytes, find_person_quota
 
@@ -112,7 +112,7 @@ class TestQuota:
         self, settings: Settings
     ) -> None:
         kept, other = send(settings, "a.zip", 500), send(settings, "b.zip", 500)
-        save_upload(settings, kept.id)
+        mark_upload_permanent(settings, kept.id)
         delete_upload(settings, other.id)
         assert count_used_bytes(settings, "ann") == 500
 

@@ -7,7 +7,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError, NotFoundError, UnsafePathError
-from app.features.imports.uploads import list_folder, name_import_folders, resolve_folder
+from app.features.imports.uploads import list_folder, map_import_folders_by_name, resolve_folder
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ class TestListFolder:
     def test_without_a_path_it_names_the_allowed_ones(self, settings: Settings) -> None:
         listing = list_folder(settings)
         assert [item.path for item in listing.items] == ["data", "data-2"]
-        assert set(name_import_folders(settings)) == {"data", "data-2"}
+        assert set(map_import_folders_by_name(settings)) == {"data", "data-2"}
 
     def test_folders_come_first_and_hidden_files_and_links_not_at_all(
         self, settings: Settings
@@ -69,7 +69,7 @@ class TestResolveFolder:
             resolve_folder(settings, path)
 
     def test_who_names_no_allowed_folder_is_told_which_there_are(self, settings: Settings) -> None:
-        names = ", ".join(sorted(name_import_folders(settings)))
+        names = ", ".join(sorted(map_import_folders_by_name(settings)))
         with pytest.raises(NotFoundError) as caught:
             resolve_folder(settings, "imp/data")
         assert caught.value.hint == f"There are: {names}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.db.store import Store
-from app.features.groups.submit import solve_and_keep
+from app.features.groups.submit import solve_and_store_group
 from app.features.independent_annotations import service as take
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import begin_annotation_in_session, get_annotation
@@ -17,7 +17,7 @@ def begin_for_batch(
     """Let a person begin a group on a batch's terms, and solve their copy."""
     with store.write() as session:
         begun = begin_annotation_in_session(session, group_id, person=person, **terms)
-    solve_and_keep(store, begun.copy_id)
+    solve_and_store_group(store, begun.copy_id)
     return begun
 
 

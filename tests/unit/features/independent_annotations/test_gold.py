@@ -10,7 +10,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.annotation_distance import polyline_distance
 from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.gold import (
     mark_gold_group,
@@ -20,7 +20,10 @@ from app.features.independent_annotations.gold import (
     unmark_gold_group,
     wilson_interval,
 )
-from app.features.independent_annotations.known_truth import BatchTerms, begin_next_annotation
+from app.features.independent_annotations.known_truth import (
+    BatchAnnotationTerms,
+    begin_next_annotation,
+)
 from app.features.independent_annotations.queries import read_gold_truth
 from app.features.independent_annotations.service import submit_annotation
 from app.features.verdicts.service import set_verdict
@@ -29,22 +32,24 @@ from app.soccer.frames import Box, ImagePoint
 
 
 def judge(store, group_id, state="accepted", actor="lea", reason=None):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, "seen", if_match=etag, actor=actor)
 
 
 def change(store, group_id, edit, actor):
-    return submit(store, group_id, edit, if_match=load(store, group_id).etag, actor=actor)
+    return submit_edit(
+        store, group_id, edit, if_match=load_group_state(store, group_id).etag, actor=actor
+    )
 
 
 @pytest.fixture
-def terms(store, fill, make_group) -> BatchTerms:
+def terms(store, fill, make_group) -> BatchAnnotationTerms:
     """A batch of two groups of three; the third one is gold."""
     groups = fill(*(make_group(number) for number in (1, 2, 3)))
     judge(store, groups[2])
     mark_gold_group(store, groups[2], "imported", actor="lea")
-    dataset_id = load(store, groups[0]).dataset_id
-    return BatchTerms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
+    dataset_id = load_group_state(store, groups[0]).dataset_id
+    return BatchAnnotationTerms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
 
 
 class TestMark:
@@ -62,10 +67,10 @@ class TestMark:
     def test_the_history_of_a_group_does_not_tell_that_it_is_gold(self, store, state) -> None:
         judge(store, state.id)
         before = [entry.kind for entry in read_history(store, state.id)]
-        etag = load(store, state.id).etag
+        etag = load_group_state(store, state.id).etag
         mark_gold_group(store, state.id, "bare", actor="lea")
         assert [entry.kind for entry in read_history(store, state.id)] == before
-        assert load(store, state.id).etag == etag
+        assert load_group_state(store, state.id).etag == etag
 
 
 class TestStartWith:
@@ -100,7 +105,7 @@ class TestMixing:
         while (
             take := begin_next_annotation(store, terms, person="ann", chance=Random(1))
         ) is not None:
-            copies.append(load(store, take.copy_id))
+            copies.append(load_group_state(store, take.copy_id))
             kinds.append(take.kind)
             judge(store, take.copy_id, actor="ann")
         assert sorted(kinds) == ["gold", "independent", "independent"]
@@ -127,7 +132,7 @@ class TestMixing:
             takes.append(take)
             judge(store, take.copy_id, actor="ann")
         (found,) = [take for take in takes if take.kind == "gold"]
-        for view in load(store, found.copy_id).group.views:
+        for view in load_group_state(store, found.copy_id).group.views:
             assert len(view.balls) == balls and bool(view.station.lines) == lines
 
 
@@ -135,7 +140,7 @@ class TestReadReport:
     def test_it_says_how_far_somebody_is_from_the_truth(self, store, terms) -> None:
         while (take := begin_next_annotation(store, terms, person="ann")) is not None:
             if take.kind == "gold":
-                group = load(store, take.copy_id).group
+                group = load_group_state(store, take.copy_id).group
                 view = group.views[0]
                 box = view.balls[0].box
                 moved = BallAnnotation(box=Box(box.x + 3.0, box.y + 4.0, box.width, box.height))
@@ -168,7 +173,7 @@ class TestReadReport:
             )
             if one.kind == "gold" or not submit_annotation(store, one.id, actor="ann")
         )
-        view = load(store, take.copy_id).group.views[0]
+        view = load_group_state(store, take.copy_id).group.views[0]
         box = view.balls[0].box
         wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
         change(store, take.copy_id, set_ball(view.key, wrong), "ann")

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from app.db.store import Store
-from app.features.batches.leases import BatchMember, Leases
+from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, get_batch, make_batch
 from app.features.datasets.service import get_dataset
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.gold import mark_gold_group, read_gold_report
 from app.features.independent_annotations.service import get_annotation_of_copy
@@ -50,8 +50,8 @@ def film(store: Store, tmp_path: Path) -> dict[int, int]:
     solve_dataset(store, "film")
     dataset = get_dataset(store, "film").id
     rows = list_groups(store, dataset, limit=9).items
-    found = {int(load(store, row.id).group.key): row.id for row in rows}
-    etag = load(store, found[GOLD]).etag
+    found = {int(load_group_state(store, row.id).group.key): row.id for row in rows}
+    etag = load_group_state(store, found[GOLD]).etag
     set_verdict(store, found[GOLD], "accepted", None, "seen", if_match=etag, actor="lea")
     invite(store, "ann", Role.ANNOTATOR, actor="local")
     return found
@@ -59,11 +59,11 @@ def film(store: Store, tmp_path: Path) -> dict[int, int]:
 
 def annotate(store: Store, copy: int, dx: float, dy: float) -> None:
     """Move the ball of a copy's first camera, in pixels; where it has none it is drawn where it was."""
-    state = load(store, copy)
+    state = load_group_state(store, copy)
     view = state.group.views[0]
     at = view.balls[0].center
     ball = BallAnnotation(point=ImagePoint(at.x + dx, at.y + dy))
-    submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor="ann")
+    submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor="ann")
 
 
 class TestGoldInAFilm:
@@ -74,9 +74,9 @@ class TestGoldInAFilm:
         frames = ",".join(str(film[FIRST + n]) for n in range(3))
         new = NewBatch("film", f"id:{frames}", annotators=["ann"], gold_every=2)
         batch = make_batch(store, "film", new, actor="lea").id
-        leases, kinds, shapes = Leases(store), [], set()
+        leases, kinds, shapes = LeaseService(store), [], set()
         while (copy := leases.next(batch, ANN).group) is not None:
-            take, state = get_annotation_of_copy(store, copy), load(store, copy)
+            take, state = get_annotation_of_copy(store, copy), load_group_state(store, copy)
             kinds.append(take.kind)
             assert all(view.media is not None for view in state.group.views)
             shapes.add(
@@ -107,12 +107,12 @@ class TestGoldInAFilm:
         mark_gold_group(store, film[GOLD], start, actor="lea")
         new = NewBatch("film", f"id:{film[FIRST]}", annotators=["ann"], gold_every=1)
         batch = make_batch(store, "film", new, actor="lea").id
-        copy = Leases(store).next(batch, ANN).group
+        copy = LeaseService(store).next(batch, ANN).group
         assert get_annotation_of_copy(store, copy).kind == "gold"
-        views = load(store, copy).group.views
+        views = load_group_state(store, copy).group.views
         assert [view.balls for view in views] == [()] * 6
         # Static cameras are everybody's: their lines are not those of this picture.
         assert all(view.station.lines for view in views)
-        Leases(store).submit(batch, copy, ANN, actor="ann")
+        LeaseService(store).submit(batch, copy, ANN, actor="ann")
         ((result,),) = [one.results for one in read_gold_report(store, "film").people]
         assert (result.error.ball_px, result.error.balls_missing) == (None, 6)

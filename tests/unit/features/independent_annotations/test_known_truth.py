@@ -13,15 +13,15 @@ from app.errors import InputError
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
-from app.features.batches.leases import BatchMember, Leases
+from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import SetLines, set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.gold import TruthSource, read_gold_report, set_gold_start
 from app.features.independent_annotations.known_truth import (
-    BatchTerms,
+    BatchAnnotationTerms,
     GoldChoice,
     begin_next_annotation,
     mark_groups_with_known_truth,
@@ -66,13 +66,15 @@ def scenes(store: Store, tmp_path: Path):
 
 
 def judge(store: Store, group: int, person: str) -> None:
-    etag = load(store, group).etag
+    etag = load_group_state(store, group).etag
     set_verdict(store, group, "accepted", None, "seen", if_match=etag, actor=person)
 
 
 def drawn_as_it_is(store: Store, copy: int, scene, aside: float) -> None:
     """Annotate a bare copy by the true cameras, its balls ``aside`` pixels to the right."""
-    for mine, view in zip(load(store, copy).group.views, scene.group.views, strict=True):
+    for mine, view in zip(
+        load_group_state(store, copy).group.views, scene.group.views, strict=True
+    ):
         truth = scene.truth.view(view.key)
         shown = project_markings(truth.camera, scene.group.pitch, view.size)
         lines = {
@@ -80,20 +82,24 @@ def drawn_as_it_is(store: Store, copy: int, scene, aside: float) -> None:
             for name in view.station.lines
             if name in shown and len(shown[name]) > 1
         }
-        etag = load(store, copy).etag
-        submit(store, copy, SetLines(mine.key, lines), if_match=etag, actor="ann")
+        etag = load_group_state(store, copy).etag
+        submit_edit(store, copy, SetLines(mine.key, lines), if_match=etag, actor="ann")
         x, y = truth.camera.project(np.array([truth.ball]))[0]
         d = truth.ball_diameter_px
         box = Box(x + aside - d / 2, y - d / 2, d, d)
-        etag = load(store, copy).etag
-        submit(store, copy, set_ball(mine.key, BallAnnotation(box=box)), if_match=etag, actor="ann")
+        etag = load_group_state(store, copy).etag
+        submit_edit(
+            store, copy, set_ball(mine.key, BallAnnotation(box=box)), if_match=etag, actor="ann"
+        )
 
 
 class TestSample:
     def test_errors_are_those_against_the_true_cameras_and_ball(self, store, scenes) -> None:
         chosen = mark_groups_with_known_truth(store, "demo", SAMPLE, actor="lea")
         assert (len(chosen.groups), chosen.left_out) == (3, 1)
-        terms = BatchTerms(4, load(store, 1).dataset_id, [4], 1, True, "2000", gold_every=1)
+        terms = BatchAnnotationTerms(
+            4, load_group_state(store, 1).dataset_id, [4], 1, True, "2000", gold_every=1
+        )
         take = begin_next_annotation(store, terms, person="ann")
         assert take is not None and take.kind == "gold"
         scene = scenes[take.group_id - 1]
@@ -154,10 +160,10 @@ class TestVersion:
         assert compare_or_adopt_submission(store, copy) == "open"
         judge(store, 3, "cy")
         freeze_dataset(store, "demo", FreezeRequest("v1"), actor="lea")
-        key = load(store, 2).group.views[0].key
+        key = load_group_state(store, 2).group.views[0].key
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
-        frozen = load(store, 2)
-        submit(store, 2, set_ball(key, ball), if_match=frozen.etag, actor="cy")
+        frozen = load_group_state(store, 2)
+        submit_edit(store, 2, set_ball(key, ball), if_match=frozen.etag, actor="cy")
         choice = GoldChoice(TruthSource.VERSION, version="v1")
         assert mark_groups_with_known_truth(store, "demo", choice, actor="lea").groups == (2,)
         take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)
@@ -177,13 +183,13 @@ class TestRunningBatch:
         invite(store, "ada", Role.ANNOTATOR, actor="local")
         new = NewBatch("a", query="number>=2", annotators=["ada"])
         batch = make_batch(store, "demo", new, actor="lea")
-        leases, ada = Leases(store), BatchMember("ada")
+        leases, ada = LeaseService(store), BatchMember("ada")
         first = leases.next(batch.id, ada).group
         leases.submit(batch.id, first, ada, actor="ada")
         mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
         change_batch(store, batch.id, actor="lea", gold_every=1)
         copy = leases.next(batch.id, ada).group
-        assert load(store, copy).group.label == "Group 1"
+        assert load_group_state(store, copy).group.label == "Group 1"
         judge(store, copy, "ada")
         assert [one.person for one in read_gold_report(store, "demo").people] == ["ada"]
         assert list_own_batches(store, lambda _: ada)[0].left == 2

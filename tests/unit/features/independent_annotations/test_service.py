@@ -14,14 +14,14 @@ from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, solve_and_keep, submit
+from app.features.groups.submit import load_group_state, solve_and_store_group, submit_edit
 from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
 from app.features.independent_annotations.gold import mark_gold_group
 from app.features.independent_annotations.known_truth import (
-    BatchTerms,
+    BatchAnnotationTerms,
     begin_next_annotation,
     count_gold_left,
-    is_gold_turn,
+    is_next_annotation_gold,
 )
 from app.features.independent_annotations.queries import GOLD, INDEPENDENT
 from app.features.independent_annotations.service import (
@@ -36,8 +36,8 @@ from app.features.people.roles import Role
 from app.features.people.service import give_role, invite
 from app.features.people.visibility_queries import COPIES, READER, RestrictedReader, Visibility
 from app.features.policies.service import change_policy
-from app.features.queue.changes import read_news
-from app.features.stations.service import load_station, submit_station
+from app.features.queue.changes import read_new_changes
+from app.features.stations.service import load_station, submit_station_edit
 from app.features.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
 from app.features.verdicts.bulk_undo import undo_batch
 from app.features.verdicts.service import set_verdict
@@ -51,11 +51,13 @@ HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
 
 
 def change(store, group_id, edit, actor="ann") -> GroupState:
-    return submit(store, group_id, edit, if_match=load(store, group_id).etag, actor=actor)
+    return submit_edit(
+        store, group_id, edit, if_match=load_group_state(store, group_id).etag, actor=actor
+    )
 
 
 def judge(store, group_id, state="accepted", actor="ann", reason=None, note="as it is"):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor=actor)
 
 
@@ -66,12 +68,12 @@ def faults(store) -> list[str]:
 class TestBeginTake:
     def test_a_copy_is_exact(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
-        copy = load(store, take.copy_id)
+        copy = load_group_state(store, take.copy_id)
         assert copy.group == state.group
         assert copy.stored.inputs_hash == state.stored.inputs_hash
         assert (
             copy.solution is not None
-            and copy.solution.ball == solve_and_keep(store, state.id).solution.ball
+            and copy.solution.ball == solve_and_store_group(store, state.id).solution.ball
         )
         assert copy.dataset_id > COPIES and copy.policy == state.policy
         assert copy.verdicts == [] and not copy.can_undo
@@ -79,38 +81,45 @@ class TestBeginTake:
     def test_it_is_judged_by_the_policy_of_the_moment(self, store, fill, make_group) -> None:
         first, second = fill(make_group(1), make_group(2))
         one = begin_take(store, first, person="ann")
-        assert load(store, one.copy_id).policy == load(store, first).policy
-        change_policy(store, load(store, first).dataset, STRICT, if_match=None, actor="lea")
+        assert load_group_state(store, one.copy_id).policy == load_group_state(store, first).policy
+        change_policy(
+            store, load_group_state(store, first).dataset, STRICT, if_match=None, actor="lea"
+        )
         two = begin_take(store, second, person="ann")
-        assert load(store, two.copy_id).dataset_id == load(store, one.copy_id).dataset_id
-        assert load(store, two.copy_id).policy == STRICT
+        assert (
+            load_group_state(store, two.copy_id).dataset_id
+            == load_group_state(store, one.copy_id).dataset_id
+        )
+        assert load_group_state(store, two.copy_id).policy == STRICT
 
     def test_a_copy_has_static_cameras_of_its_own_until_it_is_adopted(
         self, store, fill, make_static
     ) -> None:
         first, second = fill(make_static(10), make_static(11))
         one = begin_take(store, first, person="ann")
-        camera = load(store, one.copy_id).station_ids["cam1"]
+        camera = load_group_state(store, one.copy_id).station_ids["cam1"]
         line = next(iter(load_station(store, camera).station.lines))
         etag = load_station(store, camera).etag
-        submit_station(store, camera, SetStationLines({line: HERE}), if_match=etag, actor="ann")
+        submit_station_edit(
+            store, camera, SetStationLines({line: HERE}), if_match=etag, actor="ann"
+        )
         two = begin_take(store, second, person="ann")
-        assert load(store, two.copy_id).group.views[0].station.lines[line] == HERE
+        assert load_group_state(store, two.copy_id).group.views[0].station.lines[line] == HERE
         assert faults(store) == []
-        assert load(store, second).group.views[0].station.lines[line] != HERE
-        assert load(store, first).group.views[0].station.lines[line] != HERE
+        assert load_group_state(store, second).group.views[0].station.lines[line] != HERE
+        assert load_group_state(store, first).group.views[0].station.lines[line] != HERE
         submit_annotation(store, one.id, actor="ann")
         adopt_annotation(store, one.id, actor="lea")
-        assert load(store, second).group.views[0].station.lines[line] == HERE
+        assert load_group_state(store, second).group.views[0].station.lines[line] == HERE
         assert faults(store) == []
 
     def test_the_log_has_it_and_makes_it_again(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         change(store, take.copy_id, set_ball(state.group.views[0].key, BALL))
-        before = load(store, take.copy_id)
+        before = load_group_state(store, take.copy_id)
         assert faults(store) == []
         rebuild_tables(store)
-        assert load(store, take.copy_id).etag == before.etag
+        assert load_group_state(store, take.copy_id).etag == before.etag
         with store.read() as session:
             verify_chain(session)
 
@@ -127,7 +136,7 @@ class TestBeginTake:
         names = ("script:nightly import", "script:a@b+c", "script:a+b@c")
         takes = [begin_take(store, state.id, person=name) for name in names]
         assert [take.person for take in takes] == list(names)
-        assert len({load(store, take.copy_id).dataset for take in takes}) == 3
+        assert len({load_group_state(store, take.copy_id).dataset for take in takes}) == 3
         assert faults(store) == []
 
     def test_a_blind_copy_begins_with_the_group_as_it_was_when_the_batch_began(
@@ -137,9 +146,9 @@ class TestBeginTake:
         view = state.group.views[0].key
         change(store, state.id, set_ball(view, None), actor="eve")
         late = begin_for_batch(store, state.id, "ann", batch_id=1, since=since)
-        assert load(store, late.copy_id).group.view(view).balls == ()
+        assert load_group_state(store, late.copy_id).group.view(view).balls == ()
         early = begin_for_batch(store, state.id, "ann", batch_id=2, since="2000-01-01")
-        assert load(store, early.copy_id).group == state.group
+        assert load_group_state(store, early.copy_id).group == state.group
 
     def test_a_copy_that_is_not_blind_begins_with_what_the_person_before_left(
         self, store, state
@@ -149,13 +158,13 @@ class TestBeginTake:
         change(store, first.copy_id, set_ball(view, BALL))
         submit_annotation(store, first.id, actor="ann")
         blind = begin_for_batch(store, state.id, "ben", batch_id=1)
-        assert load(store, blind.copy_id).group == state.group
+        assert load_group_state(store, blind.copy_id).group == state.group
         seeing = begin_for_batch(store, state.id, "cleo", batch_id=1, blind=False)
-        assert load(store, seeing.copy_id).group.view(view).balls == (BALL,)
+        assert load_group_state(store, seeing.copy_id).group.view(view).balls == (BALL,)
 
     def test_a_nameless_copy_says_nowhere_which_group_it_is_of(self, store, state) -> None:
         take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True)
-        copy = load(store, take.copy_id)
+        copy = load_group_state(store, take.copy_id)
         said = repr(replace(copy.group, views=())) + repr(copy.view_ids) + repr(copy.station_ids)
         assert copy.group.label == "Group 1" and copy.group.match == ""
         for word in ("north", "Alder", ".png"):
@@ -207,13 +216,15 @@ class TestStart:
         for group, start in zip(groups[3:], starts, strict=True):
             judge(store, group, actor="lea")
             mark_gold_group(store, group, start, actor="lea")
-        terms = BatchTerms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
+        terms = BatchAnnotationTerms(
+            7, load_group_state(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2
+        )
         kinds = []
         while (
             take := begin_next_annotation(store, terms, person="ann", chance=Random(3))
         ) is not None:
             kinds.append(take.kind)
-            copy = load(store, take.copy_id).group
+            copy = load_group_state(store, take.copy_id).group
             assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
             assert [bool(view.station.lines) for view in copy.views] == [lines] * len(copy.views)
             submit_annotation(store, take.id, actor="ann")
@@ -248,7 +259,7 @@ class TestHandIn:
         take = begin_take(store, state.id, person="ann")
         with pytest.raises(ForbiddenError, match="only ann"):
             judge(store, take.copy_id, actor="ben")
-        dataset = load(store, take.copy_id).dataset_id
+        dataset = load_group_state(store, take.copy_id).dataset_id
         with pytest.raises(ForbiddenError, match="only ann"):
             give_verdicts(store, dataset, "", "deferred", actor="ben")
         give_verdicts(store, dataset, "", "deferred", actor="ann")
@@ -277,7 +288,7 @@ class TestHandIn:
             for number in fill(make_group(7), make_group(8), make_group(9))
         ]
         submit_annotation(store, takes[1].id, actor="ann")
-        dataset = load(store, takes[0].copy_id).dataset_id
+        dataset = load_group_state(store, takes[0].copy_id).dataset_id
         refused = [("submitted", 1)]
         for verdict in ("deferred", "accepted"):
             plan = plan_verdicts(store, dataset, "", verdict, note="seen")
@@ -315,7 +326,7 @@ class TestAdoptTake:
         change(store, take.copy_id, SetLines(views[1], {line: HERE}))
         judge(store, take.copy_id)
         after = adopt_annotation(store, take.id, actor="lea")
-        copy = load(store, take.copy_id)
+        copy = load_group_state(store, take.copy_id)
         assert after.group == copy.group
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
         said = [(entry.kind, entry.actor) for entry in read_history(store, state.id)][1:]
@@ -364,7 +375,7 @@ class TestCopies:
         take = begin_take(store, state.id, person="ann")
         delete_dataset(store, state.dataset, confirm=state.dataset, actor="lea")
         with pytest.raises(NotFoundError):
-            load(store, take.copy_id)
+            load_group_state(store, take.copy_id)
         assert faults(store) == []
         with store.write() as session:
             assert insert_dataset(session, "next", state.policy, "ann") < COPIES
@@ -384,7 +395,9 @@ class TestCopies:
         }
         give_role(store, state.dataset, people["here"][0], Role.LEAD, actor="local")
         give_role(store, state.dataset, people["elsewhere"][0], Role.VIEWER, actor="local")
-        copies = load(store, begin_take(store, state.id, person="ann").copy_id).dataset_id
+        copies = load_group_state(
+            store, begin_take(store, state.id, person="ann").copy_id
+        ).dataset_id
         with store.read() as session:
             roles = {name: read_roles(session, *who) for name, who in people.items()}
         assert {name: str(one.find_role_in(copies)) for name, one in roles.items()} == {
@@ -400,16 +413,16 @@ class TestCopies:
         with store.read() as session:
             last = find_newest_entry_id(session)
         begin_take(store, state.id, person="ann")
-        changes = read_news(store, {last}, None).changes[last]
+        changes = read_new_changes(store, {last}, None).changes[last]
         assert changes and not [one for one in changes if reader.sees(one.dataset_id)]
 
 
 class TestBeginNext:
     def test_what_is_left_is_what_will_come(self, store, fill, make_group) -> None:
         groups = fill(make_group(1), make_group(2), make_group(3))
-        dataset = load(store, groups[0]).dataset_id
+        dataset = load_group_state(store, groups[0]).dataset_id
         batch = make_batch(store, dataset, NewBatch("a", verdicts=2), actor="lea")
-        terms = BatchTerms(batch.id, dataset, groups, 2, True, batch.created)
+        terms = BatchAnnotationTerms(batch.id, dataset, groups, 2, True, batch.created)
 
         def left(person: str) -> int:
             with store.read() as session:
@@ -425,7 +438,9 @@ class TestBeginNext:
 
     def test_each_group_as_often_as_the_batch_asks(self, store, fill, make_group) -> None:
         groups = fill(make_group(1), make_group(2))
-        terms = BatchTerms(5, load(store, groups[0]).dataset_id, groups, 2, True, "2000")
+        terms = BatchAnnotationTerms(
+            5, load_group_state(store, groups[0]).dataset_id, groups, 2, True, "2000"
+        )
         had = []
         for person in ("ann", "ben", "cleo"):
             while (take := begin_next_annotation(store, terms, person=person)) is not None:
@@ -439,7 +454,9 @@ class TestBeginNext:
     def test_one_of_each_block_is_gold_and_nobody_knows_which(self) -> None:
         every, chance, kinds = 5, Random(4), list[str]()
         for _ in range(every * 100):
-            kinds.append("gold" if is_gold_turn(kinds, every, 1000, chance) else "independent")
+            kinds.append(
+                "gold" if is_next_annotation_gold(kinds, every, 1000, chance) else "independent"
+            )
         blocks = [kinds[at : at + every] for at in range(0, len(kinds), every)]
         assert all(block.count("gold") == 1 for block in blocks)
         assert len({block.index("gold") for block in blocks}) == every
@@ -456,7 +473,7 @@ class TestBeginNext:
             kinds, free, gold = list[str](), groups, fresh
             while True:
                 left = free + count_gold_left(kinds, every, free, gold)
-                if gold and is_gold_turn(kinds, every, free, chance):
+                if gold and is_next_annotation_gold(kinds, every, free, chance):
                     kinds, gold = [*kinds, "gold"], gold - 1
                 elif free:
                     kinds, free = [*kinds, "independent"], free - 1

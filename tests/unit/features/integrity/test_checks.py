@@ -15,7 +15,7 @@ from app.config import Settings
 from app.db.check import CheckResult
 from app.db.home import make_home
 from app.db.store import Store
-from app.features.imports.upload_queries import UploadWriter, save_upload
+from app.features.imports.upload_queries import UploadWriter, mark_upload_permanent
 from app.features.integrity import checks
 from app.features.integrity.checks import examine_home, examine_surroundings
 from app.features.people.login_queries import put_identity
@@ -170,7 +170,7 @@ class TestExamineSurroundings:
         writer = UploadWriter(settings, "frames.zip")
         writer.write(b"frames")
         upload = writer.finish()
-        save_upload(settings, upload.id)
+        mark_upload_permanent(settings, upload.id)
         part = settings.uploads / "x.part"
         part.touch()
         os.utime(part, (0, 0))

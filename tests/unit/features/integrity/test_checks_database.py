@@ -11,11 +11,11 @@ import pytest
 from sqlalchemy import text
 
 from app.db.check import CheckResult
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.store import Store
-from app.features.findings.service import FindingName, set_dismissal
+from app.features.findings.service import FindingReference, set_dismissal
 from app.features.groups.replay import rebuild_tables
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.integrity.checks import REBUILD, examine_database
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -27,7 +27,15 @@ from tests.unit.stores import OPPOSITE
 @pytest.fixture
 def ids(store: Store, fill, make_group) -> list[int]:
     ids = fill(make_group(7), make_group(8))
-    set_verdict(store, ids[0], "accepted", None, None, if_match=load(store, ids[0]).etag, actor="a")
+    set_verdict(
+        store,
+        ids[0],
+        "accepted",
+        None,
+        None,
+        if_match=load_group_state(store, ids[0]).etag,
+        actor="a",
+    )
     return ids
 
 
@@ -68,7 +76,7 @@ def first(store: Store, statement: str) -> Any:
 class TestComputed:
     @pytest.fixture
     def restoring(self, store: Store) -> str:
-        return dialect_of(store.settings).restoring
+        return get_dialect(store.settings).restoring
 
     @pytest.mark.parametrize("body", [b"garbage", zlib.compress(b"[1")])
     def test_a_calibration_that_cannot_be_read_is_named_by_its_key(
@@ -241,7 +249,7 @@ class TestExamine:
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER verdict_refuses_update"
         change(store, trigger, f"UPDATE verdict SET actor = 'eve' WHERE group_id = {ids[0]}")
-        assert faults(store)["groups' verdicts"].mend == dialect_of(store.settings).restoring
+        assert faults(store)["groups' verdicts"].mend == get_dialect(store.settings).restoring
 
     @pytest.mark.parametrize(
         ("verb", "forged"),
@@ -254,15 +262,15 @@ class TestExamine:
     def test_a_dismissal_that_is_gone_or_was_changed_needs_a_backup(
         self, store: Store, fill, make_group, verb: str, forged: str
     ) -> None:
-        state = load(store, fill(make_group(9, shift=80.0))[0])
+        state = load_group_state(store, fill(make_group(9, shift=80.0))[0])
         assert state.solution is not None
-        name = FindingName(state.solution.findings[0].kind, state.solution.findings[0].view)
+        name = FindingReference(state.solution.findings[0].kind, state.solution.findings[0].view)
         set_dismissal(store, state.id, name, dismissed=True, if_match=state.etag, actor="ann")
         assert faults(store) == {}
         change(store, f"DROP TRIGGER dismissal_refuses_{verb}", forged)
         found = faults(store)["dismissed findings"]
         assert found.sentence == f"1 not as the log says: {state.id}"
-        assert found.mend == dialect_of(store.settings).restoring
+        assert found.mend == get_dialect(store.settings).restoring
 
     def test_a_log_that_was_changed_ends_the_comparison(self, store: Store, ids) -> None:
         change(

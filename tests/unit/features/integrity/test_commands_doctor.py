@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from app.command_line import app
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.locks import hold_server_lock
 from app.db.store import Store
 from app.features.imports.ingest import ensure_dataset
@@ -41,7 +41,7 @@ class TestDoctor:
         done = CliRunner().invoke(app, ["doctor", "--json"])
         assert done.exit_code == 1
         (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
-        mended_by = "touchline restore" if dialect_of(settings).is_file else "pg_restore"
+        mended_by = "touchline restore" if get_dialect(settings).is_file else "pg_restore"
         assert (fault["name"], mended_by in fault["mend"]) == ("datasets", True)
 
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:

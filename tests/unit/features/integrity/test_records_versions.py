@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import text
 
 from app.db.check import CheckResult
-from app.db.dialects.dialect import dialect_of
+from app.db.dialects.dialect import get_dialect
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
 from app.features.integrity.records import examine_versions
@@ -69,7 +69,7 @@ class TestVersions:
         found = faults(store)
         assert found.keys() == {"frozen versions"}
         assert found["frozen versions"].sentence.endswith("(the log says otherwise)")
-        assert found["frozen versions"].mend == dialect_of(store.settings).restoring
+        assert found["frozen versions"].mend == get_dialect(store.settings).restoring
 
     def test_all_groups_of_a_version_are_there(self, store: Store) -> None:
         change(store, "version_group_refuses_delete", "DELETE FROM version_group")

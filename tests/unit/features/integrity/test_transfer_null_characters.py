@@ -8,9 +8,9 @@ from sqlalchemy import text
 from app.db.store import Store
 from app.errors import InputError
 from app.features.integrity.transfer import (
-    NullCharacter,
+    TextWithNullCharacter,
     find_null_characters,
-    without_null_characters,
+    replace_null_characters,
 )
 from tests.unit.db.homes import INSERT, add, names
 
@@ -53,8 +53,8 @@ class TestFindNullCharacters:
             session.execute(text("UPDATE dataset SET name = 'a' || char(0), policy = char(0)"))
             found = find_null_characters(session)
         assert found == [
-            NullCharacter("dataset", {"id": 1}, "name", "a\0"),
-            NullCharacter("dataset", {"id": 1}, "policy", "\0"),
+            TextWithNullCharacter("dataset", {"id": 1}, "name", "a\0"),
+            TextWithNullCharacter("dataset", {"id": 1}, "policy", "\0"),
         ]
         assert str(found[0]) == "dataset id=1 column name"
 
@@ -62,4 +62,4 @@ class TestFindNullCharacters:
 class TestWithoutNullCharacters:
     def test_texts_alone_are_changed(self) -> None:
         row = {"a": "x\0y", "b": b"\0", "c": 0, "d": None}
-        assert without_null_characters(row) == {"a": "x\ufffdy", "b": b"\0", "c": 0, "d": None}
+        assert replace_null_characters(row) == {"a": "x\ufffdy", "b": b"\0", "c": 0, "d": None}

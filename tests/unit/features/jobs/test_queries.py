@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from app.db.store import Store
-from app.features.jobs.queries import NewJob, insert_job, read_job, read_jobs, trim_jobs, update_job
+from app.features.jobs.queries import (
+    NewJob,
+    delete_oldest_jobs,
+    insert_job,
+    read_job,
+    read_jobs,
+    update_job,
+)
 
 
 def insert(own_store: Store, kind: str = "solve", **options) -> int:
@@ -40,7 +47,7 @@ class TestTrimJobs:
         for job in (*ids[1:], other):
             update(own_store, job, state="done")
         with own_store.write() as session:
-            trim_jobs(session, "solve", 1)
+            delete_oldest_jobs(session, "solve", 1)
         with own_store.read() as session:
             left = [job.id for job in read_jobs(session)]
         assert left == [other, ids[3], ids[0]]

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from app.db.database_worker import CallingServer
+from app.db.database_worker import ServerProxy
 from app.db.store import Store
 from app.errors import InputError, JobCancelled, OverloadedError
 from app.features.datasets.service import dataset_id
@@ -111,22 +111,22 @@ class TestRunQueue:
         jobs.close()
 
 
-def number_of_process(_store: Store, caller: CallingServer) -> int:
+def number_of_process(_store: Store, caller: ServerProxy) -> int:
     caller(1, 2, "counting")
     caller(2)
     return os.getpid()
 
 
-def ask(_store: Store, question: str, caller: CallingServer) -> Any:
+def ask(_store: Store, question: str, caller: ServerProxy) -> Any:
     return caller.ask(question)
 
 
-def step_for_ever(_store: Store, caller: CallingServer) -> None:
+def step_for_ever(_store: Store, caller: ServerProxy) -> None:
     for number in range(10_000_000):
         caller(number)
 
 
-def be_refused(_store: Store, _caller: CallingServer) -> None:
+def be_refused(_store: Store, _caller: ServerProxy) -> None:
     raise InputError("there is nothing to count")
 
 

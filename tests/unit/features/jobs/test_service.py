@@ -128,7 +128,7 @@ class TestSubmitting:
             looks = threads.submit(
                 lambda: (
                     jobs.is_open(running.id, "export"),
-                    jobs.are_idle(),
+                    jobs.is_idle(),
                     jobs.cancel(running.id).id,
                 )
             )
@@ -369,7 +369,7 @@ class TestRestart:
         assert [entry["event"] for entry in logs] == ["a job did not end in time"]
         assert jobs.get(job.id).tries == 0
         finish.set()
-        until(jobs.are_idle)
+        until(jobs.is_idle)
         assert jobs.get(job.id).tries == 0
 
     def test_finished_jobs_stay_as_they_were_after_a_restart(

@@ -152,7 +152,7 @@ class TestSharedJobs:
         job = ask(first)
         assert unaware.begun.acquire(timeout=SECONDS)
         claims.free = False
-        first._lead_or_log_failure()
+        first._try_to_lead()
         assert not first.is_leader()
         first._ended.set()
         claims.free = True
@@ -175,7 +175,7 @@ class TestSharedJobs:
         assert work.begun.acquire(timeout=SECONDS)
         (run,) = jobs._queue.runs
         claims.free = False
-        jobs._lead_or_log_failure()
+        jobs._try_to_lead()
         work.go_on.release()
         assert run.over.wait(SECONDS)
         assert (jobs.get(job.id).state, jobs.get(job.id).tries) == ("running", 0)

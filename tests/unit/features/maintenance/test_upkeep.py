@@ -23,7 +23,7 @@ from app.features.datasets.service import delete_dataset, list_datasets
 from app.features.jobs.queries import JobModel, NewJob, insert_job, update_job
 from app.features.jobs.service import Jobs
 from app.features.maintenance import upkeep as module
-from app.features.maintenance.upkeep import CleanupCounts, Upkeep, clean_up
+from app.features.maintenance.upkeep import CleanupCounts, UpkeepScheduler, clean_up
 
 OLD = time.time() - 40 * 86_400
 
@@ -165,7 +165,7 @@ class TestUpkeep:
         def damaged(_wanted: object) -> None:
             raise OSError("the disk is gone")
 
-        upkeep = Upkeep(store, Jobs(store))
+        upkeep = UpkeepScheduler(store, Jobs(store))
         monkeypatch.setattr(store, "require_whole", damaged)
         with capture_logs() as logs:
             upkeep.round()
@@ -193,15 +193,15 @@ class TestUpkeep:
         count = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000000)"
         slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
         monkeypatch.setattr("app.db.dialects.sqlite.text", lambda _: slow)
-        there.require_whole(lambda: False)
+        there.require_intact_database(lambda: False)
         with pytest.raises(DamagedError):
-            there.require_whole()
+            there.require_intact_database()
 
     def test_its_thread_has_ended_when_it_is_closed_however_long_it_would_wait(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "FIRST_SECONDS", 3600.0)
-        upkeep = Upkeep(store, Jobs(store))
+        upkeep = UpkeepScheduler(store, Jobs(store))
         upkeep.start()
         upkeep.close()
         upkeep.close()

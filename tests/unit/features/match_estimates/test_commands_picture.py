@@ -10,7 +10,7 @@ import pytest
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_writer import write_line_files
 from app.soccer.picture import PictureGeometry
@@ -34,7 +34,7 @@ def frames(pitch: Pitch) -> list[LineFile]:
             LineFile(
                 f"{number}",
                 SIZE,
-                click(TRUE.camera_of_shown_picture(camera, SIZE), 0.7, number, pitch),
+                click(TRUE.camera_of_annotated_picture(camera, SIZE), 0.7, number, pitch),
             )
         )
     return files
@@ -75,7 +75,7 @@ class TestPicture:
 
     def aspect(self, home: Path) -> float | None:
         store = Store.open(Settings(home=home))
-        picture = load(store, 1).group.views[0].station.picture
+        picture = load_group_state(store, 1).group.views[0].station.picture
         store.close()
         return None if picture is None else picture.aspect
 

@@ -17,9 +17,9 @@ from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import jobs as pictures_job
 from app.features.match_estimates.jobs import PICTURES
-from app.features.match_estimates.pictures import change_pictures, read_pictures
+from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
 from app.features.solutions.service import list_stale_groups
-from app.features.solve.jobs import change_and_solve
+from app.features.solve.jobs import change_and_return_job
 from app.progress import ReportProgress
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
@@ -38,7 +38,7 @@ def frames(match: str) -> list[Group]:
     groups = []
     for number in range(FRAMES):
         camera = looking((1.0, 62.0, -16.0), (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        lines = click(DONE[match].camera_of_shown_picture(camera, SIZE), 0.7, number)
+        lines = click(DONE[match].camera_of_annotated_picture(camera, SIZE), 0.7, number)
         view = View(f"{number}.png", Station(f"{match}/{number}", SIZE, lines=lines))
         groups.append(Group(f"{match}/{number}.png", (view,), match=match))
     return groups
@@ -69,7 +69,7 @@ def aspects(store: Store) -> dict[str, float | None]:
     """What the pictures of each match are taken to be."""
     return {
         item.match: None if item.picture is None else item.picture.aspect
-        for item in read_pictures(store, "demo")
+        for item in read_picture_geometries(store, "demo")
     }
 
 
@@ -115,9 +115,9 @@ def test_one_match_is_looked_at_where_one_is_asked_for_in_a_process_of_its_own(t
 
 def say(jobs: Jobs, store: Store, wanted: dict[str, PictureGeometry | None]) -> Job:
     def change(session: Session) -> None:
-        change_pictures(session, "demo", wanted, actor="lea")
+        set_picture_geometries(session, "demo", wanted, actor="lea")
 
-    return change_and_solve(jobs, store, "demo", change, actor="lea")
+    return change_and_return_job(jobs, store, "demo", change, actor="lea")
 
 
 def test_a_picture_that_is_said_is_solved_and_no_longer_proposed(jobs: Jobs, two: Store) -> None:
@@ -157,12 +157,12 @@ def test_a_server_that_stops_leaves_an_estimate_to_the_next_one(
 
     first = Jobs(two)
     with monkeypatch.context() as patch:
-        patch.setattr(pictures_job, "estimate_pictures", endless)
+        patch.setattr(pictures_job, "estimate_picture_geometries", endless)
         job = PICTURES.request(first, two, "demo", WIDE, actor="lea")
         assert started.wait(SECONDS)
         first.close()
     second = Jobs(two)
-    PICTURES.take_up(second, two)
+    PICTURES.register_with_jobs(second, two)
     second.start()
     assert [item["match"] for item in finished(second, job).result["items"]] == [WIDE]
     second.close()

@@ -45,14 +45,14 @@ def test_matches_are_worked_on_in_processes_of_their_own(two: Store) -> None:
 def test_what_was_written_before_it_failed_is_solved(
     two: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = editing._estimate_match
+    whole = editing._run_position_task
 
     def estimate(task):
         if task.match == "1":
             raise ValueError("odd")
         return whole(task)
 
-    monkeypatch.setattr(editing, "_estimate_match", estimate)
+    monkeypatch.setattr(editing, "_run_position_task", estimate)
     jobs = Jobs(two)
     job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
     assert jobs.wait(job.id, SECONDS).state == "failed"
@@ -66,11 +66,11 @@ def test_what_was_written_before_it_failed_is_solved(
 def test_a_share_that_is_taken_back_while_it_runs_gives_nothing_more(
     two: Store, monkeypatch: pytest.MonkeyPatch, match: str, shared: list[bool | None]
 ) -> None:
-    jobs, estimated = Jobs(two), Held(editing._estimate_match, calls=2)
-    monkeypatch.setattr(editing, "_estimate_match", estimated)
+    jobs, estimated = Jobs(two), Held(editing._run_position_task, calls=2)
+    monkeypatch.setattr(editing, "_run_position_task", estimated)
     job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
     estimated.wait()
-    POSITIONS.take_back(jobs, two, "demo", match, actor="ann")
+    POSITIONS.undo_last_job(jobs, two, "demo", match, actor="ann")
     estimated.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert [item.current for item in get_positions(two, "demo").items] == shared

@@ -11,14 +11,14 @@ from app.features.groups.edit import SetLines, SetPicture
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates import queries as positions_in_store
 from app.features.match_estimates.positions import (
     get_positions,
     share_positions,
-    take_back_positions,
+    undo_position_sharing,
 )
 from app.features.pitches.service import change_pitches
 from app.features.policies.service import change_policy
@@ -78,21 +78,21 @@ def state(store):
 
 
 def stand(store, number):
-    return load(store, number).solution.views[0].calibration.camera.position
+    return load_group_state(store, number).solution.views[0].calibration.camera.position
 
 
 def keys(store):
     """Which calibration the main camera of each group has."""
-    solved = [load(store, number).solution.views[0] for number in range(1, 7)]
+    solved = [load_group_state(store, number).solution.views[0] for number in range(1, 7)]
     return [view.calibration_key for view in solved]
 
 
 def draw(store, number):
     """Edit the lines of a group's main camera."""
-    at = load(store, number)
+    at = load_group_state(store, number)
     view = at.group.views[0].key
     edit = SetLines(view, {"Circle central": None, "Middle line": None})
-    return submit(store, number, edit, if_match=at.etag, actor="ann")
+    return submit_edit(store, number, edit, if_match=at.etag, actor="ann")
 
 
 class TestSharePositions:
@@ -106,14 +106,14 @@ class TestSharePositions:
         assert (item.groups, item.views, item.shared, item.current) == (6, 6, 6, True)
         assert np.linalg.norm(np.subtract(item.mean, STAND)) < 0.5
         for number in range(1, 7):
-            group = load(shared, number).group
+            group = load_group_state(shared, number).group
             assert list(group.positions) == [group.views[0].key]
 
     def test_its_own_lines_have_no_part_in_it(self, shared):
-        (before,) = load(shared, 1).group.positions.values()
+        (before,) = load_group_state(shared, 1).group.positions.values()
         draw(shared, 1)
         share_positions(shared, "demo", [MATCH], actor="ann")
-        (after,) = load(shared, 1).group.positions.values()
+        (after,) = load_group_state(shared, 1).group.positions.values()
         # They say where it looks, and frames that look the same way count more.
         assert after.mean == pytest.approx(before.mean, abs=0.02)
 
@@ -125,17 +125,17 @@ class TestSharePositions:
         assert np.mean(apart) < 0.9 * np.mean(alone)
 
     def test_another_policy_than_one_that_shares_gives_what_was_before(self, shared, store):
-        replay_view = load(shared, 1).solution.views[1].calibration_key
-        with_position = load(shared, 1).solution.views[0].calibration_key
+        replay_view = load_group_state(shared, 1).solution.views[1].calibration_key
+        with_position = load_group_state(shared, 1).solution.views[0].calibration_key
         change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
         solve_dataset(shared, "demo")
-        after = load(shared, 1).solution.views
+        after = load_group_state(shared, 1).solution.views
         assert after[1].calibration_key == replay_view
         assert after[0].calibration_key != with_position
 
     def test_an_edit_solves_its_group_at_once_and_no_other(self, shared):
         draw(shared, 1)
-        assert load(shared, 1).solution is not None
+        assert load_group_state(shared, 1).solution is not None
         assert list_stale_groups(shared, "demo") == []
         assert state(shared).current is False
         assert "the data that it was estimated from has changed" in state(shared).sentence
@@ -170,14 +170,14 @@ class TestSharePositions:
     def test_the_log_tells_it_again(self, shared):
         with shared.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
-        before = [load(shared, number).stored for number in (1, 4)]
+        before = [load_group_state(shared, number).stored for number in (1, 4)]
         rebuild_tables(shared)
-        assert [load(shared, number).stored for number in (1, 4)] == before
+        assert [load_group_state(shared, number).stored for number in (1, 4)] == before
 
     def test_undo_of_a_group_takes_back_its_own_edits_alone(self, shared):
         draw(shared, 1)
-        positions = load(shared, 1).group.positions
-        after = undo_group_edit(shared, 1, if_match=load(shared, 1).etag, actor="ann")
+        positions = load_group_state(shared, 1).group.positions
+        after = undo_group_edit(shared, 1, if_match=load_group_state(shared, 1).etag, actor="ann")
         assert after.group.positions == positions
         assert state(shared).current is True
 
@@ -185,8 +185,8 @@ class TestSharePositions:
         first, *_ = match()
         changed = replace(first, label="the source says more of it now")
         import_groups(shared, "demo", (changed,), source="files", actor="ann")
-        assert load(shared, 1).group.label == changed.label
-        assert len(load(shared, 1).group.positions) == 1
+        assert load_group_state(shared, 1).group.label == changed.label
+        assert len(load_group_state(shared, 1).group.positions) == 1
         with shared.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
@@ -201,10 +201,10 @@ class TestSharePositions:
         )
 
     def test_a_view_whose_picture_was_changed_takes_no_part(self, shared):
-        edit = SetPicture(load(shared, 1).group.views[0].key, OPEN)
-        submit(shared, 1, edit, if_match=load(shared, 1).etag, actor="ann")
+        edit = SetPicture(load_group_state(shared, 1).group.views[0].key, OPEN)
+        submit_edit(shared, 1, edit, if_match=load_group_state(shared, 1).etag, actor="ann")
         share_positions(shared, "demo", actor="ann")
-        assert load(shared, 1).group.positions == {}
+        assert load_group_state(shared, 1).group.positions == {}
         assert (state(shared).shared, state(shared).current) == (5, True)
 
     def test_looking_reads_one_entry_a_match(self, shared, monkeypatch):
@@ -241,21 +241,21 @@ class TestSharePositions:
         assert other.current is False
 
     def test_a_group_that_leaves_while_it_is_estimated_gets_nothing(self, shared, monkeypatch):
-        whole = editing._estimate_match
+        whole = editing._run_position_task
         first, *_ = match()
 
         def estimate(task):
             import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
             return whole(task)
 
-        monkeypatch.setattr(editing, "_estimate_match", estimate)
+        monkeypatch.setattr(editing, "_run_position_task", estimate)
         share_positions(shared, "demo", [MATCH], actor="ann")
-        assert load(shared, 1).group.positions == {}
+        assert load_group_state(shared, 1).group.positions == {}
 
     def test_an_import_into_another_match_leaves_it_behind(self, shared):
         first, *_ = match()
         import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
-        assert load(shared, 1).group.positions == {}
+        assert load_group_state(shared, 1).group.positions == {}
 
     def test_a_version_holds_it_and_is_verified_bit_for_bit(self, shared):
         version = freeze_dataset(
@@ -268,7 +268,7 @@ class TestSharePositions:
 
 def take_back(store, name):
     with store.write() as session:
-        take_back_positions(session, "demo", name, actor="ann")
+        undo_position_sharing(session, "demo", name, actor="ann")
 
 
 class TestTakeBackPositions:
@@ -288,12 +288,15 @@ class TestTakeBackPositions:
         assert (state(shared).shared, state(shared).current) == (0, None)
 
     def test_each_share_is_taken_back_once_the_newest_first(self, shared):
-        first = load(shared, 2).group.positions
+        first = load_group_state(shared, 2).group.positions
         draw(shared, 1)
         share_positions(shared, "demo", actor="ann")
-        assert load(shared, 2).group.positions != first
+        assert load_group_state(shared, 2).group.positions != first
         take_back(shared, MATCH)
-        assert (load(shared, 2).group.positions, state(shared).current) == (first, False)
+        assert (load_group_state(shared, 2).group.positions, state(shared).current) == (
+            first,
+            False,
+        )
         take_back(shared, MATCH)
         assert (state(shared).shared, state(shared).current) == (0, None)
         share_positions(shared, "demo", actor="ann")

@@ -9,7 +9,7 @@ import pytest
 from app.errors import ConflictError, InputError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibration, SetStationCamera
 from app.features.groups.replay import replay_log
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates import rig
 from app.features.match_estimates.rig import (
@@ -21,11 +21,11 @@ from app.features.match_estimates.rig import (
     describe_time_difference,
     propose_adjustment,
     rig_proposal_to_json,
-    take_back,
+    undo_accepted_rig,
 )
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.solutions.service import list_stale_groups
-from app.features.stations.service import load_station, submit_station
+from app.features.stations.service import load_station, submit_station_edit
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
@@ -161,7 +161,7 @@ class TestAccept:
 
     def test_a_frozen_group_has_the_covariance_of_its_cameras(self, store, ids, proposed) -> None:
         accept_rig(store, proposed, SIGMA, actor="ann")
-        group = load(store, ids[0]).group
+        group = load_group_state(store, ids[0]).group
         said = freeze_annotations(group)
         texts = {key: json.loads(text) for key, text in said.texts.items()}
         assert group.views[0].station.given_covariance is not None
@@ -177,7 +177,7 @@ class TestAccept:
     def test_a_camera_that_has_changed_since_is_not_overwritten(self, store, proposed) -> None:
         state = proposed.stations["cam3"]
         other = SetStationCalibration("lines")
-        submit_station(store, state.id, other, if_match=state.etag, actor="bob")
+        submit_station_edit(store, state.id, other, if_match=state.etag, actor="bob")
         with pytest.raises(StaleRevisionError):
             accept_rig(store, proposed, CAMERAS, actor="ann")
         # All of them or none.
@@ -224,12 +224,12 @@ class TestAccept:
             for g in groups()[:2]
         ]
         fill(*bare, solved=False)
-        view = load(store, 1).group.views[0]
-        before = load_station(store, load(store, 1).station_ids[view.key])
+        view = load_group_state(store, 1).group.views[0]
+        before = load_station(store, load_group_state(store, 1).station_ids[view.key])
         assert before.station.given is None
         covariance = tuple((np.eye(8) / 7).ravel().tolist())
         edit = SetStationCamera(GIVEN[view.key], covariance)
-        submit_station(store, before.id, edit, if_match=before.etag, actor="ann")
+        submit_station_edit(store, before.id, edit, if_match=before.etag, actor="ann")
         edited = load_station(store, before.id)
         report = import_groups(store, "demo", bare, source="test", actor="ann")
         assert (report.changed, report.findings) == (0, 0)
@@ -239,10 +239,10 @@ class TestAccept:
 class TestTakeBack:
     def test_every_camera_is_what_it_was(self, store, proposed) -> None:
         accept_rig(store, proposed, CAMERAS, actor="ann")
-        assert take_back(store, "demo", actor="ann") == len(GIVEN)
+        assert undo_accepted_rig(store, "demo", actor="ann") == len(GIVEN)
         for key, state in proposed.stations.items():
             assert stations(store, proposed)[key] == state.station
 
     def test_there_must_be_something_to_take_back(self, store, ids) -> None:
         with pytest.raises(ConflictError, match="nothing to undo"):
-            take_back(store, "demo", actor="ann")
+            undo_accepted_rig(store, "demo", actor="ann")

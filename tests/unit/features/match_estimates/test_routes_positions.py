@@ -79,7 +79,7 @@ def test_a_take_back_that_is_sent_again_is_answered_as_the_first_time(
     api, shared, monkeypatch
 ) -> None:
     # As where the server stops between the work and its answer.
-    monkeypatch.setattr(idempotency, "store_sent", lambda *_: None)
+    monkeypatch.setattr(idempotency, "store_sent_response", lambda *_: None)
     how = {"params": {"match": shared}, "headers": {"Idempotency-Key": "one"}}
     first = api.delete(POSITIONS, **how)
     again = api.delete(POSITIONS, **how)

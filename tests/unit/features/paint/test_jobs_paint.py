@@ -52,7 +52,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     assert done.sentence == "The paint of 12 pictures was read."
     (solve,) = jobs.find(kinds=["solve"])
     assert jobs.wait(solve.id, SECONDS).state == "done"
-    back = jobs.wait(PAINT.take_back(jobs, asked, "demo", actor="ann").id, SECONDS)
+    back = jobs.wait(PAINT.undo_last_job(jobs, asked, "demo", actor="ann").id, SECONDS)
     assert (back.kind, get_paint(asked, "demo").items[0].read) == ("solve", 0)
     jobs.close()
 
@@ -61,12 +61,12 @@ def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
     asked: Store, monkeypatch
 ) -> None:
     monkeypatch.setattr(editing, "_PER_WORKER", 1)
-    jobs, looked = Jobs(asked), Held(editing._read_pictures, calls=2)
-    monkeypatch.setattr(editing, "_read_pictures", looked)
+    jobs, looked = Jobs(asked), Held(editing._read_paint_of_pictures, calls=2)
+    monkeypatch.setattr(editing, "_read_paint_of_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     assert get_paint(asked, "demo").items[0].read > 0
-    PAINT.take_back(jobs, asked, "demo", actor="ann")
+    PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert get_paint(asked, "demo").items[0].read == 0
@@ -79,11 +79,11 @@ def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
     jobs = Jobs(asked)
     first = PAINT.request(jobs, asked, "demo", None, actor="ann")
     assert jobs.wait(first.id, SECONDS).state == "done"
-    looked = Held(editing._read_pictures, calls=1)
-    monkeypatch.setattr(editing, "_read_pictures", looked)
+    looked = Held(editing._read_paint_of_pictures, calls=1)
+    monkeypatch.setattr(editing, "_read_paint_of_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
-    PAINT.take_back(jobs, asked, "demo", actor="ann")
+    PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert get_paint(asked, "demo").items[0].read == 12
@@ -94,12 +94,12 @@ def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, mon
     def full(_session, _job):
         raise StorageError("the disk is full")
 
-    jobs, looked = Jobs(asked), Held(editing._read_pictures, calls=1)
-    monkeypatch.setattr(editing, "_read_pictures", looked)
+    jobs, looked = Jobs(asked), Held(editing._read_paint_of_pictures, calls=1)
+    monkeypatch.setattr(editing, "_read_paint_of_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     with pytest.raises(StorageError), stored_by(full):
-        PAINT.take_back(jobs, asked, "demo", actor="ann")
+        PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "done"
     assert get_paint(asked, "demo").items[0].read == 12
@@ -112,7 +112,7 @@ def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked
     assert jobs.wait(job.id, SECONDS).state == "done"
     with asked.write() as session:
         insert_job(session, NewJob("paint", "Read", "ann", 1, {"match": None, "run": "lost"}))
-    PAINT.take_back(jobs, asked, "demo", actor="ann")
+    PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     assert get_paint(asked, "demo").items[0].read == 0
     jobs.close()
 
@@ -123,7 +123,7 @@ def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch
     with stopped_at_its_first_step(paint_job, "read_paint", first):
         job = PAINT.request(first, asked, "demo", None, actor="ann")
     second = Jobs(asked)
-    PAINT.take_up(second, asked)
+    PAINT.register_with_jobs(second, asked)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

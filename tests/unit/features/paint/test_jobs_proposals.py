@@ -12,7 +12,7 @@ from app.features.imports.ingest import import_groups
 from app.features.jobs.service import Jobs
 from app.features.paint import jobs as proposals_job
 from app.features.paint import proposals as editing
-from app.features.paint.jobs import PROPOSALS, stop_and_forget
+from app.features.paint.jobs import PROPOSALS, cancel_and_forget_proposals
 from app.features.paint.proposals import get_proposals
 from app.soccer.group import Group, Media, Station, View
 from tests.cameras import SIZE
@@ -51,7 +51,7 @@ def test_a_job_is_asked_for_without_a_count_of_every_match(gone: Store, monkeypa
     def refuse(*_arguments):
         raise AssertionError("every match was counted")
 
-    monkeypatch.setattr(editing, "match_proposals", refuse)
+    monkeypatch.setattr(editing, "count_proposals_by_match", refuse)
     jobs = Jobs(gone)
     job = PROPOSALS.request(jobs, gone, "demo", "", actor="ann")
     assert jobs.wait(job.id, SECONDS).result["views"] == VIEWS
@@ -66,7 +66,7 @@ def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, mon
     waiting = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
     looked.wait()
     kept = get_proposals(gone, "demo").count("looked")
-    assert 0 < stop_and_forget(jobs, gone, "demo") == kept < VIEWS
+    assert 0 < cancel_and_forget_proposals(jobs, gone, "demo") == kept < VIEWS
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == jobs.get(waiting.id).state == "cancelled"
     assert get_proposals(gone, "demo").count("looked") == 0
@@ -80,7 +80,7 @@ def test_a_server_that_stops_leaves_it_to_the_next_one(gone: Store, monkeypatch)
         job = PROPOSALS.request(first, gone, "demo", None, actor="ann")
     assert get_proposals(gone, "demo").count("looked") == 1
     second = Jobs(gone)
-    PROPOSALS.take_up(second, gone)
+    PROPOSALS.register_with_jobs(second, gone)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

@@ -20,8 +20,8 @@ from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.pictures import MISSING
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
-from app.features.imports.edits_export import group_to_merge
+from app.features.groups.submit import load_group_state, submit_edit
+from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import proposals as editing
 from app.features.paint.proposals import (
@@ -120,7 +120,7 @@ def accept(store: Store, number: int = 2) -> str:
     (key, is_open, item), *_ = get_group_proposals(store, number)
     assert is_open and item.outcome == "proposed"
     edit = SetLines(key, item.lines, tuple(item.lines))
-    submit(store, number, edit, if_match=load(store, number).etag, actor="bob")
+    submit_edit(store, number, edit, if_match=load_group_state(store, number).etag, actor="bob")
     return key
 
 
@@ -136,7 +136,7 @@ class TestProposeViews:
 
         def look(task, settings):  # type: ignore[no-untyped-def]
             seen.append(has_index(task.media, settings))
-            return task.proposal_without_picture(MISSING)
+            return task.make_proposal_without_picture(MISSING)
 
         monkeypatch.setattr(editing, "read_proposal", look)
         told: list[str] = []
@@ -145,7 +145,10 @@ class TestProposeViews:
         assert told[0] == "Finding the frames of cam1.mp4."
 
     def test_lines_are_found_from_the_picture_and_the_match_and_nothing_is_said(self, filled):
-        before, kinds = load(filled, 2).etag, [entry.kind for entry in read_history(filled, 2)]
+        before, kinds = (
+            load_group_state(filled, 2).etag,
+            [entry.kind for entry in read_history(filled, 2)],
+        )
         assert counts(filled) == (1, 0, 0, 0, 0, 0)
         run = propose_views(filled, "demo")
         assert run == ProposalRun(views=1, proposed=1)
@@ -153,10 +156,12 @@ class TestProposeViews:
         assert (key, is_open, item.outcome, item.sentence) == ("b.png", True, "proposed", "")
         assert item.supported > 0.9 and item.points > 100 and item.error_px < 0.5
         assert item.frame and item.version
-        curve = CAMERA.project(load(filled, 2).group.pitch.sample("Side line right", 0.05, 0.05))
+        curve = CAMERA.project(
+            load_group_state(filled, 2).group.pitch.sample("Side line right", 0.05, 0.05)
+        )
         for point in item.lines["Side line right"]:
             assert np.hypot(*(curve - point).T).min() < 1.5
-        assert load(filled, 2).etag == before
+        assert load_group_state(filled, 2).etag == before
         assert [entry.kind for entry in read_history(filled, 2)] == kinds
 
     def test_what_the_match_knows_is_handed_on(self, filled, asked):
@@ -259,9 +264,9 @@ class TestAccepting:
         self, filled, asked
     ):
         propose_views(filled, "demo")
-        before = load(filled, 2)
+        before = load_group_state(filled, 2)
         key = accept(filled)
-        state = load(filled, 2)
+        state = load_group_state(filled, 2)
         station = state.group.view(key).station
         assert station.proposed == tuple(station.lines)
         edit = read_history(filled, 2)[-1].body["edit"]
@@ -274,19 +279,19 @@ class TestAccepting:
     def test_who_says_the_lines_is_part_of_what_is_said(self, filled, asked):
         propose_views(filled, "demo")
         key = accept(filled)
-        station = load(filled, 2).group.view(key).station
+        station = load_group_state(filled, 2).group.view(key).station
         assert station_digest(station) != station_digest(replace(station, proposed=()))
 
     def test_a_frozen_group_and_a_carried_one_keep_it(self, filled, asked):
         propose_views(filled, "demo")
         key = accept(filled)
-        group = load(filled, 2).group
+        group = load_group_state(filled, 2).group
         said = freeze_annotations(group)
         texts = {name: json.loads(text) for name, text in said.texts.items()}
         thawed = thaw_group(texts[said.key], texts)
         assert thawed.view(key).station.proposed == group.view(key).station.proposed
         assert Station("x", SIZE).with_annotations_of(group.view(key).station).proposed
-        assert group_to_merge(group)["views"][0]["station"]["proposed"] == [
+        assert group_to_export_json(group)["views"][0]["station"]["proposed"] == [
             *thawed.view(key).station.proposed
         ]
 
@@ -300,10 +305,10 @@ class TestAccepting:
     def test_a_marking_that_is_moved_is_a_person_s_again(self, filled, asked):
         propose_views(filled, "demo")
         key = accept(filled)
-        state = load(filled, 2)
+        state = load_group_state(filled, 2)
         first, *rest = state.group.view(key).station.proposed
         moved = SetLines(key, {first: state.group.view(key).station.lines[first][:-1]})
-        after = submit(filled, 2, moved, if_match=state.etag, actor="bob")
+        after = submit_edit(filled, 2, moved, if_match=state.etag, actor="bob")
         assert after.group.view(key).station.proposed == tuple(rest)
         back = undo_group_edit(filled, 2, if_match=after.etag, actor="bob")
         assert back.group.view(key).station.proposed == (first, *rest)
@@ -314,7 +319,7 @@ class TestAccepting:
         accept(filled)
         assert counts(filled) == (0, 0, 0, 0, 0, 1)
         assert found(filled, "proposal:any") == []
-        undo_group_edit(filled, 2, if_match=load(filled, 2).etag, actor="bob")
+        undo_group_edit(filled, 2, if_match=load_group_state(filled, 2).etag, actor="bob")
         assert found(filled, "proposal:any") == [2]
 
 
@@ -348,7 +353,7 @@ class TestDrawnLines:
         wrong = view("w.png", draw(tmp_path / "w.png"), lines=mixed)
         import_groups(store, "demo", [Group("1", (wrong,), match="m")], source="f", actor="a")
         solve_dataset(store, "demo")
-        calibration = load(store, 1).solution.views[0].calibration
+        calibration = load_group_state(store, 1).solution.views[0].calibration
         assert calibration.camera is not None and calibration.unobservable
         assert propose_views(store, "demo") == ProposalRun(views=1, unsure=1)
         ((_, is_open, item),) = get_group_proposals(store, 1)
@@ -357,10 +362,10 @@ class TestDrawnLines:
     def test_stay_and_the_others_join_them_in_one_edit(self, poor, asked):
         solve_dataset(poor, "demo")
         propose_views(poor, "demo")
-        before = load(poor, 1)
+        before = load_group_state(poor, 1)
         assert before.solution.views[0].calibration.camera is None
         accept(poor, 1)
-        after = load(poor, 1)
+        after = load_group_state(poor, 1)
         station = after.group.views[0].station
         assert (
             station.lines["Side line right"]
@@ -377,9 +382,9 @@ class TestDrawnLines:
     def test_that_are_others_now_are_looked_at_again(self, poor, asked):
         solve_dataset(poor, "demo")
         propose_views(poor, "demo")
-        at = load(poor, 1)
+        at = load_group_state(poor, 1)
         more = SetLines("p.png", {"Big rect. right main": lines_of(CAMERA)["Big rect. right main"]})
-        submit(poor, 1, more, if_match=at.etag, actor="bob")
+        submit_edit(poor, 1, more, if_match=at.etag, actor="bob")
         assert not get_group_proposals(poor, 1)[0][1]
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
         assert propose_views(poor, "demo") == ProposalRun(views=1, proposed=1)
@@ -387,8 +392,10 @@ class TestDrawnLines:
         ((_, is_open, item),) = get_group_proposals(poor, 1)
         assert is_open and "Big rect. right main" not in item.lines
         # Without any line the one beside them does not count.
-        none = SetLines("p.png", dict.fromkeys(load(poor, 1).group.views[0].station.lines))
-        submit(poor, 1, none, if_match=load(poor, 1).etag, actor="bob")
+        none = SetLines(
+            "p.png", dict.fromkeys(load_group_state(poor, 1).group.views[0].station.lines)
+        )
+        submit_edit(poor, 1, none, if_match=load_group_state(poor, 1).etag, actor="bob")
         assert not get_group_proposals(poor, 1)[0][1]
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
 
@@ -426,7 +433,7 @@ class TestForget:
         accept(filled)
         assert forget_proposals(filled, "demo") == 1
         assert counts(filled) == (0, 0, 0, 0, 0, 0)
-        assert load(filled, 2).group.view("b.png").station.proposed
+        assert load_group_state(filled, 2).group.view("b.png").station.proposed
         assert forget_proposals(filled, "demo") == 0
 
     def test_leaves_other_datasets_alone(self, filled, groups, asked):

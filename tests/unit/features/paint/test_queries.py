@@ -10,14 +10,14 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
-from app.features.datasets.queries import delete_rows
+from app.features.datasets.queries import delete_dataset_rows
 from app.features.groups.queries import read_groups
 from app.features.groups.revision_queries import (
     make_next_revision,
     refresh_inputs_hashes,
     save_revision,
 )
-from app.features.paint.queries import insert_readings, match_paint, read_readings
+from app.features.paint.queries import insert_paint_readings, read_match_paint, read_paint_readings
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 
 POINTS = {"Middle line": (PaintPoint(1.25, 2.5, 0.0625),)}
@@ -28,7 +28,7 @@ OTHER = replace(READING, reason="no_paint", evidence=PaintEvidence({}))
 def give(store: Store, *readings: PaintReading) -> None:
     """Give the only group what was read of its first views."""
     with store.write() as session:
-        insert_readings(session, 1, readings)
+        insert_paint_readings(session, 1, readings)
         (stored,) = read_groups(session, [1]).values()
         keys = [view.key for view in stored.group.views]
         paint = dict(zip(keys, readings, strict=False))
@@ -64,7 +64,9 @@ class TestReadings:
             give(filled, READING, READING)
         with filled.read() as session:
             assert session.scalar(text("SELECT count(*) FROM paint_evidence")) == 1
-            assert read_readings(session, [READING.digest, "unknown"]) == {READING.digest: READING}
+            assert read_paint_readings(session, [READING.digest, "unknown"]) == {
+                READING.digest: READING
+            }
 
     def test_what_is_not_what_its_digest_says_is_damage(self, filled: Store) -> None:
         body = zlib.compress(replace(READING, supported=0.25).text.encode())
@@ -74,7 +76,7 @@ class TestReadings:
                 {"digest": READING.digest, "body": body},
             )
         with filled.read() as session, pytest.raises(DamagedError):
-            read_readings(session, [READING.digest])
+            read_paint_readings(session, [READING.digest])
 
     def test_a_reading_that_is_gone_is_damage(self, filled: Store) -> None:
         give(filled, READING)
@@ -88,12 +90,12 @@ class TestReadings:
         with pytest.raises(StorageError), filled.write() as session:
             session.execute(text("UPDATE paint_evidence SET body = ''"))
         with filled.write() as session:
-            delete_rows(session, 1)
+            delete_dataset_rows(session, 1)
             assert session.scalar(text("SELECT count(*) FROM paint_evidence")) == 0
 
     def test_readings_are_counted_by_match_and_reason(self, filled: Store) -> None:
         give(filled, READING, OTHER, READING)
         with filled.read() as session:
-            (item,) = match_paint(session, 1)
+            (item,) = read_match_paint(session, 1)
         assert (item.match, item.groups, item.reasons) == ("m", (1,), {None: 2, "no_paint": 1})
         assert (item.views >= item.without_picture, item.painted) == (True, (1,))

@@ -19,11 +19,11 @@ from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
-from app.features.imports.edits_export import group_to_merge
+from app.features.groups.submit import load_group_state, submit_edit
+from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import service as editing
-from app.features.paint.service import get_paint, read_paint, take_back_paint
+from app.features.paint.service import get_paint, read_paint, undo_paint_reading
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
@@ -130,19 +130,19 @@ def state(store):
 
 
 def calibrations(store, number=1):
-    return [view.calibration for view in load(store, number).solution.views]
+    return [view.calibration for view in load_group_state(store, number).solution.views]
 
 
 def draw(store, number):
     """Edit the lines of a group's first view."""
-    at = load(store, number)
+    at = load_group_state(store, number)
     view = at.group.views[0]
     edit = SetLines(view.key, {next(iter(view.station.lines)): None})
-    return submit(store, number, edit, if_match=at.etag, actor="ann")
+    return submit_edit(store, number, edit, if_match=at.etag, actor="ann")
 
 
 def kinds(store, number=1):
-    said = load(store, number).solution.findings
+    said = load_group_state(store, number).solution.findings
     return [item.kind for item in said if item.kind in ("no_paint", "paint_disagrees")]
 
 
@@ -177,7 +177,7 @@ class TestReadPaint:
 
     def test_nothing_is_believed_where_the_dataset_has_people(self, painted):
         for number in (1, 2):
-            group = load(painted, number).group
+            group = load_group_state(painted, number).group
             for view in group.views:
                 people = [box for box in view.extras.places if box.width * box.height < 2e4]
                 believed = group.paint[view.key].evidence.points
@@ -212,7 +212,7 @@ class TestReadPaint:
         solve_dataset(painted, "demo")
         rows = list_groups(painted, 1, "gate:agreement").items
         assert [row.gate for row in rows] == ["agreement"] * 2
-        assert load(painted, 1).solution.view(rows[0].gate_view).failed == "agreement"
+        assert load_group_state(painted, 1).solution.view(rows[0].gate_view).failed == "agreement"
 
     def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
         monkeypatch.setattr(media, "_decode_pixels", lambda *_: pytest.fail("it was decoded again"))
@@ -221,9 +221,9 @@ class TestReadPaint:
         assert [entry.kind for entry in read_history(painted, 1)] == ["import", "paint"]
 
     def test_an_edit_of_a_ball_leaves_cameras_and_paint(self, painted, here, looked):
-        at = load(painted, 1)
+        at = load_group_state(painted, 1)
         edit = set_ball(at.group.views[0].key, BallAnnotation(point=ImagePoint(600.0, 400.0)))
-        after = submit(painted, 1, edit, if_match=at.etag, actor="ann")
+        after = submit_edit(painted, 1, edit, if_match=at.etag, actor="ann")
         assert [view.calibration for view in after.solution.views] == calibrations(painted)
         assert after.group.paint == at.group.paint
         read_paint(painted, "demo", actor="ann")
@@ -258,7 +258,7 @@ class TestReadPaint:
     def test_undo_of_the_lines_brings_their_paint_back(self, painted):
         before = calibrations(painted)
         draw(painted, 1)
-        undo_group_edit(painted, 1, if_match=load(painted, 1).etag, actor="ann")
+        undo_group_edit(painted, 1, if_match=load_group_state(painted, 1).etag, actor="ann")
         assert calibrations(painted) == before
 
     def test_where_other_people_hide_paint_now_it_is_read_again(self, painted, pictures, looked):
@@ -269,18 +269,18 @@ class TestReadPaint:
         changed = first.with_view(
             replace(first.views[0], extras=replace(first.views[0].extras, boxes=boxes[1:]))
         )
-        before = load(painted, 1)
+        before = load_group_state(painted, 1)
         import_groups(painted, "demo", [changed, other], source="files", actor="ann")
         assert state(painted).old == 1
         solve_dataset(painted, "demo")
-        after = load(painted, 1)
+        after = load_group_state(painted, 1)
         assert [view.calibration.source for view in after.solution.views] == ["lines", "paint"]
         (finding,) = (item for item in after.solution.findings if item.kind == NO_PAINT)
         assert (finding.view, finding.fix.action) == (key, "read_paint")
         assert "boxes of its people" in finding.sentence
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
-        again = load(painted, 1)
+        again = load_group_state(painted, 1)
         assert (looked, state(painted).old) == ([key], 0)
         assert [view.calibration.source for view in again.solution.views] == ["paint", "paint"]
         assert again.group.paint[key].people not in ("", before.group.paint[key].people)
@@ -291,12 +291,12 @@ class TestReadPaint:
         self, painted, pictures, looked
     ):
         first, other = groups(pictures)
-        reading = load(painted, 1).group.paint
+        reading = load_group_state(painted, 1).group.paint
         bare = replace(first, views=tuple(replace(view, extras=Extras()) for view in first.views))
         import_groups(painted, "demo", [bare, other], source="files", actor="ann")
         # What a process was at while that happened is given afterwards.
         with painted.write() as session:
-            editing._give_readings(session, 1, {1: reading}, "ann", {"run": "late"})
+            editing._save_reading_edits(session, 1, {1: reading}, "ann", {"run": "late"})
         solve_dataset(painted, "demo")
         assert state(painted).old == 2
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
@@ -321,11 +321,11 @@ class TestReadPaint:
         cv2.imwrite(str(other), np.full_like(picture, 127))
         view = replace(changed.views[0], media=Media(str(other)))
         import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
-        assert len(load(painted, 1).group.paint) == 2
+        assert len(load_group_state(painted, 1).group.paint) == 2
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert looked == [view.key]
-        assert load(painted, 1).group.paint[view.key].reason == NO_PAINT
+        assert load_group_state(painted, 1).group.paint[view.key].reason == NO_PAINT
         assert calibrations(painted)[0].source == "lines"
 
     def test_a_picture_that_is_gone_keeps_what_was_read_of_it(self, painted, pictures, tmp_path):
@@ -333,12 +333,12 @@ class TestReadPaint:
         view = replace(changed.views[0], media=Media(str(tmp_path / "gone.png")))
         import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
         read_paint(painted, "demo", actor="ann")
-        assert load(painted, 1).group.paint[view.key].reason is None
+        assert load_group_state(painted, 1).group.paint[view.key].reason is None
         draw(painted, 1)
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
-        assert load(painted, 1).group.paint[view.key].reason == NO_FRAME
-        assert "missing" in load(painted, 1).solution.findings[-1].sentence
+        assert load_group_state(painted, 1).group.paint[view.key].reason == NO_FRAME
+        assert "missing" in load_group_state(painted, 1).solution.findings[-1].sentence
         assert "1 missing or unreadable" in state(painted).sentence
 
     def test_a_view_that_never_had_a_picture_has_the_camera_of_its_clicks_and_no_finding(
@@ -402,9 +402,9 @@ class TestKept:
     def test_the_log_tells_it_again(self, painted):
         with painted.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
-        before = load(painted, 1).stored
+        before = load_group_state(painted, 1).stored
         rebuild_tables(painted)
-        assert load(painted, 1).stored == before
+        assert load_group_state(painted, 1).stored == before
 
     def test_without_paint_reading_groups_costs_no_statement_more(self, store, pictures, counted):
         import_groups(store, "demo", groups(pictures), source="files", actor="ann")
@@ -422,42 +422,42 @@ class TestKept:
         assert report.groups > 0
 
     def test_another_policy_leaves_it_and_solves_with_the_clicks(self, painted):
-        before = load(painted, 1).group.paint
+        before = load_group_state(painted, 1).group.paint
         change_policy(painted, "demo", PAPER, if_match=None, actor="ann")
         solve_dataset(painted, "demo")
-        assert load(painted, 1).group.paint == before
+        assert load_group_state(painted, 1).group.paint == before
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
 
     def test_it_does_not_go_to_another_installation(self, painted):
-        assert "paint" not in group_to_merge(load(painted, 1).group)
+        assert "paint" not in group_to_export_json(load_group_state(painted, 1).group)
 
     def test_an_import_keeps_it(self, painted, pictures):
         changed = replace(groups(pictures)[0], label="the source says more of it now")
         import_groups(painted, "demo", [changed], source="files", actor="ann")
-        assert len(load(painted, 1).group.paint) == 2
+        assert len(load_group_state(painted, 1).group.paint) == 2
         with painted.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
 
 def take_back(store):
     with store.write() as session:
-        take_back_paint(session, "demo", actor="ann")
+        undo_paint_reading(session, "demo", actor="ann")
 
 
 class TestTakeBackPaint:
     def test_cameras_are_again_those_of_the_clicks(self, painted):
         take_back(painted)
         solve_dataset(painted, "demo")
-        assert (state(painted).read, load(painted, 1).group.paint) == (0, {})
+        assert (state(painted).read, load_group_state(painted, 1).group.paint) == (0, {})
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
 
     def test_each_reading_is_taken_back_once_the_newest_first(self, painted):
-        first = load(painted, 1).group.paint
+        first = load_group_state(painted, 1).group.paint
         draw(painted, 1)
         read_paint(painted, "demo", actor="ann", run="second")
-        assert load(painted, 1).group.paint != first
+        assert load_group_state(painted, 1).group.paint != first
         take_back(painted)
-        assert load(painted, 1).group.paint == first
+        assert load_group_state(painted, 1).group.paint == first
         take_back(painted)
         assert state(painted).read == 0
         with pytest.raises(ConflictError, match="has a measurement of its paint"):

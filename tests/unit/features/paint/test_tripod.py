@@ -9,14 +9,14 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.datasets.service import require_matches
+from app.features.datasets.service import require_dataset_with_matches
 from app.features.groups.edit import SetLines
 from app.features.groups.queries import read_groups
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.paint import service
-from app.features.paint.service import take_back_paint
-from app.features.paint.tripod import share_tripods
+from app.features.paint.service import undo_paint_reading
+from app.features.paint.tripod import solve_match_tripods
 from app.features.policies.service import change_policy
 from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import TOUCHLINE
@@ -34,15 +34,15 @@ def dataset(store) -> Store:
     change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
     with store.write() as session:
         wanted = {number: each.paint for number, each in enumerate(groups, start=1)}
-        service._give_readings(session, 1, wanted, "ann", {"run": "read"})
+        service._save_reading_edits(session, 1, wanted, "ann", {"run": "read"})
     solve_dataset(store, "demo")
     return store
 
 
 def share(store, matches=None, require_wanted=None):
     with store.read() as session:
-        head = require_matches(session, "demo")
-    share_tripods(store, head, matches, "ann", "read", require_wanted)
+        head = require_dataset_with_matches(session, "demo")
+    solve_match_tripods(store, head, matches, "ann", "read", require_wanted)
 
 
 def readings(store):
@@ -55,7 +55,7 @@ def sigmas(store):
     """Of the camera's position as documents and files have it, metres."""
     found = []
     for number in range(1, 6):
-        (view,) = load(store, number).solution.views
+        (view,) = load_group_state(store, number).solution.views
         covariance = np.reshape(view.calibration.known_covariance, (8, 8))[3:6, 3:6]
         found.append(float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])))
     return found
@@ -88,7 +88,7 @@ def test_another_match_is_left_alone(dataset):
 def test_it_goes_with_the_reading_when_that_is_taken_back(dataset):
     share(dataset)
     with dataset.write() as session:
-        take_back_paint(session, "demo", actor="ann")
+        undo_paint_reading(session, "demo", actor="ann")
     with dataset.read() as session:
         assert all(not stored.group.paint for stored in read_groups(session, [1, 2, 3]).values())
 
@@ -105,10 +105,10 @@ def test_what_is_not_wanted_any_more_is_not_given(dataset):
 def test_an_edit_of_lines_leaves_its_view_to_itself_and_the_others_as_they_are(dataset):
     share(dataset)
     given = readings(dataset)
-    at = load(dataset, 2)
+    at = load_group_state(dataset, 2)
     edit = SetLines("a", {next(iter(at.group.views[0].station.lines)): None})
-    submit(dataset, 2, edit, if_match=at.etag, actor="ann")
-    (view,) = load(dataset, 2).solution.views
+    submit_edit(dataset, 2, edit, if_match=at.etag, actor="ann")
+    (view,) = load_group_state(dataset, 2).solution.views
     assert view.calibration.source == "lines"
     share(dataset)
     kept = readings(dataset)

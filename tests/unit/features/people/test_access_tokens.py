@@ -26,7 +26,7 @@ from app.features.people.logins import Login
 from app.features.people.queries import update_person
 from app.features.people.roles import SCOPES, Action, DatasetRoles, Role, Scope, require_scope
 from app.features.people.service import get_person, invite
-from app.soccer.actors import person_of
+from app.soccer.actors import person_of_actor
 from tests.databases import all_that_is_kept
 
 READ = [Scope.READ]
@@ -84,7 +84,7 @@ class TestFind:
         made, text = tokens.make(anna, "deploy", [Scope.EXPORT, Scope.READ])
         login = tokens.find(text)
         assert (login.name, login.role, login.actor) == ("anna", Role.LEAD, "anna (token deploy)")
-        assert person_of(login.actor) == "anna"
+        assert person_of_actor(login.actor) == "anna"
         assert login.token is not None
         assert login.token.scopes == (Scope.READ, Scope.EXPORT)
         assert text.startswith(made.start)
@@ -93,21 +93,21 @@ class TestFind:
         _, text = tokens.make(anna, "short", READ, days=7)
         clock.at += timedelta(days=7) - timedelta(seconds=1)
         assert tokens.find(text)
-        assert not tokens.of_person(anna.person_id)[0].expired
+        assert not tokens.list_of_person(anna.person_id)[0].expired
         clock.at += timedelta(seconds=1)
         with pytest.raises(NotLoggedInError) as refused:
             tokens.find(text)
         assert refused.value.message == INVALID
-        assert tokens.of_person(anna.person_id)[0].expired
+        assert tokens.list_of_person(anna.person_id)[0].expired
 
     def test_its_use_is_noted_at_once_and_then_seldom(self, tokens, anna, clock) -> None:
         _, text = tokens.make(anna, "used", READ)
-        assert tokens.is_use_unlogged(tokens.find(text))
+        assert tokens.should_log_use(tokens.find(text))
         tokens.touch(tokens.find(text))
-        assert tokens.of_person(anna.person_id)[0].used is not None
-        assert not tokens.is_use_unlogged(tokens.find(text))
+        assert tokens.list_of_person(anna.person_id)[0].used is not None
+        assert not tokens.should_log_use(tokens.find(text))
         clock.at += timedelta(minutes=6)
-        assert tokens.is_use_unlogged(tokens.find(text))
+        assert tokens.should_log_use(tokens.find(text))
 
     def test_one_that_was_not_copied_whole_is_told_so(self, tokens) -> None:
         with pytest.raises(NotLoggedInError) as refused:
@@ -124,7 +124,7 @@ class TestFind:
     def test_one_of_a_dataset_goes_with_it(self, home, tokens, anna) -> None:
         ensure_dataset(home, "small", "local")
         _, text = tokens.make(anna, "small", READ, dataset_id=dataset_id(home, "small"))
-        assert tokens.of_person(None)[0].dataset == "small"
+        assert tokens.list_of_person(None)[0].dataset == "small"
         delete_dataset(home, "small", confirm="small", actor="local")
         with pytest.raises(NotLoggedInError):
             tokens.find(text)

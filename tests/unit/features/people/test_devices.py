@@ -8,17 +8,23 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import AttemptWindow, PasskeyChallenges, StoredPending
+from app.features.people.devices import AttemptWindow, PasskeyChallenges, StoredPendingActions
 
 
 class TestAttempts:
     def test_tries_of_all_processes_count_in_one_moving_window(self, store: Store) -> None:
         at = [1000.0]
         one, other = AttemptWindow(store, lambda: at[0]), AttemptWindow(store, lambda: at[0])
-        assert [one.hit("ann", 3, 60.0), other.hit("ann", 3, 60.0)] == [None, None]
+        assert [one.hit("ann", 3, 60.0), other.hit("ann", 3, 60.0)] == [
+            None,
+            None,
+        ]
         at[0] = 1030.0
         assert one.hit("ann", 3, 60.0) is None
-        assert (one.hit("ann", 3, 60.0), other.hit("ann", 3, 60.0)) == (30.0, 30.0)
+        assert (one.hit("ann", 3, 60.0), other.hit("ann", 3, 60.0)) == (
+            30.0,
+            30.0,
+        )
         assert other.hit("ben", 3, 60.0) is None
         at[0] = 1061.0
         assert other.hit("ann", 3, 60.0) is None
@@ -35,7 +41,7 @@ class TestWritten:
     def test_another_process_takes_what_was_begun_once(self, store: Store) -> None:
         at = [datetime.now(UTC)]
         one, other = (
-            PasskeyChallenges(StoredPending(store, lambda: at[0], LASTS, "passkey"))
+            PasskeyChallenges(StoredPendingActions(store, lambda: at[0], LASTS, "passkey"))
             for _ in range(2)
         )
         made = one.make("ann")
@@ -48,7 +54,7 @@ class TestWritten:
         assert other.take("late") is None
 
     def test_the_database_shows_neither_who_nor_what(self, store: Store) -> None:
-        begun = StoredPending(store, lambda: datetime.now(UTC), LASTS, "sign-on")
+        begun = StoredPendingActions(store, lambda: datetime.now(UTC), LASTS, "sign-on")
         begun.put("ann", b"the secret")
         with store.read() as session:
             name, value = session.execute(text("SELECT name, value FROM begun")).one()

@@ -17,9 +17,9 @@ from app.features.people.invitations import (
     InvitationRow,
     LinkMailer,
     invite_many,
-    invite_one,
-    read_list,
-    renew_one,
+    invite_person,
+    parse_invitation_list,
+    renew_invitation,
 )
 from app.features.people.links import find_link_holder
 from app.features.people.roles import Role
@@ -144,12 +144,12 @@ class TestPost:
     def test_another_link_says_what_it_is_for(self, store: Store) -> None:
         with serving(MailBox()) as box:
             post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
-            person, first = invite_one(store, "anna", Role.LEAD, None, post, actor="berta")
+            person, first = invite_person(store, "anna", Role.LEAD, None, post, actor="berta")
             address = "anna@example.org"
-            renew_one(store, person.id, address, post, actor="berta")
-            again, row = renew_one(store, person.id, None, post, actor="berta")
+            renew_invitation(store, person.id, address, post, actor="berta")
+            again, row = renew_invitation(store, person.id, None, post, actor="berta")
             links.set_password_by_link(store, token_of(row.link or ""), "three plain words")
-            _, reset = renew_one(store, person.id, address, post, actor="berta")
+            _, reset = renew_invitation(store, person.id, address, post, actor="berta")
         assert (first.state, row.state, reset.state) == ("invited", "invited", "reset")
         assert reset.mailed and not again.joined
         invited, other = box.letters
@@ -168,7 +168,7 @@ class TestPost:
 class TestInviteOne:
     def test_an_address_that_is_none_makes_nobody(self, store: Store) -> None:
         with pytest.raises(InputError, match="is not an email address") as caught:
-            invite_one(
+            invite_person(
                 store, "anna", Role.VIEWER, "anna", LinkMailer(None, None, URL), actor="local"
             )
         assert caught.value.pointer == "/email"
@@ -178,7 +178,7 @@ class TestInviteOne:
 class TestReadList:
     def test_reads_a_line_for_each_person(self) -> None:
         text = "\ufeff# the new ones\nanna,reviewer,anna@example.org\n\n ben , annotator \ncarl\n"
-        assert read_list(text) == [
+        assert parse_invitation_list(text) == [
             InvitationRow(2, "anna", "reviewer", "anna@example.org"),
             InvitationRow(4, "ben", "annotator"),
             InvitationRow(5, "carl", ""),
@@ -188,15 +188,15 @@ class TestReadList:
     def test_a_first_line_says_the_order_of_columns(self, divider: str) -> None:
         lines = [("E-Mail", "Name", "Role"), ("a@b.org", "anna", "lead"), ("", "ben", "viewer")]
         text = "\r\n".join(divider.join(line) for line in lines)
-        assert read_list(text) == [
+        assert parse_invitation_list(text) == [
             InvitationRow(2, "anna", "lead", "a@b.org"),
             InvitationRow(3, "ben", "viewer"),
         ]
 
     def test_an_unknown_column_is_refused(self) -> None:
         with pytest.raises(InputError, match='"phone"'):
-            read_list("name,role,phone\nanna,lead,1\n")
+            parse_invitation_list("name,role,phone\nanna,lead,1\n")
 
     def test_more_cells_than_columns_are_not_dropped(self) -> None:
-        (row,) = read_list("anna,lead,a@b.org,c@d.org")
+        (row,) = parse_invitation_list("anna,lead,a@b.org,c@d.org")
         assert row.email == "a@b.org,c@d.org"

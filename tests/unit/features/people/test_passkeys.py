@@ -18,7 +18,7 @@ from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInErro
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import MOST, InMemoryPending, PasskeyChallenges
+from app.features.people.devices import MOST, InMemoryPendingActions, PasskeyChallenges
 from app.features.people.logins import Login, LoginSessions
 from app.features.people.passkeys import Passkeys, PasskeySite
 from app.features.people.roles import Role
@@ -36,7 +36,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hash that takes no time."""
     cheap = Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1)
     monkeypatch.setattr(passwords, "HASHER", PasswordHash((cheap,)))
-    passwords._placeholder_hash.cache_clear()
+    passwords._make_placeholder_hash.cache_clear()
 
 
 class Desk:
@@ -252,7 +252,7 @@ class TestSecondFactor:
 class TestChallenges:
     def test_old_ones_make_room(self) -> None:
         at = [datetime.now(UTC)]
-        waiting = InMemoryPending(lambda: at[0], LASTS)
+        waiting = InMemoryPendingActions(lambda: at[0], LASTS)
         challenges = PasskeyChallenges(waiting)
         for number in range(MOST + 2):
             challenges.make(str(number))

@@ -33,7 +33,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hash that takes no time."""
     cheap = Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1)
     monkeypatch.setattr(passwords, "HASHER", PasswordHash((cheap,)))
-    passwords._placeholder_hash.cache_clear()
+    passwords._make_placeholder_hash.cache_clear()
 
 
 class Clock:

@@ -44,7 +44,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hash that takes no time."""
     cheap = Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1)
     monkeypatch.setattr(passwords, "HASHER", PasswordHash((cheap,)))
-    passwords._placeholder_hash.cache_clear()
+    passwords._make_placeholder_hash.cache_clear()
 
 
 @pytest.fixture
@@ -125,12 +125,12 @@ class TestLinks:
 
     def test_it_is_too_old_after_its_days(self, home) -> None:
         with home.write() as session:
-            from app.features.people.links import insert_new
+            from app.features.people.links import insert_password_link
             from app.features.people.queries import insert_person
 
             person = insert_person(session, "anna", Role.VIEWER, by="local")
             past = datetime.now(UTC) - links.LASTS - timedelta(seconds=1)
-            link = insert_new(session, person, by="local", at=past)
+            link = insert_password_link(session, person, by="local", at=past)
         with pytest.raises(NotFoundError):
             links.set_password_by_link(home, link.token, SECRET)
 
@@ -204,10 +204,10 @@ class TestLogins:
         token = logins.log_in("anna", SECRET)
         clock.at += IDLE - timedelta(seconds=1)
         login = found(logins, token)
-        assert logins.is_use_unlogged(login)
+        assert logins.should_log_use(login)
         logins.touch(login)
         clock.at += IDLE - timedelta(seconds=1)
-        assert not logins.is_use_unlogged(login) or logins.find(token)
+        assert not logins.should_log_use(login) or logins.find(token)
         clock.at += timedelta(seconds=2)
         assert logins.find(token) is None
 

@@ -89,7 +89,7 @@ class TestSignOnRules:
     ) -> None:
         rules = whole(tmp_path)
         said = ("Anna", "anna.b@club.example", " J\u00f6rg  M. ", "..", 7, None, "x" * 60)
-        names = [rules.name_for({"preferred_username": one}) for one in said]
+        names = [rules.make_user_name({"preferred_username": one}) for one in said]
         assert names == ["anna", "anna.b", "j-rg-m", "", "7", "", "x" * 40]
 
     def test_everybody_whom_the_provider_knows_may_be_meant(self, tmp_path: Path) -> None:

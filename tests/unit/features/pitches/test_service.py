@@ -13,7 +13,7 @@ from app.features.groups.edit import SetLines
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,
@@ -118,9 +118,11 @@ class TestEstimatePitches:
         estimate_pitches(solved, "demo")
         accept(solved)
         estimate_pitches(solved, "demo")
-        state = load(solved, 1)
+        state = load_group_state(solved, 1)
         view = state.group.views[0].key
-        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        submit_edit(
+            solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann"
+        )
         with pytest.raises(AssertionError, match="once more"):
             estimate_pitches(solved, "demo")
 
@@ -151,7 +153,7 @@ class TestGroupsWithoutMatch:
         assert item.proposed.width == pytest.approx(66.0, abs=0.3)
         assert "for the groups without a match under Statistics" in item.sentence
         accept(store, match="", pitch=TRUE)
-        assert {load(store, number).group.pitch for number in range(1, 7)} == {TRUE}
+        assert {load_group_state(store, number).group.pitch for number in range(1, 7)} == {TRUE}
         assert read_pitches(store, "demo").proposals == ()
 
     def test_a_size_holds_for_those_that_it_was_said_of(self, store):
@@ -162,14 +164,18 @@ class TestGroupsWithoutMatch:
         assert item.previous == Pitch()
         changed = replace(first, label="the source says more of it now")
         import_groups(store, "demo", [changed, second, third], source="files", actor="ann")
-        assert [load(store, n).group.pitch for n in (1, 2, 3)] == [TRUE, TRUE, Pitch()]
-        assert load(store, 1).group.label == changed.label
+        assert [load_group_state(store, n).group.pitch for n in (1, 2, 3)] == [TRUE, TRUE, Pitch()]
+        assert load_group_state(store, 1).group.label == changed.label
         # One more came since: the size before was not that of all.
         assert read_pitches(store, "demo").items[0].previous is None
         with store.write() as session:
             set_pitch_of_groups(session, 1, [3], Pitch(101.0, 65.0), "ann")
         import_groups(store, "demo", [first], source="files", actor="ann")
-        assert [load(store, n).group.pitch.length for n in (1, 2, 3)] == [103.0, 103.0, 101.0]
+        assert [load_group_state(store, n).group.pitch.length for n in (1, 2, 3)] == [
+            103.0,
+            103.0,
+            101.0,
+        ]
         assert read_pitches(store, "demo").items[0].previous is None
         assert_replays(store)
 
@@ -218,25 +224,27 @@ class TestChangePitches:
         accept(solved)
         with solved.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
-        before = [load(solved, number).stored for number in (1, 7)]
+        before = [load_group_state(solved, number).stored for number in (1, 7)]
         rebuild_tables(solved)
-        assert [load(solved, number).stored for number in (1, 7)] == before
+        assert [load_group_state(solved, number).stored for number in (1, 7)] == before
 
     def test_undo_of_a_group_takes_back_its_own_edits_and_not_the_pitch(self, solved):
-        state = load(solved, 1)
+        state = load_group_state(solved, 1)
         view = state.group.views[0].key
-        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        submit_edit(
+            solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann"
+        )
         accept(solved)
-        state = undo_group_edit(solved, 1, if_match=load(solved, 1).etag, actor="ann")
+        state = undo_group_edit(solved, 1, if_match=load_group_state(solved, 1).etag, actor="ann")
         assert state.group.pitch == TRUE
         assert state.group.views[0].station.lines == season()[0].views[0].station.lines
 
     def test_an_edit_that_builds_on_the_size_before_is_refused(self, solved):
-        state = load(solved, 1)
+        state = load_group_state(solved, 1)
         accept(solved)
         edit = SetLines(state.group.views[0].key, {"Middle line": None})
         with pytest.raises(StaleRevisionError):
-            submit(solved, 1, edit, if_match=state.etag, actor="ben")
+            submit_edit(solved, 1, edit, if_match=state.etag, actor="ben")
 
     def test_two_people_do_not_overwrite_each_other(self, solved):
         etag = read_pitches(solved, "demo").etag
@@ -245,9 +253,9 @@ class TestChangePitches:
             accept(solved, pitch=Pitch(100.0, 64.0), if_match=etag)
 
     def test_the_size_in_use_changes_nothing(self, solved):
-        revision = load(solved, 1).revision
+        revision = load_group_state(solved, 1).revision
         accept(solved, pitch=Pitch())
-        assert load(solved, 1).revision == revision
+        assert load_group_state(solved, 1).revision == revision
 
     def test_an_unknown_match_is_refused(self, solved):
         with pytest.raises(NotFoundError, match="no match nowhere"):
@@ -262,8 +270,8 @@ class TestChangePitches:
             second.key, second.views, match=SMALL, label="the source says more of it now"
         )
         import_groups(store, "demo", (changed,), source="files", actor="ann")
-        assert [load(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
-        assert load(store, 2).group.label == changed.label
+        assert [load_group_state(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
+        assert load_group_state(store, 2).group.label == changed.label
         with store.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
@@ -274,7 +282,7 @@ class TestChangePitches:
         import_groups(store, "demo", (third,), source="files", actor="ann")
         changed = Group(third.key, third.views, match=SMALL, label="the source says more now")
         import_groups(store, "demo", (changed,), source="files", actor="ann")
-        assert load(store, 3).group == replace(changed, pitch=TRUE)
+        assert load_group_state(store, 3).group == replace(changed, pitch=TRUE)
         assert [entry.kind for entry in read_history(store, 3)] == ["import", "pitch", "import"]
         assert_replays(store)
 
@@ -285,7 +293,7 @@ class TestChangePitches:
             set_pitch_of_groups(session, 1, [2], TRUE, "ann")
             set_pitch_of_groups(session, 1, [1], Pitch(101.0, 65.0), "ann")
         import_groups(store, "demo", (third,), source="files", actor="ann")
-        assert load(store, 3).group.pitch == Pitch(101.0, 65.0)
+        assert load_group_state(store, 3).group.pitch == Pitch(101.0, 65.0)
 
 
 class TestReadPitches:
@@ -319,9 +327,11 @@ class TestReadPitches:
         assert small.proposed == TRUE
 
     def test_an_estimate_of_other_lines_is_not_shown(self, solved):
-        state = load(solved, 1)
+        state = load_group_state(solved, 1)
         view = state.group.views[0].key
-        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        submit_edit(
+            solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann"
+        )
         small, right = read_pitches(solved, "demo").items
         assert (small.estimate, small.problem, small.proposed) == (None, None, None)
         assert right.estimate is not None

@@ -11,22 +11,22 @@ import pytest
 from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
-from app.features.datasets.queries import group_ids
+from app.features.datasets.queries import list_group_ids
 from app.features.groups.edit import set_ball
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
-from app.features.groups.submit import submit
+from app.features.groups.submit import submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies import noise
-from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
-from app.features.policies.service import change_policy, policy_with, read_policy
+from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, reset_noise_factors
+from app.features.policies.service import change_policy, read_policy, replace_thresholds
 from app.features.solutions import service as recompute
 from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.solve.jobs import solve_fully
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
-from app.soccer.policy import PAPER, TOUCHLINE, Policy, is_shipped
+from app.soccer.policy import PAPER, TOUCHLINE, Policy, is_builtin_policy
 from app.solving import dataset_noise
 from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.ball_noise import RayResidual
@@ -81,7 +81,7 @@ def placings(states: Sequence[GroupState]) -> Iterator[NewLogEntry]:
 def read_states_of(store: Store) -> list[GroupState]:
     """Every group of the first dataset."""
     with store.read() as session:
-        return read_states(session, group_ids(session, 1))
+        return read_states(session, list_group_ids(session, 1))
 
 
 def _spreads(store: Store) -> np.ndarray:
@@ -142,7 +142,7 @@ class TestReadNoise:
         assert not again.is_new and again.used == found.factors
         assert _mean_sigma(store) > sigma
         with store.write() as session:
-            assert take_noise_back(session, "demo", actor="ben") == 40
+            assert reset_noise_factors(session, "demo", actor="ben") == 40
         assert {view.noise for state in read_states_of(store) for view in state.group.views} == {1}
 
     def test_lines_of_many_images_know_their_noise_together(self, store: Store) -> None:
@@ -193,7 +193,7 @@ class TestReadNoise:
         def fails(*_: object) -> None:
             raise error("open")
 
-        monkeypatch.setattr(dataset_noise, "view_line_evidence", fails)
+        monkeypatch.setattr(dataset_noise, "collect_view_line_evidence", fails)
         found = read_noise(store, "demo")
         assert (found.line_estimate, len(found.advice)) == (None, 1)
 
@@ -277,7 +277,7 @@ class TestFollowing:
         assert (report.total, report.solved) == (10, 10)
         state = read_policy(store, "demo")
         assert [item.actor for item in state.history] == ["ann", "ben"]
-        assert state.policy.name == "touchline" and is_shipped(state.policy)
+        assert state.policy.name == "touchline" and is_builtin_policy(state.policy)
         assert state.policy.click_sigma_px == pytest.approx(NOISY, rel=0.4)
         assert state.policy.calibration.line_sigma_px == pytest.approx(LINE_NOISY, rel=0.15)
         found = read_noise(store, "demo")
@@ -300,25 +300,25 @@ class TestFollowing:
         before = read_policy(store, "demo")
         state = read_states_of(store)[0]
         ball = BallAnnotation(point=ImagePoint(5.0, 5.0))
-        submit(store, state.id, set_ball("a", ball), if_match=state.etag, actor="ben")
+        submit_edit(store, state.id, set_ball("a", ball), if_match=state.etag, actor="ben")
         assert not list_stale_groups(store, "demo")
         assert read_policy(store, "demo") == before
 
     def test_numbers_of_a_person_win(self, store: Store) -> None:
         make_lined(store, TOUCHLINE)
-        mine = policy_with(TOUCHLINE, {"click_sigma_px": 1.4}, name="mine")
+        mine = replace_thresholds(TOUCHLINE, {"click_sigma_px": 1.4}, name="mine")
         assert mine.noise == "fixed"
         change_policy(store, "demo", mine, if_match=None, actor="ben")
         solve_fully(store, "demo", None, nobody)
         assert read_policy(store, "demo").policy == mine
-        assert policy_with(TOUCHLINE, {"tau_percent": 0.9}, name="mine").noise == "estimated"
+        assert replace_thresholds(TOUCHLINE, {"tau_percent": 0.9}, name="mine").noise == "estimated"
 
     def test_what_was_judged_by_an_earlier_touchline_keeps_its_numbers(self, store: Store) -> None:
         """Nothing moves by an upgrade: who wants the present one chooses it."""
         earlier = replace(TOUCHLINE, noise="fixed")
         make_lined(store, earlier)
         solve_fully(store, "demo", None, nobody)
-        assert read_policy(store, "demo").policy == earlier and not is_shipped(earlier)
+        assert read_policy(store, "demo").policy == earlier and not is_builtin_policy(earlier)
 
     def test_somebodys_own_copies_keep_the_numbers_of_what_they_are_of(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
@@ -344,7 +344,7 @@ class TestFollowing:
         def fails(*_: object) -> None:
             raise ValueError("no")
 
-        monkeypatch.setattr(recompute, "solve_encoded", fails)
+        monkeypatch.setattr(recompute, "solve_and_encode", fails)
         report = solve_fully(store, "demo", None, nobody)
         assert (report.total, report.solved) == (1, 0)
         assert report.failed == [("bad", "ValueError: no")]

@@ -8,7 +8,7 @@ from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies import noise as noise_store
-from app.features.policies.noise import NoiseStore, apply_noise
+from app.features.policies.noise import NoiseCache, apply_noise
 from app.features.solutions.service import solve_dataset
 from tests.unit.features.policies.test_noise import make
 
@@ -16,12 +16,12 @@ from tests.unit.features.policies.test_noise import make
 class TestNoiseStore:
     def test_the_same_state_is_answered_from_memory(self, store: Store) -> None:
         make(store, given=True)
-        noises = NoiseStore(store)
+        noises = NoiseCache(store)
         assert noises.read("demo") is noises.read("demo")
 
     def test_another_policy_is_seen_at_once(self, store: Store) -> None:
         make(store, given=True)
-        noises = NoiseStore(store)
+        noises = NoiseCache(store)
         before = noises.read("demo")
         policy = apply_noise(store, before, actor="ben").policy
         assert noises.read("demo") is not before
@@ -35,11 +35,11 @@ class TestNoiseStore:
         monkeypatch.setattr(noise_store, "SIZE", 1)
         for name in "ab":
             ensure_dataset(store, name, "ann")
-        noises = NoiseStore(store)
+        noises = NoiseCache(store)
         first = noises.read("a")
         noises.read("b")
         assert noises.read("a") is not first
 
     def test_a_dataset_that_is_not_there_is_said(self, store: Store) -> None:
         with pytest.raises(NotFoundError):
-            NoiseStore(store).read("nothing")
+            NoiseCache(store).read("nothing")

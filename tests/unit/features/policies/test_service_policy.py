@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.errors import NotFoundError, StaleRevisionError
 from app.features.datasets.service import get_dataset, insert_dataset
 from app.features.imports.ingest import ensure_dataset
-from app.features.policies.service import change_policy, policy_with, read_policy
+from app.features.policies.service import change_policy, read_policy, replace_thresholds
 from app.features.queue.service import list_groups
 from app.features.solutions import service as recompute
 from app.features.solutions.queries import CalibrationModel, SolutionModel
@@ -18,7 +18,7 @@ from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import PAPER, STRICT
 from app.solving import calibrate
 
-TIGHT = policy_with(PAPER, {"tau_percent": 0.1}, name="tight")
+TIGHT = replace_thresholds(PAPER, {"tau_percent": 0.1}, name="tight")
 
 
 def count(store: Store, model) -> int:
@@ -128,7 +128,7 @@ class TestChangePolicy:
 
     def test_another_name_alone_solves_nothing(self, store: Store, fill, make_group) -> None:
         fill(make_group())
-        named = policy_with(PAPER, {}, name="ours")
+        named = replace_thresholds(PAPER, {}, name="ours")
         assert change_policy(store, "demo", named, if_match=None, actor="ann").version == 2
         assert list_stale_groups(store, "demo") == []
 
@@ -137,7 +137,7 @@ class TestChangePolicy:
     ) -> None:
         fill(make_static(10), make_static(20))
         calibrations.clear()
-        policy = policy_with(PAPER, {"calibration": {"robust_scale_px": 3.0}}, name="soft")
+        policy = replace_thresholds(PAPER, {"calibration": {"robust_scale_px": 3.0}}, name="soft")
         change_policy(store, "demo", policy, if_match=None, actor="ann")
         solve_dataset(store, "demo")
         assert len(calibrations) == 3

@@ -13,7 +13,7 @@ from app.features.policies.service import (
     policy_from_yaml,
     policy_to_values,
     policy_to_yaml,
-    policy_with,
+    replace_thresholds,
 )
 from app.soccer.policy import PAPER, POLICIES, STRICT, TOUCHLINE, CalibrationPolicy, Policy
 
@@ -25,7 +25,7 @@ class TestPolicyToYaml:
 
     def test_comes_back_the_same_bits_under_any_name(self) -> None:
         for name in ("yes", "1.5", "null", "2020-01-01", "a b", "1e5"):
-            policy = policy_with(STRICT, {"tau_percent": 0.1 + 0.2}, name=name)
+            policy = replace_thresholds(STRICT, {"tau_percent": 0.1 + 0.2}, name=name)
             again = policy_from_yaml(policy_to_yaml(policy))
             assert (again, again.tau_percent) == (policy, 0.1 + 0.2)
 
@@ -109,22 +109,22 @@ class TestPolicyFromYaml:
 
 class TestPolicyWith:
     def test_takes_the_calibration_nested_or_dotted(self) -> None:
-        nested = policy_with(PAPER, {"calibration": {"robust_scale_px": 3}}, name="x")
-        dotted = policy_with(PAPER, {"calibration.robust_scale_px": 3}, name="x")
+        nested = replace_thresholds(PAPER, {"calibration": {"robust_scale_px": 3}}, name="x")
+        dotted = replace_thresholds(PAPER, {"calibration.robust_scale_px": 3}, name="x")
         assert nested == dotted
         assert nested.calibration.robust_scale_px == 3.0
 
     def test_points_into_the_request(self) -> None:
         with pytest.raises(InputError) as caught:
-            policy_with(PAPER, {"calibration": {"robust_scale_px": 300}}, pointer="/values")
+            replace_thresholds(PAPER, {"calibration": {"robust_scale_px": 300}}, pointer="/values")
         assert caught.value.pointer == "/values/calibration/robust_scale_px"
 
     def test_an_optional_threshold_can_be_switched_off(self) -> None:
-        policy = policy_with(STRICT, {"max_sigma_m": None}, name="x")
+        policy = replace_thresholds(STRICT, {"max_sigma_m": None}, name="x")
         assert (policy.max_sigma_m, policy.min_parallax_degrees) == (None, 5.0)
 
     def test_values_of_a_policy_make_it_again(self) -> None:
-        assert policy_with(PAPER, policy_to_values(STRICT), name="strict") == STRICT
+        assert replace_thresholds(PAPER, policy_to_values(STRICT), name="strict") == STRICT
 
     @pytest.mark.parametrize(
         ("values", "noise"),
@@ -138,12 +138,12 @@ class TestPolicyWith:
     def test_a_number_of_ones_own_takes_the_place_of_the_estimate(
         self, values: dict[str, Any], noise: str
     ) -> None:
-        assert policy_with(TOUCHLINE, values, name="mine").noise == noise
+        assert replace_thresholds(TOUCHLINE, values, name="mine").noise == noise
 
     def test_what_a_dataset_shows_leaves_a_policy_the_shipped_one(self) -> None:
         estimated = {"noise": "estimated", "click_sigma_px": 1.3, "calibration.line_sigma_px": 0.7}
-        assert policy_with(TOUCHLINE, estimated).name == "touchline"
+        assert replace_thresholds(TOUCHLINE, estimated).name == "touchline"
         with pytest.raises(InputError, match="a policy with other thresholds"):
-            policy_with(TOUCHLINE, {"click_sigma_px": 1.3})
+            replace_thresholds(TOUCHLINE, {"click_sigma_px": 1.3})
         with pytest.raises(InputError, match="a policy with other thresholds"):
-            policy_with(TOUCHLINE, {**estimated, "tau_percent": 0.9})
+            replace_thresholds(TOUCHLINE, {**estimated, "tau_percent": 0.9})

@@ -13,7 +13,7 @@ from app.features.practice.lessons import (
     WORDS,
     Feedback,
     judge_lesson,
-    make_practice,
+    make_practice_scenes,
     make_practice_stage,
 )
 from app.sample.faults import FaultPlan
@@ -23,7 +23,7 @@ from app.soccer.annotation import make_lines
 from app.soccer.group import Group, View
 from app.soccer.pitch import opposite_marking
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 
 NONE = VerdictState()
 ACCEPTED = VerdictState("accepted")
@@ -36,7 +36,7 @@ def rejected(reason: str) -> VerdictState:
 
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
-    return dict(zip([lesson.kind for lesson in LESSONS], make_practice(), strict=True))
+    return dict(zip([lesson.kind for lesson in LESSONS], make_practice_scenes(), strict=True))
 
 
 def mended(scene: Scene, kind: str) -> Group:
@@ -188,6 +188,6 @@ class TestOneOfTwoLines:
             lines = {**view.station.lines, fault.marking: drawn.station.lines[fault.marking]}
             station = replace(view.station, lines=make_lines(lines))
             one = with_view(scene.group, replace(view, station=station))
-            assert solve(one, PAPER).passes
+            assert solve_group(one, PAPER).passes
             assert told(scene, one, NONE).state == "mended"
             assert told(scene, one, ACCEPTED).state == "right"

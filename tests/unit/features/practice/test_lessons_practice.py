@@ -12,7 +12,7 @@ import pytest
 from app.features.practice.lessons import (
     CLEAN,
     LESSONS,
-    make_practice,
+    make_practice_scenes,
     make_practice_stage,
     write_practice,
 )
@@ -21,7 +21,7 @@ from app.sample.scene import PRACTICE_KINDS, Scene, read_truth
 from app.sample.scenes import make_scene
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 
 FAILS = {
     CLEAN: None,
@@ -38,13 +38,13 @@ MENDABLE = ("wrong_label", "swapped_sides", "bad_point", "missing_ball", "undraw
 
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
-    made = zip(LESSONS, make_practice(), strict=True)
+    made = zip(LESSONS, make_practice_scenes(), strict=True)
     return {lesson.kind: scene for lesson, scene in made}
 
 
 @pytest.fixture(scope="module")
 def solved(scenes: dict[str, Scene]) -> dict[str, Solution]:
-    return {kind: solve(scene.group, PAPER) for kind, scene in scenes.items()}
+    return {kind: solve_group(scene.group, PAPER) for kind, scene in scenes.items()}
 
 
 class TestLessons:
@@ -91,7 +91,7 @@ class TestLessons:
         views = [replace(view, media=None) for view in spoilt.views]
         views[lesson.view] = sound.group.views[lesson.view]
         mended = replace(spoilt, views=tuple(views))
-        assert solve(mended, PAPER).passes
+        assert solve_group(mended, PAPER).passes
 
     def test_undrawn_lines_are_long_and_straight(self, scenes: dict[str, Scene]):
         scene = scenes["undrawn_line"]

@@ -19,10 +19,13 @@ from app.features.practice.recording import (
     read_recording_practice,
 )
 from app.features.practice.recording_lessons import FilmTruth
-from app.features.recordings.camera_tracking import track_now, turn_cameras
+from app.features.recordings.camera_tracking import (
+    rotate_cameras_half_turn,
+    track_stretch_in_worker,
+)
 from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.service import add_recording
-from app.features.recordings.shots import put_shots
+from app.features.recordings.shots import replace_shots
 from tests.videos import write_video
 
 SHORT = (
@@ -63,10 +66,10 @@ def test_each_lesson_is_open_until_it_is_mended_and_says_what_is_right_in_number
     told = json.loads((store.settings.home / FILM).with_suffix(".json").read_text())
     truth = FilmTruth.of(told)
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
-    put_shots(store, number, truth.shots, None, actor="ann")
+    replace_shots(store, number, truth.shots, None, actor="ann")
     quiet = {"actor": "ann", "progress": lambda *_: None, "stop": lambda: None}
-    track_now(store, number, live.first, live.last, **quiet)
-    turn_cameras(store, number, replay.first, True, actor="ann")
+    track_stretch_in_worker(store, number, live.first, live.last, **quiet)
+    rotate_cameras_half_turn(store, number, replay.first, True, actor="ann")
     wrong = add_link(
         store,
         (number, truth.shots[0].first, truth.shots[0].last),

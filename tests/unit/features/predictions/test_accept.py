@@ -10,13 +10,13 @@ from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.predictions.accept import (
     AcceptRequest,
     accept_box,
     accept_predicted_balls,
-    group_predictions,
     plan_accept,
+    read_group_predictions,
 )
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, read_frame_names, save_predictions
@@ -27,8 +27,8 @@ from app.soccer.frames import Box
 def cleared(store, fill, make_group):
     """Two groups; nobody annotated a ball in the main view of the first."""
     ids = fill(make_group(7), make_group(8))
-    state = load(store, ids[0])
-    return submit(store, ids[0], set_ball("7.png", None), if_match=state.etag, actor="ann")
+    state = load_group_state(store, ids[0])
+    return submit_edit(store, ids[0], set_ball("7.png", None), if_match=state.etag, actor="ann")
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ class TestPlanAccept:
         plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
         assert [(item.view, item.box.x) for item in plan.changes] == [("7.png", 600)]
         assert plan.refused == {"annotated": 2}
-        assert load(store, cleared.id) == cleared
+        assert load_group_state(store, cleared.id) == cleared
 
     def test_replaces_where_it_is_told_to(self, store, predictions) -> None:
         plan = plan_accept(
@@ -98,7 +98,7 @@ class TestAccept:
     ) -> None:
         report = accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         assert (report.views, report.groups, report.refused) == (1, 1, {"annotated": 2})
-        after = load(store, cleared.id)
+        after = load_group_state(store, cleared.id)
         ball = after.group.view("7.png").ball
         assert ball.box == Box(600, 300, 14, 14)
         assert ball.predicted_by == "yolo"
@@ -111,7 +111,7 @@ class TestAccept:
 
     def test_can_be_undone(self, store, cleared, predictions) -> None:
         accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
-        after = load(store, cleared.id)
+        after = load_group_state(store, cleared.id)
         assert (
             undo_group_edit(store, cleared.id, if_match=after.etag, actor="bob").group
             == cleared.group
@@ -120,16 +120,16 @@ class TestAccept:
     def test_done_again_it_changes_nothing(self, store, cleared, predictions) -> None:
         request = AcceptRequest(predictions.id, replace=True)
         accept_predicted_balls(store, "demo", request, actor="bob")
-        before = load(store, cleared.id)
+        before = load_group_state(store, cleared.id)
         report = accept_predicted_balls(store, "demo", request, actor="bob")
         assert (report.views, report.refused) == (0, {"the_same": 3})
-        assert load(store, cleared.id) == before
+        assert load_group_state(store, cleared.id) == before
 
     def test_changes_only_the_views_that_are_named(self, store, cleared, predictions) -> None:
         view = cleared.view_ids["7_1.png"]
         request = AcceptRequest(predictions.id, views=(view,), replace=True)
         assert accept_predicted_balls(store, "demo", request, actor="bob").views == 1
-        assert load(store, cleared.id).group.view("7.png").balls == ()
+        assert load_group_state(store, cleared.id).group.view("7.png").balls == ()
 
     def test_a_person_who_moves_it_is_the_source_from_then_on(
         self, store, cleared, predictions
@@ -137,9 +137,9 @@ class TestAccept:
         from app.soccer.annotation import BallAnnotation
 
         accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
-        state = load(store, cleared.id)
+        state = load_group_state(store, cleared.id)
         edit = set_ball("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
-        after = submit(store, cleared.id, edit, if_match=state.etag, actor="bob")
+        after = submit_edit(store, cleared.id, edit, if_match=state.etag, actor="bob")
         assert after.group.view("7.png").ball.predicted_by == ""
 
     def test_the_log_alone_rebuilds_it(self, store, cleared, predictions) -> None:
@@ -167,7 +167,7 @@ class TestAccept:
         request = AcceptRequest(predictions.id, replace=True)
         with pytest.raises(KeyboardInterrupt):
             accept_predicted_balls(store, "demo", request, actor="bob", progress=stop)
-        assert load(store, cleared.id).group.view("7_1.png").ball.predicted_by == "yolo"
+        assert load_group_state(store, cleared.id).group.view("7_1.png").ball.predicted_by == "yolo"
         assert accept_predicted_balls(store, "demo", request, actor="bob").views == 1
 
 
@@ -180,10 +180,10 @@ class TestAcceptBox:
             accept_box(store, view, box, if_match=cleared.etag, actor="bob")
         with pytest.raises(StaleRevisionError):
             accept_box(store, view, box, if_match='"0"', actor="bob")
-        assert load(store, cleared.id) == cleared
+        assert load_group_state(store, cleared.id) == cleared
 
     def box(self, store, cleared, score: float) -> int:
-        found = group_predictions(store, cleared.id).boxes
+        found = read_group_predictions(store, cleared.id).boxes
         return next(box.id for _, box in found if box.score == score)
 
     def test_takes_the_one_that_is_named_and_not_the_surest(
@@ -203,7 +203,7 @@ class TestAcceptBox:
         with pytest.raises(ConflictError, match="has a ball already") as refused:
             accept_box(store, view, box, if_match=cleared.etag, actor="bob")
         assert "replace" in refused.value.hint
-        assert load(store, cleared.id) == cleared
+        assert load_group_state(store, cleared.id) == cleared
         after = accept_box(store, view, box, if_match=cleared.etag, actor="bob", replace=True)
         assert after.group.view("7_1.png").ball.box == Box(20, 300, 14, 14)
 

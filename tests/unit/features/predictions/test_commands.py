@@ -11,7 +11,7 @@ from app.command_line import app
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
-from app.features.predictions.evaluation import run_tables
+from app.features.predictions.evaluation import parse_run_tables
 from app.features.solutions.service import solve_dataset
 from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
@@ -178,4 +178,7 @@ class TestTables:
         store = Store.open(Settings(home=home))
         found = list_evaluations(store, "small")[0]
         store.close()
-        assert [table.name for table in run_tables(found)][:2] == ["detection", "localization"]
+        assert [table.name for table in parse_run_tables(found)][:2] == [
+            "detection",
+            "localization",
+        ]

@@ -8,7 +8,7 @@ from sqlalchemy import func, select
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.evaluation import (
     FrameQuery,
@@ -17,8 +17,8 @@ from app.features.predictions.evaluation import (
     get_figure,
     list_evaluations,
     list_frames,
+    parse_run_tables,
     remove_evaluation,
-    run_tables,
 )
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
@@ -57,7 +57,7 @@ def predict(store, path, states, factor: float, name: str):
 def states(store, fill, make_group):
     """Three groups that pass: two of the training split, one of the test split."""
     ids = fill(make_group(7), make_group(8), make_group(9, split="test"))
-    return [load(store, identity) for identity in ids]
+    return [load_group_state(store, identity) for identity in ids]
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def loose(store, states, tmp_path):
 
 
 def cell(found, table: str, row: str, column: str):
-    return next(item for item in run_tables(found) if item.name == table).cell(row, column)
+    return next(item for item in parse_run_tables(found) if item.name == table).cell(row, column)
 
 
 class TestRunEvaluation:
@@ -92,7 +92,7 @@ class TestRunEvaluation:
         assert first.pins["predictions"]["unknown"] == 0
         assert first.pins["policy_hash"] == states[0].policy.hash
         edit = set_ball("7.png", None)
-        submit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
+        submit_edit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         assert (
             run_evaluation(store, "demo", request, actor="ann").pins["state"] != first.pins["state"]
         )
@@ -102,7 +102,7 @@ class TestRunEvaluation:
         request = EvaluationRequest(predictions=exact.id, version=version.id)
         first = run_evaluation(store, "demo", request, actor="ann")
         edit = set_ball("7.png", None)
-        submit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
+        submit_edit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         again = run_evaluation(store, "demo", request, actor="ann")
         assert (again.pins, again.tables) == (first.pins, first.tables)
         assert first.pins["version_hash"] == version.hash
@@ -168,7 +168,7 @@ class TestRunEvaluation:
     ) -> None:
         clean = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
         assert clean.counts["accepted_predictions"] == 0
-        assert not any("Warning" in table.note for table in run_tables(clean))
+        assert not any("Warning" in table.note for table in parse_run_tables(clean))
         view = states[0].view_ids["7.png"]
         accept_predicted_balls(
             store, "demo", AcceptRequest(exact.id, views=(view,), replace=True), actor="ann"
@@ -179,7 +179,7 @@ class TestRunEvaluation:
         )
         assert own.counts["accepted_predictions"] == other.counts["accepted_predictions"] == 1
         notes = [
-            next(item.note for item in run_tables(run) if item.name == "detection")
+            next(item.note for item in parse_run_tables(run) if item.name == "detection")
             for run in (own, other)
         ]
         assert all("Warning: the ball of 1 of 6 frames is an accepted" in note for note in notes)
@@ -218,7 +218,7 @@ class TestListFrames:
         return run_evaluation(store, "demo", EvaluationRequest(predictions=loose.id), actor="ann")
 
     def test_a_row_opens_the_frames_that_it_counts(self, store, run) -> None:
-        table = next(item for item in run_tables(run) if item.name == "detection_by_distance")
+        table = next(item for item in parse_run_tables(run) if item.name == "detection_by_distance")
         for row in table.rows:
             query = FrameQuery(row.frames.field, row.frames.low, row.frames.high)
             page = list_frames(store, run.id, query)

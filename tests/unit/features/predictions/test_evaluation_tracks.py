@@ -10,7 +10,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
-from app.features.predictions.evaluation import get_figure, run_tables
+from app.features.predictions.evaluation import get_figure, parse_run_tables
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
     SourcesRequest,
@@ -69,7 +69,7 @@ def shifted(own: Path, by: float) -> Path:
 class TestEvaluation:
     def test_our_own_track_is_without_an_error(self, accepted, own) -> None:
         found = evaluated(accepted, own)
-        tables = {table.name: table for table in run_tables(found)}
+        tables = {table.name: table for table in parse_run_tables(found)}
         assert tables["tracks"].cell("all", "mae_m").value == pytest.approx(0.0, abs=1e-12)
         assert tables["tracks"].cell("all", "coverage").value == 1.0
         assert tables["track_events"].cell("any", "f1").value == 1.0
@@ -78,7 +78,7 @@ class TestEvaluation:
 
     def test_another_one_has_its_error_and_what_pins_the_truth(self, accepted, own) -> None:
         found = evaluated(accepted, shifted(own, 0.5), name="mine")
-        (table,) = run_tables(found)
+        (table,) = parse_run_tables(found)
         assert table.cell("all", "mae_m").value == pytest.approx(0.5)
         assert table.cell("all", "inside_95").value == 1.0
         assert (found.name, found.pins["version_name"]) == ("mine", "v1")
@@ -87,7 +87,7 @@ class TestEvaluation:
     def test_without_a_version_the_accepted_tracks_are_the_truth(self, accepted, own) -> None:
         found = evaluated(accepted, shifted(own, 0.5), None)
         assert (found.version_id, found.pins["groups"]) == (None, "accepted")
-        assert run_tables(found)[0].cell("all", "mae_m").value == pytest.approx(0.5)
+        assert parse_run_tables(found)[0].cell("all", "mae_m").value == pytest.approx(0.5)
 
     def test_a_dataset_without_accepted_tracks_says_so(self, store, tmp_path: Path) -> None:
         add_flight(store)

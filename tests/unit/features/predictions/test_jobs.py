@@ -7,7 +7,7 @@ import pytest
 from app.db.session import now
 from app.errors import NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.jobs.service import Jobs
 from app.features.predictions.accept import AcceptRequest
@@ -87,9 +87,9 @@ class TestResume:
 class TestRequestAccept:
     def test_counts_what_changed(self, store, state, jobs, predictions) -> None:
         jobs.start()
-        submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
+        submit_edit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
         request = AcceptRequest(predictions.id, query="")
         job = jobs.wait(request_accept(jobs, store, "demo", request, actor="bob").id, 60)
         assert job.state == "done", job.problem
         assert job.result == {"changed": 1, "groups": 1, "refused": {}}
-        assert load(store, state.id).group.view("7.png").ball.predicted_by == "yolo"
+        assert load_group_state(store, state.id).group.view("7.png").ball.predicted_by == "yolo"

@@ -7,14 +7,14 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.predictions.queries import (
     FrameCondition,
+    between_condition,
     count_frame_rows,
     delete_evaluation,
     find_evaluation,
     insert_evaluation,
-    is_between,
-    is_missing,
-    is_of_match,
     list_evaluations_of_dataset,
+    match_condition,
+    missing_condition,
     read_frame_rows,
 )
 from app.features.predictions.tables import EvaluationFrameModel
@@ -72,12 +72,12 @@ class TestReadFrameRows:
         ("conditions", "places"),
         [
             ([], 4),
-            ([is_of_match("n")], 1),
-            ([is_between("error_m", None, None)], 2),
-            ([is_between("error_m", 0.1, 0.5)], 1),
-            ([is_between("error_m", 0.2, None)], 1),
-            ([is_missing("error_m")], 1),
-            ([is_of_match("n"), is_missing("error_m")], 0),
+            ([match_condition("n")], 1),
+            ([between_condition("error_m", None, None)], 2),
+            ([between_condition("error_m", 0.1, 0.5)], 1),
+            ([between_condition("error_m", 0.2, None)], 1),
+            ([missing_condition("error_m")], 1),
+            ([match_condition("n"), missing_condition("error_m")], 0),
         ],
     )
     def test_all_conditions_must_hold(self, session, conditions, places: int) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import DatasetFormatError, InputError, NotFoundError, OverloadedError, TooLargeError
-from app.evaluation.frame import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNameIndex, NamedFrame
 from app.features.imports.upload_queries import UploadWriter
 from app.features.predictions import reader as prediction_reader
 from app.features.predictions.reader import (
@@ -19,10 +19,10 @@ from app.features.predictions.reader import (
     read_files,
     resolve_uploaded_files,
 )
-from app.formats.file_tree import Limits
+from app.formats.file_tree import ImportLimits
 from app.soccer.frames import ImageSize
 
-NAMES = FrameNames.of([NamedFrame(1, "demo/7", "7.png", "demo", ImageSize(1280, 720))])
+NAMES = FrameNameIndex.of([NamedFrame(1, "demo/7", "7.png", "demo", ImageSize(1280, 720))])
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ class TestUploadedFiles:
 
 class TestPredictionReader:
     def test_reads_and_refuses_what_is_read_and_refused_here(self, reader_of, tmp_path) -> None:
-        reader, limits = reader_of(), Limits.of(Settings())
+        reader, limits = reader_of(), ImportLimits.of(Settings())
         box = b'{"category_id": 1, "bbox": [600, 300, 14, 14], "score": 0.5, "image_id": "%s"}'
         files = written(tmp_path / "a.json", b"[%s, %s]" % (box % b"7.png", box % b"9.png"))
         assert reader.read(files, NAMES, limits) == read_files(files, NAMES, limits)
@@ -81,13 +81,13 @@ class TestPredictionReader:
     def test_a_file_of_another_kind_is_called_by_its_name_alone(self, reader_of, tmp_path) -> None:
         other = written(tmp_path / "x.csv", b"a,b")
         with pytest.raises(DatasetFormatError) as refused:
-            reader_of().read(other, NAMES, Limits.of(Settings()))
+            reader_of().read(other, NAMES, ImportLimits.of(Settings()))
         assert refused.value.message == "x.csv: holds no COCO results"
 
     def test_what_needs_too_much_memory_is_refused_and_the_next_is_read(
         self, reader_of, tmp_path
     ) -> None:
-        reader, limits = reader_of(import_memory=400 * 2**20), Limits.of(Settings())
+        reader, limits = reader_of(import_memory=400 * 2**20), ImportLimits.of(Settings())
         heavy = written(tmp_path / "heavy.json", b"[%s{}]" % (b"{}," * 8_000_000))
         with pytest.raises(TooLargeError, match=r"heavy\.json needs more than 400 MiB") as refused:
             reader.read(heavy, NAMES, limits)
@@ -101,4 +101,6 @@ class TestPredictionReader:
     ) -> None:
         monkeypatch.setattr(prediction_reader, "WAITING", -1)
         with pytest.raises(OverloadedError, match="sets of predictions"):
-            reader_of().read(written(tmp_path / "a.json", b"[]"), NAMES, Limits.of(Settings()))
+            reader_of().read(
+                written(tmp_path / "a.json", b"[]"), NAMES, ImportLimits.of(Settings())
+            )

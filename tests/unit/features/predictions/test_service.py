@@ -9,7 +9,7 @@ from sqlalchemy import delete, select
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.tables import ViewModel
 from app.features.groups.state import read_record
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import (
     add_predictions,
@@ -57,7 +57,7 @@ class TestAddPredictions:
     def test_changes_nothing_of_the_group_and_solves_nothing(self, store, state, tmp_path) -> None:
         files = results(tmp_path / "yolo.json", "7.png", "7_1.png")
         add_predictions(store, "demo", "yolo", files, actor="ann")
-        assert load(store, state.id) == state
+        assert load_group_state(store, state.id) == state
         with store.read() as session:
             key = read_record(session, state.id).solution_key
             assert list(read_solutions(session, [key])) == [state.id]

@@ -9,14 +9,19 @@ from app.db.store import Store
 from app.features.comments.service import begin_thread
 from app.features.datasets.service import delete_dataset, get_dataset
 from app.features.groups.edit import IncludeView, SetStationCalibration
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.queue import changes as module
-from app.features.queue.changes import LoggedChange, read_changes, read_solved, read_solved_since
+from app.features.queue.changes import (
+    LoggedChange,
+    read_changes,
+    read_groups_solved_since,
+    read_newly_solved_groups,
+)
 from app.features.solutions.queries import find_newest_solution_id
 from app.features.solutions.service import solve_dataset
-from app.features.stations.service import load_station, submit_station
+from app.features.stations.service import load_station, submit_station_edit
 from app.features.verdicts.service import set_verdict
 from app.soccer.policy import STRICT
 
@@ -36,8 +41,8 @@ class TestReadChanges:
         self, store: Store, fill, make_group
     ) -> None:
         one, _two = fill(make_group(7), make_group(8))
-        before, etag = newest(store), load(store, one).etag
-        edited = submit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
+        before, etag = newest(store), load_group_state(store, one).etag
+        edited = submit_edit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
         judged = set_verdict(store, one, "deferred", if_match=edited.etag, actor="bob")
         found = get_dataset(store, "demo").id
         assert since(store, before) == [
@@ -47,8 +52,8 @@ class TestReadChanges:
 
     def test_a_comment_hides_no_change_of_its_group(self, store: Store, fill, make_group) -> None:
         (one,) = fill(make_group(7))
-        before, etag = newest(store), load(store, one).etag
-        submit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
+        before, etag = newest(store), load_group_state(store, one).etag
+        submit_edit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
         begin_thread(store, one, "Is it?", actor="bob")
         edited, commented = since(store, before)
         assert (edited.group_id, edited.actor) == (commented.group_id, "ann") == (one, "ann")
@@ -58,16 +63,18 @@ class TestReadChanges:
         self, store: Store, fill, make_static
     ) -> None:
         ids = fill(make_static(10), make_static(20))
-        station = next(iter(load(store, ids[0]).station_ids.values()))
+        station = next(iter(load_group_state(store, ids[0]).station_ids.values()))
         before, etag = newest(store), load_station(store, station).etag
-        submit_station(store, station, SetStationCalibration("lines"), if_match=etag, actor="ann")
+        submit_station_edit(
+            store, station, SetStationCalibration("lines"), if_match=etag, actor="ann"
+        )
         told = since(store, before)
         assert [(item.kind, item.group_id) for item in told if item.group_id] == [
             ("station_edit", ids[0]),
             ("station_edit", ids[1]),
         ]
         assert {item.etag for item in told if item.group_id} == {
-            load(store, number).etag for number in ids
+            load_group_state(store, number).etag for number in ids
         }
 
     def test_a_policy_changes_the_dataset(self, store: Store) -> None:
@@ -117,8 +124,8 @@ class TestReadSolved:
             before = find_newest_solution_id(session)
         solve_dataset(store, "demo")
         with store.read() as session:
-            told = read_solved(session, before)
-            rest = read_solved(session, before, {one})
+            told = read_newly_solved_groups(session, before)
+            rest = read_newly_solved_groups(session, before, {one})
         assert [(item.group_id, item.kind, item.id) for item in told] == [
             (one, "solved", None),
             (two, "solved", None),
@@ -131,8 +138,8 @@ class TestReadSolved:
         fill(*(make_group(number) for number in (1, 2, 3)))
         with store.read() as session:
             newest = find_newest_solution_id(session)
-        assert read_solved_since(store, newest) == []
-        assert [one.group_id for one in read_solved_since(store, newest - 3)] == [1, 2, 3]
+        assert read_groups_solved_since(store, newest) == []
+        assert [one.group_id for one in read_groups_solved_since(store, newest - 3)] == [1, 2, 3]
         monkeypatch.setattr(module, "FAR", 2)
-        (whole,) = read_solved_since(store, newest - 3)
+        (whole,) = read_groups_solved_since(store, newest - 3)
         assert (whole.dataset, whole.kind, whole.group_id) == ("demo", "solved", None)

@@ -14,11 +14,11 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel
 from app.features.queue.queries import (
-    Listing,
+    GroupListing,
     RowOrder,
     compare_condition,
     count_states,
-    find_place,
+    find_group_position,
     read_columns,
     read_rows,
 )
@@ -55,8 +55,10 @@ BY_SIGMA = RowOrder("sigma_m", descending=True)
 
 class TestCounts:
     def test_groups_of_the_dataset_that_fulfil_all_conditions(self, session: Session) -> None:
-        assert [Listing(session, 1).count(), Listing(session, 2).count()] == [4, 0]
-        assert Listing(session, 1, [*OPEN, compare_condition("sigma_m", ">", 0.2)]).count() == 1
+        assert [GroupListing(session, 1).count(), GroupListing(session, 2).count()] == [4, 0]
+        assert (
+            GroupListing(session, 1, [*OPEN, compare_condition("sigma_m", ">", 0.2)]).count() == 1
+        )
 
     def test_states_with_the_groups_that_are_solved(self, session: Session) -> None:
         rows = {row.status: (row.groups, row.solved) for row in count_states(session, [1, 2])}
@@ -65,7 +67,7 @@ class TestCounts:
 
 class TestReadColumns:
     def test_columns_come_in_the_order_of_the_numbers(self, session: Session) -> None:
-        rows = Listing(session, 1, OPEN).columns(("number", "sigma_m"), by_number=True)
+        rows = GroupListing(session, 1, OPEN).columns(("number", "sigma_m"), by_number=True)
         assert [tuple(row) for row in rows] == [(1, None), (2, 0.5), (3, 0.1)]
 
     def test_of_some_groups_alone(self, session: Session) -> None:
@@ -75,31 +77,36 @@ class TestReadColumns:
 
 class TestOrder:
     def test_all_ids_or_the_first_few_come_in_the_order(self, session: Session) -> None:
-        assert Listing(session, 1).ids(BY_SIGMA) == [2, 4, 3, 1]
-        assert Listing(session, 1, OPEN).ids(BY_SIGMA, 2) == [2, 3]
+        assert GroupListing(session, 1).ids(BY_SIGMA) == [2, 4, 3, 1]
+        assert GroupListing(session, 1, OPEN).ids(BY_SIGMA, 2) == [2, 3]
 
     def test_ids_from_a_position_on_either_side_of_the_middle(self, session: Session) -> None:
         whole = [2, 4, 3, 1]
         for start in range(6):
-            assert Listing(session, 1).ids_from(BY_SIGMA, start, 2, 4) == whole[start : start + 2]
+            assert (
+                GroupListing(session, 1).ids_from(BY_SIGMA, start, 2, 4) == whole[start : start + 2]
+            )
 
     def test_a_page_goes_on_after_the_keys_of_a_row(self, session: Session) -> None:
-        first = Listing(session, 1).rows_after(BY_SIGMA, None, 2)
+        first = GroupListing(session, 1).rows_after(BY_SIGMA, None, 2)
         assert [row.group_id for row in first] == [2, 4]
         keys = BY_SIGMA.keys_of(first[-1])
-        rest = Listing(session, 1).rows_after(BY_SIGMA, keys, 9)
+        rest = GroupListing(session, 1).rows_after(BY_SIGMA, keys, 9)
         assert [row.group_id for row in rest] == [3, 1]
         assert [row.group_id for row in read_rows(session, [1, 4], BY_SIGMA)] == [4, 1]
 
     def test_a_group_has_a_place_also_where_it_is_not_among_those_that_are_meant(
         self, session: Session
     ) -> None:
-        place = find_place(session, 4, BY_SIGMA)
+        place = find_group_position(session, 4, BY_SIGMA)
         assert place is not None
         dataset, keys = place
-        assert (dataset, find_place(session, 9, BY_SIGMA)) == (1, None)
-        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5, total=5) == ([2], [3, 1])
-        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 1, total=5) == ([2], [3])
+        assert (dataset, find_group_position(session, 9, BY_SIGMA)) == (1, None)
+        assert GroupListing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5, total=5) == (
+            [2],
+            [3, 1],
+        )
+        assert GroupListing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 1, total=5) == ([2], [3])
 
     @pytest.mark.parametrize("column", ["number", "changed", "gate", "findings", "label"])
     def test_no_two_groups_have_the_same_keys(self, session: Session, column: str) -> None:
@@ -134,7 +141,7 @@ class TestWhatIsRead:
         statements: list[str] = []
         with closing(Store.open(settings)) as store, store.read() as session:
             event.listen(session, "before_cursor_execute", lambda *told: statements.append(told[2]))
-            Listing(session, 1, conditions).count()
+            GroupListing(session, 1, conditions).count()
             explain = f"EXPLAIN QUERY PLAN {statements[-1]}"
             plan = session.exec_driver_sql(explain, (1, 2, 5)).all()
         assert index in " ".join(row[3] for row in plan)

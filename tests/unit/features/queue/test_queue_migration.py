@@ -17,7 +17,7 @@ from app.db.dialects.dialect import make_engine
 from app.db.migrate import KNOWN_REVISIONS, migrate_database, read_schema_revision
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.tables import QUEUE_NUMBERS
 from app.features.verdicts.service import set_verdict
@@ -145,7 +145,7 @@ def filled(store: Store, fill, make_group, make_static) -> Store:
     without = make_group(8)
     without = without.with_view(replace(without.views[0], balls=()))
     ids = fill(make_group(7), make_static(10), without)
-    state = load(store, ids[0])
+    state = load_group_state(store, ids[0])
     set_verdict(store, ids[0], "accepted", if_match=state.etag, actor="ann")
     fill(make_group(9), solved=False)
     return store

@@ -10,7 +10,7 @@ from sqlalchemy import insert, update
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.datasets.tables import GroupModel
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.query import SORTS
 from app.features.queue.service import (
@@ -296,7 +296,7 @@ class TestNeighbours:
 
     def test_a_group_that_was_just_judged_still_has_a_place(self, store, fill, make_group) -> None:
         ids = fill(make_group(7), make_group(8), make_group(9))
-        state = load(store, ids[1])
+        state = load_group_state(store, ids[1])
         set_verdict(store, ids[1], "deferred", if_match=state.etag, actor="ann")
         found = find_neighbours(store, ids[1], "status:unreviewed")
         assert (found.index, found.total) == (None, 2)

@@ -4,7 +4,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
 from app.features.queue.statistics import read_timeline
 from app.features.solutions.service import solve_dataset
@@ -34,20 +34,20 @@ class TestReadTimeline:
 
     def test_frames_are_the_keys_as_numbers(self, filmed: Store) -> None:
         timeline = read_timeline(filmed, 1)
-        keys = [load(filmed, group).group.key for group in timeline.id]
+        keys = [load_group_state(filmed, group).group.key for group in timeline.id]
         assert [str(frame) for frame in timeline.frame] == keys
 
     def test_the_point_is_that_of_the_solution(self, filmed: Store) -> None:
         timeline = read_timeline(filmed, 1)
         for group, point, error in zip(timeline.id, timeline.point, timeline.error_px, strict=True):
-            solution = load(filmed, group).solution
+            solution = load_group_state(filmed, group).solution
             assert solution is not None and solution.ball is not None
             assert point == pytest.approx(solution.ball.point, abs=1e-12)
             assert error is not None and error < 1.0
         assert timeline.passes == [True] * len(FRAMES)
 
     def test_a_query_and_a_match_narrow_it(self, filmed: Store) -> None:
-        state = load(filmed, 2)
+        state = load_group_state(filmed, 2)
         # These frames have no pictures, so the note says what was looked at.
         note = "seen on video"
         set_verdict(filmed, 2, "accepted", note=note, if_match=state.etag, actor="ann")

@@ -12,8 +12,8 @@ import pytest
 from app.db.store import Store
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.recordings.ball_runs import get_run
-from app.features.recordings.follow import follow_hints
+from app.features.recordings.ball_runs import get_ball_run
+from app.features.recordings.follow import collect_follow_hints
 from app.features.recordings.queries import update_recording
 from app.features.recordings.service import get_recording
 from tests.drawn_balls import FRAMES, WALL, place, write_film
@@ -95,7 +95,12 @@ class TestFollow:
         number, whole, told = int(recording.rpartition("/")[2]), follower.follow, []
 
         def watched(*asked: Any) -> Any:
-            told.append((follower.frames_at_work(number), follower.frames_at_work(number + 1)))
+            told.append(
+                (
+                    follower.list_frames_being_followed(number),
+                    follower.list_frames_being_followed(number + 1),
+                )
+            )
             return whole(*asked)
 
         monkeypatch.setattr(follower, "follow", watched)
@@ -207,7 +212,7 @@ class TestAccept:
         number = run["recording"]
         with store.write() as session:
             update_recording(session, number, sha256="0" * 64)
-        assert get_run(store, number, run["id"]).stale
+        assert get_ball_run(store, number, run["id"]).stale
         assert change(api, run, accepted=True).status_code == 409
 
     def test_boxes_of_detectors_are_candidates(
@@ -220,6 +225,6 @@ class TestAccept:
         body = {"name": "seen", "format": "csv", "upload": sent.json()["id"]}
         made = api.post("/api/v1/datasets/cup/predictions", json=body)
         assert made.status_code == 201, made.text
-        hints = follow_hints(store, get_recording(store, 1), range(FRAMES))
+        hints = collect_follow_hints(store, get_recording(store, 1), range(FRAMES))
         (one,) = hints.detected[8]
         assert (one.x, one.y, one.diameter, one.score) == (108.5, 66.5, 9.0, 0.8)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.store import Store
 from app.errors import ConflictError, InputError, JobCancelled
 from app.features.datasets.queries import list_unused_frame_files
@@ -22,18 +22,22 @@ from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.imports.cameras import import_given_cameras
 from app.features.recordings import camera_tracking as module
-from app.features.recordings.camera_tracking import Tracked, track_now, track_stretch
+from app.features.recordings.camera_tracking import (
+    TrackedStretch,
+    track_stretch,
+    track_stretch_in_worker,
+)
 from app.features.recordings.cameras import (
     SOURCE,
-    cameras_at,
-    get_cameras,
-    list_cameras,
+    get_shot_cameras,
+    list_shot_cameras,
     read_cameras,
+    read_cameras_of_frames,
 )
 from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
-from app.features.recordings.service import Recording, get_recording, groups_taken
-from app.features.recordings.shots import Shot, put_shots
+from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
+from app.features.recordings.shots import Shot, replace_shots
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -41,7 +45,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
 from app.solving.sides import turn_camera
-from app.tracking.track import FrameCamera, Track
+from app.tracking.track import CameraTrack, FrameCamera
 from tests.tripod_films import Film, render_film
 from tests.videos import write_pictures
 
@@ -88,12 +92,12 @@ class Tracker:
         self.asked: dict[int, Any] = {}
         self.pitch: dict[str, Any] | None = None
 
-    def __call__(self, path: Path, work: Any, *arguments: Any, **_: Any) -> Tracked:
+    def __call__(self, path: Path, work: Any, *arguments: Any, **_: Any) -> TrackedStretch:
         assert work is track_stretch
         first, last, lines = arguments[2:5]
         self.asked = lines
         frames = [self.frame(number, lines) for number in range(first, last + 1)]
-        return Tracked(frames, (), pitch=self.pitch)
+        return TrackedStretch(frames, (), pitch=self.pitch)
 
     def frame(self, number: int, lines: Any) -> FrameCamera:
         lost = number in self.lost
@@ -125,7 +129,7 @@ class Tracker:
 @pytest.fixture
 def tracker(tripod: Film, monkeypatch: pytest.MonkeyPatch) -> Tracker:
     tracker = Tracker(tripod.cameras)
-    monkeypatch.setattr(module, "in_worker", tracker)
+    monkeypatch.setattr(module, "run_in_worker", tracker)
     return tracker
 
 
@@ -175,7 +179,7 @@ def test_a_shot_is_tracked_and_its_frames_have_cameras(
     assert max(body["error_px"]) < 0.5 and min(body["supported"]) > 0.8
     assert api.get(f"{recording}/cameras/9", headers=tag).status_code == 304
     store = app.state.services.store
-    frames = read_cameras(store.settings, get_cameras(store, found.id, 9).digest)
+    frames = read_cameras(store.settings, get_shot_cameras(store, found.id, 9).digest)
     for place, frame in enumerate(frames):
         assert frame.number == FIRST + place and frame.camera is not None
         assert tripod.off_px(place, frame.camera) < 1.5
@@ -218,11 +222,11 @@ def test_groups_get_the_cameras_of_their_frames_and_need_no_proposal(
     assert track(api, recording, finished)["lost"] == 1
     taken = take(api, recording, finished, 5, 6)
     assert (taken["new"], taken["cameras"], taken["proposals_job"]) == (2, 2, None)
-    assert taken["group"] == groups_taken(app.state.services.store, found)[5]
+    assert taken["group"] == find_groups_of_recording(app.state.services.store, found)[5]
     taken = take(api, recording, finished, 7, 8)
     assert taken["cameras"] == 1 and taken["proposals_job"] is not None
     store: Store = app.state.services.store
-    groups = groups_taken(store, found)
+    groups = find_groups_of_recording(store, found)
     with store.read() as session:
         stored = read_groups(session, list(groups.values()))
     station = stored[groups[5]].group.views[0].station
@@ -243,7 +247,7 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
     tracker.lost, tracker.off = {7, 8}, 2.0
     track(api, recording, finished)
     take(api, recording, finished, 5, 7, 8, 11)
-    groups = groups_taken(store, found)
+    groups = find_groups_of_recording(store, found)
     draw(api, groups[7], tracker.truth[3])
     assert api.get(f"{recording}/cameras").json()["items"][0]["drawn"] == [7]
     tracker.lost, tracker.off = {11}, 0.0
@@ -278,7 +282,7 @@ def test_views_of_linked_replays_are_frames_of_their_shot(
     store: Store = app.state.services.store
     # So few frames would tell no speed.
     monkeypatch.setattr("app.tracking.time_map._UNSURE", 1.0)
-    put_shots(
+    replace_shots(
         store,
         found.id,
         [Shot(4, 7, "main", "cut"), Shot(8, 11, "replay", "cut")],
@@ -290,7 +294,7 @@ def test_views_of_linked_replays_are_frames_of_their_shot(
     track(api, recording, finished, 8, 11)
     body = {"frames": [5], "propose": False, "linked": True}
     finished(api.post(f"{recording}/groups", json=body))
-    (group,) = groups_taken(store, found).values()
+    (group,) = find_groups_of_recording(store, found).values()
 
     def given() -> list[Camera | None]:
         with store.read() as session:
@@ -325,7 +329,7 @@ def test_cameras_are_turned_by_half_and_back_and_groups_follow(
         return job.result
 
     def given() -> dict[int, Camera | None]:
-        groups = groups_taken(store, found)
+        groups = find_groups_of_recording(store, found)
         with store.read() as session:
             stored = read_groups(session, list(groups.values()))
         return {
@@ -362,15 +366,15 @@ def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_tur
     store: Store = app.state.services.store
     assert api.patch(f"{recording}/cameras/5", json={"turned": True}).status_code == 404
     track(api, recording, finished)
-    present = get_cameras(store, found.id, 5)
+    present = get_shot_cameras(store, found.id, 5)
     take(api, recording, finished, 7)
-    draw(api, groups_taken(store, found)[7], tracker.truth[3])
+    draw(api, find_groups_of_recording(store, found)[7], tracker.truth[3])
     tracker.off = 1.0
     track(api, recording, finished)
     answer = api.patch(f"{recording}/cameras/5", json={"turned": True})
     assert answer.status_code == 409
     assert "lines of frame 7 already say which half of the pitch" in answer.json()["detail"]
-    turned = Tracked([tracker.frame(number, {}) for number in range(4, 12)], (), True)
+    turned = TrackedStretch([tracker.frame(number, {}) for number in range(4, 12)], (), True)
     with pytest.raises(
         ConflictError, match="the cameras of this shot were changed in the meantime"
     ):
@@ -391,7 +395,7 @@ def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
     take(api, recording, finished, 4, 5, 6)
     own = tracker.truth[0]
     import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
-    groups = groups_taken(store, found)
+    groups = find_groups_of_recording(store, found)
     draw(api, groups[6], tracker.truth[2])
     track(api, recording, finished)
     link = add_link(store, (found.id, 4, 7), (found.id, 8, 11), actor="ann")
@@ -422,7 +426,7 @@ def test_a_camera_that_somebody_gave_stays(
     own = tracker.truth[0]
     import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
     assert track(api, recording, finished)["groups"] == 1
-    groups = groups_taken(store, found)
+    groups = find_groups_of_recording(store, found)
     with store.read() as session:
         stored = read_groups(session, list(groups.values()))
     assert stored[groups[5]].group.views[0].station.given == own
@@ -449,7 +453,7 @@ def test_cameras_take_the_place_of_those_that_share_a_frame_and_leave_no_file(
     track(api, recording, finished, 6, 9)
     # Frames beside it keep their cameras.
     assert stretches() == [(4, 5), (6, 9), (10, 11)] and files() == 3
-    assert sorted(cameras_at(store, found, [4, 6, 9, 11])) == [4, 6, 9, 11]
+    assert sorted(read_cameras_of_frames(store, found, [4, 6, 9, 11])) == [4, 6, 9, 11]
     with store.read() as session:
         assert not [
             name for name in list_unused_frame_files(session, store.settings) if "cameras" in name
@@ -466,18 +470,18 @@ def test_cameras_of_another_video_or_of_no_file_are_not_given(
 ) -> None:
     store: Store = app.state.services.store
     track(api, recording, finished)
-    kept = get_cameras(store, found.id, 5)
-    place = module.camera_place(store.settings, kept.digest)
+    kept = get_shot_cameras(store, found.id, 5)
+    place = module.cameras_file_path(store.settings, kept.digest)
     content = place.read_bytes()
     place.write_bytes(content[:100])
     answer = api.get(f"{recording}/cameras/5")
     assert answer.status_code == 409 and "Track the shot again" in answer.json()["hint"]
-    assert cameras_at(store, found, [5]) == {}
+    assert read_cameras_of_frames(store, found, [5]) == {}
     place.write_bytes(content)
-    assert sorted(cameras_at(store, found, [5])) == [5]
-    with store.write() as session, without_response():
+    assert sorted(read_cameras_of_frames(store, found, [5])) == [5]
+    with store.write() as session, without_pending_response():
         update_recording(session, found.id, sha256="0" * 64)
-    assert cameras_at(store, found, [5]) == {}
+    assert read_cameras_of_frames(store, found, [5]) == {}
     assert api.get(f"{recording}/cameras").json()["items"][0]["stale"]
 
 
@@ -485,12 +489,12 @@ def test_a_video_that_changes_while_it_is_tracked_is_refused(
     app: Any, recording: str, found: Recording, tracker: Tracker
 ) -> None:
     store: Store = app.state.services.store
-    tracked = Tracked([tracker.frame(number, {}) for number in range(4, 12)], ())
+    tracked = TrackedStretch([tracker.frame(number, {}) for number in range(4, 12)], ())
     other = Recording(**{**vars(found), "sha256": "0" * 64})
     with pytest.raises(ConflictError, match="was replaced while the shot was tracked"):
         module.save_cameras(store, other, (4, 11), tracked, [], "ann")
     with pytest.raises(InputError):
-        module.require_stretch(found, 4, 12)
+        module.require_trackable_stretch(found, 4, 12)
 
 
 def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
@@ -502,8 +506,8 @@ def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
     store: Store = app.state.services.store
     asked = {"actor": "ann", "progress": lambda *_: None, "stop": cancelled}
     with pytest.raises(JobCancelled):
-        track_now(store, found.id, FIRST, 11, **asked)
-    assert list_cameras(store, found.id) == []
+        track_stretch_in_worker(store, found.id, FIRST, 11, **asked)
+    assert list_shot_cameras(store, found.id) == []
     assert list(store.settings.recordings.glob("*.cameras.npz")) == []
 
 
@@ -536,9 +540,9 @@ def test_lines_that_make_no_camera_are_named_and_left_out(
 ) -> None:
     asked: dict[str, Any] = {}
 
-    def follow(clip: Any, lines: Any, *_: Any) -> Track:
+    def follow(clip: Any, lines: Any, *_: Any) -> CameraTrack:
         asked.update(lines)
-        return Track([], None, [])
+        return CameraTrack([], None, [])
 
     monkeypatch.setattr(module, "track_clip", follow)
     few = make_lines({"Middle line": (ImagePoint(600, 100), ImagePoint(620, 500))})

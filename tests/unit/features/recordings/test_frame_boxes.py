@@ -15,13 +15,13 @@ from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
 from app.features.datasets.queries import list_unused_frame_files
 from app.features.predictions.detect import OnnxModel
-from app.features.recordings.follow import follow_hints
+from app.features.recordings.follow import collect_follow_hints
 from app.features.recordings.frame_boxes import (
     MOST,
-    boxes_in,
     detect_in_frames,
     find_recording,
-    read_boxes_of_file,
+    import_boxes_from_file,
+    read_detected_balls_in_frames,
 )
 from app.features.recordings.service import Recording
 from tests.drawn_balls import FRAMES, WALL, place, write_film
@@ -69,19 +69,19 @@ class TestFile:
         self, store: Store, recording: Recording, tmp_path: Path
     ) -> None:
         path = written(tmp_path / "seen.csv", (8, 104, 62, 9, 9, 0.8), (900, 1, 1, 9, 9, 0.9))
-        kept = read_boxes_of_file(store, recording, path, "seen", min_score=0.1, actor="ann")
+        kept = import_boxes_from_file(store, recording, path, "seen", min_score=0.1, actor="ann")
         assert (kept.boxes, kept.frames, kept.unknown) == (1, 1, 1)
-        (one,) = follow_hints(store, recording, EVERY).detected[8]
+        (one,) = collect_follow_hints(store, recording, EVERY).detected[8]
         assert (one.x, one.y, one.diameter, one.score) == (108.5, 66.5, 9.0, 0.8)
-        assert follow_hints(store, recording, range(9, FRAMES)).detected == {}
+        assert collect_follow_hints(store, recording, range(9, FRAMES)).detected == {}
 
     def test_a_set_takes_the_place_of_one_of_its_name_and_stands_beside_others(
         self, store: Store, recording: Recording, tmp_path: Path
     ) -> None:
         for name, x in (("one", 10), ("other", 20), ("one", 30)):
             path = written(tmp_path / "seen.csv", (4, x, 62, 8, 8, 0.5))
-            read_boxes_of_file(store, recording, path, name, min_score=0.1, actor="ann")
-        found = boxes_in(store.settings, recording, EVERY)
+            import_boxes_from_file(store, recording, path, name, min_score=0.1, actor="ann")
+        found = read_detected_balls_in_frames(store.settings, recording, EVERY)
         assert [ball.x for ball in found[4]] == [24.0, 34.0]
 
     def test_the_surest_of_a_frame_are_kept(
@@ -89,8 +89,11 @@ class TestFile:
     ) -> None:
         rows = [(4, 10 * number, 62, 8, 8, number / 10) for number in range(1, 9)]
         path = written(tmp_path / "many.csv", *rows)
-        read_boxes_of_file(store, recording, path, "many", min_score=0.1, actor="ann")
-        scores = [ball.score for ball in boxes_in(store.settings, recording, EVERY)[4]]
+        import_boxes_from_file(store, recording, path, "many", min_score=0.1, actor="ann")
+        scores = [
+            ball.score
+            for ball in read_detected_balls_in_frames(store.settings, recording, EVERY)[4]
+        ]
         assert scores == [0.8, 0.7, 0.6, 0.5, 0.4][:MOST]
 
     def test_of_other_frames_is_refused(
@@ -98,19 +101,19 @@ class TestFile:
     ) -> None:
         path = written(tmp_path / "far.csv", (900, 1, 1, 9, 9, 0.9))
         with pytest.raises(InputError, match='no box for any frame of "ball"'):
-            read_boxes_of_file(store, recording, path, "far", min_score=0.1, actor="ann")
+            import_boxes_from_file(store, recording, path, "far", min_score=0.1, actor="ann")
 
     def test_lies_beside_the_index_and_is_told_where_it_is_damaged(
         self, store: Store, recording: Recording, tmp_path: Path
     ) -> None:
         path = written(tmp_path / "seen.csv", (8, 104, 62, 9, 9, 0.8))
-        read_boxes_of_file(store, recording, path, "seen", min_score=0.1, actor="ann")
+        import_boxes_from_file(store, recording, path, "seen", min_score=0.1, actor="ann")
         with store.read() as session:
             assert list_unused_frame_files(session, store.settings) == []
         (kept,) = store.settings.recordings.glob("*.balls.npz")
         kept.write_bytes(b"no boxes")
         with pytest.raises(StorageError, match="detections of ball are damaged"):
-            boxes_in(store.settings, recording, EVERY)
+            read_detected_balls_in_frames(store.settings, recording, EVERY)
 
 
 class TestDetector:
@@ -123,7 +126,7 @@ class TestDetector:
             min_score=0.2, actor="ann", progress=lambda done, *_: told.append(done),
         )  # fmt: skip
         assert kept.looked_at == 18 and told == list(range(18))
-        found = boxes_in(store.settings, recording, EVERY)
+        found = read_detected_balls_in_frames(store.settings, recording, EVERY)
         assert set(found) <= set(range(2, 20))
         near = [
             min(np.hypot(ball.x - x, ball.y - y) for ball in found[frame])

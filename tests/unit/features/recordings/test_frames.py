@@ -12,7 +12,7 @@ import pytest
 from app.config import Settings
 from app.features.recordings import frames as module
 from app.features.recordings.frames import AHEAD, BEHIND, read_ahead, read_jpeg
-from app.features.recordings.index import index_file
+from app.features.recordings.index import index_recording_file
 from app.media.video import FrameReader
 from tests.videos import number_of, write_video
 
@@ -30,7 +30,7 @@ def settings(tmp_path: Path) -> Iterator[Settings]:
 def film(tmp_path: Path, settings: Settings) -> tuple[Path, str]:
     """A film that is indexed, and its sha256."""
     path = write_video(tmp_path / "film.mp4", "mp4v", FRAMES)
-    facts, _ = index_file(path, settings, lambda _: None)
+    facts, _ = index_recording_file(path, settings, lambda _: None)
     return path, facts["sha256"]
 
 
@@ -143,7 +143,7 @@ class TestReadJpeg:
     ) -> None:
         for number in range(module.MOST_OPEN + 1):
             path = write_video(tmp_path / f"{number}.mp4", "mp4v", 20 + number)
-            facts, _ = index_file(path, settings, lambda _: None)
+            facts, _ = index_recording_file(path, settings, lambda _: None)
             read_jpeg(path, facts["sha256"], 3, None, settings)
         assert len(module._OPEN) == module.MOST_OPEN
         assert shown(read_jpeg(*film, 7, None, settings)) == 7

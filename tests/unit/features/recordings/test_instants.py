@@ -12,9 +12,9 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError, StorageError
 from app.features.recordings import instants as module
-from app.features.recordings.index import index_now
-from app.features.recordings.instants import require_instants, take_instants
-from app.features.recordings.service import Recording, add_recording, groups_taken
+from app.features.recordings.index import index_recording_in_worker
+from app.features.recordings.instants import make_groups_of_instants, validate_instant_frames
+from app.features.recordings.service import Recording, add_recording, find_groups_of_recording
 from tests.videos import write_video
 
 
@@ -26,11 +26,13 @@ def recording(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     shutil.rmtree(store.settings.recordings, ignore_errors=True)
     film = write_video(tmp_path / "final.mp4", "mp4v", 40)
     recording = add_recording(store, "cup", film, actor="ann")
-    return index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+    return index_recording_in_worker(
+        store, recording.id, progress=lambda *_: None, stop=lambda: None
+    )
 
 
 def take(store: Store, recording: Recording, *frames: int) -> module.TakenInstants:
-    return take_instants(store, recording.id, frames, False, "ann", lambda *_: None)
+    return make_groups_of_instants(store, recording.id, frames, False, "ann", lambda *_: None)
 
 
 class TestTakeInstants:
@@ -56,10 +58,10 @@ class TestTakeInstants:
             patch.setattr(module, "replace_file", replace_file)
             with pytest.raises(raised or type(error)):
                 take(store, recording, 5, 6, 7, 8)
-        assert sorted(groups_taken(store, recording)) == [5, 6]
+        assert sorted(find_groups_of_recording(store, recording)) == [5, 6]
         taken = take(store, recording, 5, 6, 7, 8)
         assert (taken.new, taken.unchanged) == (2, 2)
-        assert sorted(groups_taken(store, recording)) == [5, 6, 7, 8]
+        assert sorted(find_groups_of_recording(store, recording)) == [5, 6, 7, 8]
 
     def test_frames_are_kept_once_whoever_takes_them(
         self, store: Store, recording: Recording, monkeypatch: pytest.MonkeyPatch
@@ -68,20 +70,20 @@ class TestTakeInstants:
         folder = store.settings.recordings / str(recording.sha256)
         assert [path.name for path in folder.iterdir()] == ["3.png"]
         other = add_recording(store, "league", recording.path, actor="ann")
-        index_now(store, other.id, progress=lambda *_: None, stop=lambda: None)
+        index_recording_in_worker(store, other.id, progress=lambda *_: None, stop=lambda: None)
         monkeypatch.setattr(module, "replace_file", None)
-        assert take_instants(store, other.id, [3], False, "ann", lambda *_: None).new == 1
+        assert make_groups_of_instants(store, other.id, [3], False, "ann", lambda *_: None).new == 1
 
 
 class TestRequireInstants:
     def test_they_are_sorted_and_each_is_there_once(self, recording: Recording) -> None:
-        assert require_instants(recording, [7, 3, 7]) == [3, 7]
+        assert validate_instant_frames(recording, [7, 3, 7]) == [3, 7]
 
     def test_too_many_and_those_beyond_the_end_are_refused(
         self, recording: Recording, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with pytest.raises(InputError, match="its last one is 39"):
-            require_instants(recording, [40])
+            validate_instant_frames(recording, [40])
         monkeypatch.setattr(module, "MOST_AT_ONCE", 2)
         with pytest.raises(InputError, match="3 instants are too many"):
-            require_instants(recording, [1, 2, 3])
+            validate_instant_frames(recording, [1, 2, 3])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.db.store import Store
-from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.service import get_recording
 from app.geometry.camera import Camera
 from app.solving.sides import turn_camera
@@ -50,7 +50,7 @@ def track(store: Store, shot: int, cameras: list[Camera]) -> None:
     frames = [
         replace(frame(first + at, "tracked"), camera=camera) for at, camera in enumerate(cameras)
     ]
-    save_cameras(store, recording, (first, last), Tracked(frames, ()), [], "ann")
+    save_cameras(store, recording, (first, last), TrackedStretch(frames, ()), [], "ann")
 
 
 def suggested(api: Any, match: str) -> list[dict[str, Any]]:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.log import read_log
-from app.features.recordings.link_frames import nearest_frames
+from app.features.recordings.link_frames import find_nearest_frames
 from tests.unit.features.recordings.test_routes import picture_of
 from tests.videos import number_of, write_video
 
@@ -202,10 +202,10 @@ class TestSetInstants:
     ) -> None:
         from app.features.recordings import links
 
-        plain, store, written = links.map_of_instants, app.state.services.store, []
+        plain, store, written = links.fit_map_to_instants, app.state.services.store, []
 
         def write() -> None:
-            with store.write(), without_response():
+            with store.write(), without_pending_response():
                 written.append(True)
 
         def slow(*arguments: Any) -> Any:
@@ -214,7 +214,7 @@ class TestSetInstants:
             other.join(20)
             return plain(*arguments)
 
-        monkeypatch.setattr(links, "map_of_instants", slow)
+        monkeypatch.setattr(links, "fit_map_to_instants", slow)
         assert instants(api, link, (5, 30), (15, 50)).status_code == 200
         assert written == [True]
 
@@ -223,14 +223,14 @@ class TestSetInstants:
     ) -> None:
         from app.features.recordings import links
 
-        plain, faster = links.map_of_instants, iter([(4, 25)])
+        plain, faster = links.fit_map_to_instants, iter([(4, 25)])
 
         def slow(*arguments: Any) -> Any:
             for pair in faster:
                 assert instants(api, link, pair).status_code == 200
             return plain(*arguments)
 
-        monkeypatch.setattr(links, "map_of_instants", slow)
+        monkeypatch.setattr(links, "fit_map_to_instants", slow)
         assert instants(api, link, (5, 30), (15, 50)).status_code == 412
         assert [one["live"] for one in api.get(link).json()["instants"]] == [4]
 
@@ -242,7 +242,7 @@ class TestNearestFrames:
             live = np.arange(generator.integers(1, 40)) * 0.04
             replay = np.sort(generator.integers(0, 60, generator.integers(1, 60)) * 0.02)
             marked = generator.random(len(replay)) < 0.4
-            numbers, later = nearest_frames(live, replay, marked, 0.02)
+            numbers, later = find_nearest_frames(live, replay, marked, 0.02)
             for time, number, off in zip(live, numbers, later, strict=True):
                 apart = np.abs(replay - time)
                 if replay[0] - time > 0.02 or replay[-1] - time < -0.02:
@@ -257,7 +257,9 @@ class TestNearestFrames:
         count = 67_000
         replay = np.arange(count) * 0.02
         began = process_time()
-        numbers, _ = nearest_frames(np.arange(count) * 0.04, replay, np.zeros(count, bool), 0.02)
+        numbers, _ = find_nearest_frames(
+            np.arange(count) * 0.04, replay, np.zeros(count, bool), 0.02
+        )
         assert process_time() - began < 2
         assert (numbers[:5].tolist(), numbers[-1]) == ([0, 2, 4, 6, 8], -1)
 
@@ -284,7 +286,7 @@ class TestLinkedFrames:
             frames = range(first, last + 1)
             return link_frames.np.array([[n == 24 for n in frames], [n == 26 for n in frames]])
 
-        monkeypatch.setattr(link_frames, "_marks", marks)
+        monkeypatch.setattr(link_frames, "_read_repeat_and_blend_flags", marks)
         instants(api, link, (0, 20), (10, 50))
         found = api.get(f"{link}/frames").json()
         # Three frames of the replay are one live: 24 would be 1.33.

@@ -194,7 +194,7 @@ class TestShots:
         shots = api.get(f"{recording}/shots").json()
         for index in app.state.services.settings.recordings.glob("*.npz"):
             index.write_bytes(b"of another version")
-        module._seconds.cache_clear()
+        module._read_frame_times.cache_clear()
         assert api.get(f"{recording}/shots").status_code == 409
         assert finished(api.post(f"{recording}/shots")).state == "done"
         assert api.get(f"{recording}/shots").json() == shots

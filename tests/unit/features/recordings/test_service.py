@@ -12,12 +12,12 @@ from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
 from app.features.datasets.queries import list_unused_frame_files, list_unused_uploads
-from app.features.imports.upload_queries import UploadWriter, save_upload, upload_path
+from app.features.imports.upload_queries import UploadWriter, mark_upload_permanent, upload_path
 from app.features.jobs.service import Jobs
 from app.features.recordings import index
 from app.features.recordings import jobs as module
-from app.features.recordings.index import index_now
-from app.features.recordings.instants import take_instants
+from app.features.recordings.index import index_recording_in_worker
+from app.features.recordings.instants import make_groups_of_instants
 from app.features.recordings.jobs import (
     InstantOptions,
     request_index,
@@ -27,12 +27,12 @@ from app.features.recordings.jobs import (
 from app.features.recordings.service import (
     Recording,
     add_recording,
+    find_groups_of_recording,
     get_recording,
-    groups_taken,
     remove_recording,
-    require_video,
+    require_video_file,
 )
-from app.features.recordings.shots import Shot, get_shots, put_shots
+from app.features.recordings.shots import Shot, get_shots, replace_shots
 from tests.unit.features.jobs.steps import stopped_at_its_first_step
 from tests.videos import write_video
 from tests.waiting import SECONDS
@@ -45,7 +45,9 @@ def film(tmp_path: Path) -> Path:
 
 def indexed(store: Store, film: Path) -> Recording:
     recording = add_recording(store, "cup", film, actor="ann")
-    return index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+    return index_recording_in_worker(
+        store, recording.id, progress=lambda *_: None, stop=lambda: None
+    )
 
 
 class TestIndexNow:
@@ -54,7 +56,7 @@ class TestIndexNow:
     ) -> None:
         recording = indexed(store, film)
         mine = [Shot(0, 9, "main", "start", True)]
-        put_shots(store, recording.id, mine, None, actor="ann")
+        replace_shots(store, recording.id, mine, None, actor="ann")
         indexed(store, film)
         assert list(get_shots(store, recording.id).items) == mine
         write_video(film, "mp4v", 30)
@@ -65,7 +67,9 @@ class TestIndexNow:
         self, store: Store, film: Path
     ) -> None:
         def take(recording: Recording, *frames: int) -> int:
-            return take_instants(store, recording.id, frames, False, "ann", lambda *_: None).new
+            return make_groups_of_instants(
+                store, recording.id, frames, False, "ann", lambda *_: None
+            ).new
 
         first, kept = indexed(store, film), film.read_bytes()
         assert take(first, 5, 6) == 2
@@ -73,19 +77,19 @@ class TestIndexNow:
         write_video(film, "mp4v", 30)
         second = indexed(store, film)
         assert (second.name, second.groups) == ("final-2", 0)
-        assert groups_taken(store, second) == {}
+        assert find_groups_of_recording(store, second) == {}
         assert take(second, 5) == 1
         # The same video takes its groups up again, also where it lies elsewhere by now.
         again = film.with_name("other.mp4")
         again.write_bytes(kept)
         third = indexed(store, again)
-        assert (third.name, sorted(groups_taken(store, third))) == ("final", [5, 6])
+        assert (third.name, sorted(find_groups_of_recording(store, third))) == ("final", [5, 6])
 
     def test_groups_of_the_video_before_stay_when_a_file_is_replaced(
         self, store: Store, film: Path
     ) -> None:
         first = indexed(store, film)
-        take_instants(store, first.id, [5], False, "ann", lambda *_: None)
+        make_groups_of_instants(store, first.id, [5], False, "ann", lambda *_: None)
         write_video(film, "mp4v", 30)
         second = indexed(store, film)
         assert (second.id, second.name, second.groups) == (first.id, "final-2", 0)
@@ -101,20 +105,20 @@ class TestIndexNow:
 
         recording = add_recording(store, "cup", film, actor="ann")
         with pytest.raises(JobCancelled):
-            index_now(store, recording.id, progress=lambda *_: None, stop=cancelled)
+            index_recording_in_worker(store, recording.id, progress=lambda *_: None, stop=cancelled)
         assert not get_recording(store, recording.id).indexed
 
     def test_a_file_that_changes_meanwhile_is_refused(
         self, store: Store, film: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        plain = index.in_worker
+        plain = index.run_in_worker
 
         def slowly(path: Path, *rest: Any, **more: Any) -> Any:
             found = plain(path, *rest, **more)
             path.touch()
             return found
 
-        monkeypatch.setattr(index, "in_worker", slowly)
+        monkeypatch.setattr(index, "run_in_worker", slowly)
         with pytest.raises(ImageError, match="changed while it was read"):
             indexed(store, film)
 
@@ -141,7 +145,7 @@ class TestRequireVideo:
         (tmp_path / "films").mkdir()
         (tmp_path / "notes.txt").write_text("x")
         with pytest.raises(InputError, match="is not a video"):
-            require_video(tmp_path / name)
+            require_video_file(tmp_path / name)
 
 
 class TestUnused:
@@ -158,7 +162,7 @@ class TestUnused:
         writer = UploadWriter(store.settings, film.name)
         writer.write(film.read_bytes())
         upload = writer.finish()
-        save_upload(store.settings, upload.id)
+        mark_upload_permanent(store.settings, upload.id)
         with store.read() as session:
             assert upload.id in list_unused_uploads(session, store.settings)
         add_recording(store, "cup", upload_path(store.settings, upload.id), actor="ann")

@@ -14,7 +14,7 @@ from app.features.solutions.queries import (
     SolutionKey,
     _is_undetermined,
     decode_calibration,
-    decode_camera,
+    decode_calibration_without_markings,
     encode_calibration,
     encode_solution,
     insert_solutions,
@@ -22,7 +22,7 @@ from app.features.solutions.queries import (
     read_solutions,
     read_summary,
 )
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.solution import (
     Ball3D,
@@ -31,9 +31,9 @@ from app.soccer.solution import (
     Gate,
     MarkingFit,
     PaintFit,
-    Pair,
     Solution,
-    Suspect,
+    SuspectLabel,
+    TriangulatedPair,
     ViewSolution,
 )
 
@@ -54,14 +54,14 @@ def solution(full_camera) -> Solution:
             MarkingFit("Middle line", "tp", (0.5, THIRD), (point, point), THIRD),
             MarkingFit("Side line top", "fn", used=False),
         ),
-        suspects=(Suspect("Circle left", None, 0.5, 12.5),),
+        suspects=(SuspectLabel("Circle left", None, 0.5, 12.5),),
         covariance=tuple(float(value) for value in range(64)),
         unobservable=("focal length",),
     )
     fit = BallFit(point, 3.5, 0.25, 14.5, Box(1, 2, 3, 4), 0.1, None, 1.25, 80.0)
     none = BallFit(None, None, None, None, None, None, None, None, None)
     failed = Calibration(source="lines", camera=None, reason="no lines")
-    pair = Pair("7.png", "cam1", (1.0, 2.0, -0.5), (3.5, 2.0), 40.0, 75.0, True)
+    pair = TriangulatedPair("7.png", "cam1", (1.0, 2.0, -0.5), (3.5, 2.0), 40.0, 75.0, True)
     return Solution(
         views=(
             ViewSolution("7.png", calibration, "key-a", True, None, fit),
@@ -77,7 +77,9 @@ def solution(full_camera) -> Solution:
         ),
         findings=(
             Finding("low_parallax", "3 degrees", number=3.0, threshold=5.0),
-            Finding("bad_point", "off", "7.png", "Middle line", fix=Fix("drop_point", index=2)),
+            Finding(
+                "bad_point", "off", "7.png", "Middle line", fix=SuggestedFix("drop_point", index=2)
+            ),
             Finding("bad_point", "off too", "7.png"),
         ),
         policy_hash="policy",
@@ -182,11 +184,11 @@ class TestValueCodec:
         trap = ',"markings":[],"suspects":[]'
         fit = MarkingFit(trap, "tp", (0.1,), (ImagePoint(1.0, 2.0),), 34.0)
         told = Calibration(
-            "lines", None, trap, markings=(fit, fit), suspects=(Suspect(trap, None, 0.5, 3.0),)
+            "lines", None, trap, markings=(fit, fit), suspects=(SuspectLabel(trap, None, 0.5, 3.0),)
         )
         body = encode_calibration(told)
         assert decode_calibration(body) == told
-        assert decode_camera(body) == replace(told, markings=())
+        assert decode_calibration_without_markings(body) == replace(told, markings=())
 
     def test_a_type_without_a_codec_is_a_programming_error(self) -> None:
         with pytest.raises(TypeError, match="no codec"):

@@ -8,15 +8,15 @@ import pytest
 from sqlalchemy import text
 
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.queue.service import list_groups
 from app.features.solutions import service as module
 from app.features.solutions.queries import EncodedSolution
-from app.features.solutions.service import list_stale_groups, solve_dataset, solve_encoded
+from app.features.solutions.service import list_stale_groups, solve_and_encode, solve_dataset
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 
 
 def stumbling(
@@ -25,7 +25,7 @@ def stumbling(
     """A solver that one group breaks."""
     if group.key == "11":
         raise ZeroDivisionError("frame 11")
-    return solve_encoded(group, policy, calibrations)
+    return solve_and_encode(group, policy, calibrations)
 
 
 @pytest.fixture
@@ -43,29 +43,29 @@ class TestSolveDataset:
         assert list_stale_groups(store, "demo") == ids
         report = solve_dataset(store, "demo")
         assert (report.total, report.solved, report.passed) == (6, 6, 6)
-        state = load(store, ids[3])
-        assert state.solution == solve(state.group, state.policy)
+        state = load_group_state(store, ids[3])
+        assert state.solution == solve_group(state.group, state.policy)
         assert list_stale_groups(store, "demo") == []
         assert solve_dataset(store, "demo").total == 0
 
     def test_only_what_changed_is_solved_again(self, store, ids) -> None:
         solve_dataset(store, "demo")
-        state = load(store, ids[2])
-        submit(store, ids[2], set_ball("cam1", None), if_match=state.etag, actor="ann")
+        state = load_group_state(store, ids[2])
+        submit_edit(store, ids[2], set_ball("cam1", None), if_match=state.etag, actor="ann")
         assert list_stale_groups(store, "demo") == []
 
     def test_an_executor_makes_the_same(self, store, ids, small_chunks) -> None:
         with ThreadPoolExecutor(2) as executor:
             report = solve_dataset(store, "demo", executor)
         assert report.solved == 6
-        state = load(store, ids[5])
-        assert state.solution == solve(state.group, state.policy)
+        state = load_group_state(store, ids[5])
+        assert state.solution == solve_group(state.group, state.policy)
 
     def test_tasks_and_results_travel_to_other_processes(self, store, ids) -> None:
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
             assert solve_dataset(store, "demo", executor).solved == 6
-        state = load(store, ids[5])
-        assert state.solution == solve(state.group, state.policy)
+        state = load_group_state(store, ids[5])
+        assert state.solution == solve_group(state.group, state.policy)
 
     def test_progress_starts_at_nothing_and_ends_at_all(self, store, ids, small_chunks) -> None:
         calls: list[tuple[int, int]] = []
@@ -89,7 +89,7 @@ class TestSolveDataset:
         assert list_stale_groups(store, "demo") == ids[4:]
 
     def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids, monkeypatch) -> None:
-        monkeypatch.setattr(module, "solve_encoded", stumbling)
+        monkeypatch.setattr(module, "solve_and_encode", stumbling)
         report = solve_dataset(store, "demo")
         assert report.solved == 5
         assert report.failed == [("11", "ZeroDivisionError: frame 11")]
@@ -108,15 +108,15 @@ class TestSolveDataset:
     def test_a_change_under_way_leaves_the_group_stale(self, store, ids, monkeypatch) -> None:
         def change(group, policy, calibrations):
             if group.key == "12":
-                state = load(store, ids[2])
+                state = load_group_state(store, ids[2])
                 edit = set_ball("cam1", None)
                 if state.revision == 1:
-                    submit(store, ids[2], edit, if_match=state.etag, actor="ann")
-            return solve_encoded(group, policy, calibrations)
+                    submit_edit(store, ids[2], edit, if_match=state.etag, actor="ann")
+            return solve_and_encode(group, policy, calibrations)
 
-        monkeypatch.setattr(module, "solve_encoded", change)
+        monkeypatch.setattr(module, "solve_and_encode", change)
         solve_dataset(store, "demo")
-        state = load(store, ids[2])
-        assert state.solution == solve(state.group, state.policy)
+        state = load_group_state(store, ids[2])
+        assert state.solution == solve_group(state.group, state.policy)
         (row,) = list_groups(store, state.dataset_id, "key:12").items
         assert row.solved

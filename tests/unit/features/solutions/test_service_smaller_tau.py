@@ -8,13 +8,13 @@ import pytest
 from sqlalchemy import text
 
 from app.db.store import Store
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import service as recompute
 from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.databases import said_for_sqlite
 
 TIGHT = replace(PAPER, name="tight", tau_percent=0.6)
@@ -34,13 +34,13 @@ def ids(fill, make_group, make_static) -> list[int]:
 def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Keys of the groups that are solved from now on."""
     found: list[str] = []
-    plain = recompute.solve_encoded
+    plain = recompute.solve_and_encode
 
     def counted(group, policy, calibrations):
         found.append(group.key.rpartition("/")[2])
         return plain(group, policy, calibrations)
 
-    monkeypatch.setattr(recompute, "solve_encoded", counted)
+    monkeypatch.setattr(recompute, "solve_and_encode", counted)
     return found
 
 
@@ -63,14 +63,14 @@ class TestRetell:
         assert solved == ["3.png"]
         assert (report.total, report.solved, report.failed) == (4, 4, [])
         assert list_stale_groups(store, "demo") == []
-        state = load(store, ids[1])
-        assert state.solution == solve(state.group, state.policy)
+        state = load_group_state(store, ids[1])
+        assert state.solution == solve_group(state.group, state.policy)
 
     def test_makes_the_same_bytes_and_the_same_queue(self, store, ids, monkeypatch) -> None:
         judge(store, TIGHT)
         solve_dataset(store, "demo")
         told = rows(store, TIGHT.hash)
-        listed = list_groups(store, load(store, ids[0]).dataset_id, "").items
+        listed = list_groups(store, load_group_state(store, ids[0]).dataset_id, "").items
         with store.write() as session:
             session.execute(
                 text("DELETE FROM solution WHERE policy_hash = :policy"), {"policy": TIGHT.hash}
@@ -78,7 +78,7 @@ class TestRetell:
         monkeypatch.setattr(recompute, "make_rethreshold_tasks", lambda *_: iter(()))
         assert solve_dataset(store, "demo").solved == 4
         assert rows(store, TIGHT.hash) == told
-        assert list_groups(store, load(store, ids[0]).dataset_id, "").items == listed
+        assert list_groups(store, load_group_state(store, ids[0]).dataset_id, "").items == listed
 
     def test_starts_from_any_larger_tau_of_before(self, store, ids, solved) -> None:
         for policy in (TIGHT, BETWEEN):

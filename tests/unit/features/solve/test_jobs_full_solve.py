@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.features.pitches.service import list_matches_to_estimate
 from app.features.solutions.service import list_stale_groups
 from app.features.solve import jobs as full_solve
-from app.features.solve.jobs import count_yield, describe_pending_work, solve_fully
+from app.features.solve.jobs import describe_pending_work, refresh_yield_table, solve_fully
 from app.features.what_if import blocks as gathered
 
 
@@ -73,7 +73,7 @@ def test_the_yield_of_many_groups_is_counted_at_once(
         lambda session, rows: looked.extend(row.group_id for row in rows) or read(session, rows),
     )
     progress = Told()
-    count_yield(two, "demo", solve_fully(two, "demo", None, progress), progress)
+    refresh_yield_table(two, "demo", solve_fully(two, "demo", None, progress), progress)
     sentences = [sentence for *_, sentence in progress.calls if sentence]
     assert sentences == (["Counting what demo yields."] if counted else [])
     assert len(looked) == (2 if counted else 0)

@@ -17,7 +17,7 @@ from app.features.jobs.service import Jobs
 from app.features.solutions.service import SolveReport, list_stale_groups
 from app.features.solve import jobs as full_solve
 from app.features.solve import jobs as solve_job
-from app.features.solve.jobs import request_solve, resume_solving, solve_leftovers
+from app.features.solve.jobs import request_solve_job, resume_solving, solve_leftovers
 from tests.waiting import SECONDS
 
 
@@ -34,7 +34,7 @@ class TestRequestSolve:
     ) -> None:
         fill(make_group(7), make_group(8, shift=300.0), solved=False)
         found = get_dataset(store, "demo")
-        job = request_solve(jobs, store, found.id, actor="ann")
+        job = request_solve_job(jobs, store, found.id, actor="ann")
         assert (job.kind, job.dataset, job.result) == ("solve", "demo", None)
         done = jobs.wait(job.id, SECONDS)
         assert done.result == {
@@ -81,7 +81,7 @@ class TestRequestSolve:
         monkeypatch.setattr(solve_job, "solve_fully", solve)
         fill(make_group(7), make_group(8), solved=solved)
         found = get_dataset(store, "demo")
-        job = request_solve(jobs, store, found.id, actor="ann", edited=edited)
+        job = request_solve_job(jobs, store, found.id, actor="ann", edited=edited)
         jobs.wait(job.id, SECONDS)
         assert asked == [follows]
 
@@ -98,7 +98,7 @@ class TestRequestSolve:
         monkeypatch.setattr(solve_job, "MATCHES_WORTH_A_POOL", worth)
         fill(*(replace(make_group(number), match=f"{number}") for number in (7, 8)), solved=True)
         jobs = Jobs(store, pool=pool)
-        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
+        job = request_solve_job(jobs, store, get_dataset(store, "demo").id, actor="ann")
         jobs.wait(job.id, SECONDS)
         assert len(pools) == made
         jobs.close()
@@ -116,7 +116,7 @@ class TestRequestSolve:
         monkeypatch.setattr(solve_job, "WORTH_A_POOL", worth)
         fill(make_group(7), make_group(8), solved=False)
         jobs = Jobs(store, pool=pool)
-        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
+        job = request_solve_job(jobs, store, get_dataset(store, "demo").id, actor="ann")
         assert jobs.wait(job.id, SECONDS).result["solved"] == 2
         assert len(pools) == made
         jobs.close()
@@ -127,7 +127,7 @@ class TestRequestSolve:
         fill(make_group(), solved=False)
         report = SolveReport(total=1, failed=[("a/7.png", "ValueError: odd")])
         monkeypatch.setattr(full_solve, "solve_dataset", lambda *_, **__: report)
-        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
+        job = request_solve_job(jobs, store, get_dataset(store, "demo").id, actor="ann")
         result = jobs.wait(job.id, SECONDS).result
         assert result["failures"] == [{"group": "a/7.png", "problem": "ValueError: odd"}]
 
@@ -142,7 +142,7 @@ class TestRequestSolve:
         jobs.submit("bulk", "Slow", slow, actor="ann")
         assert started.wait(SECONDS)
         found = get_dataset(store, "demo")
-        ids = {request_solve(jobs, store, found.id, actor=name).id for name in ("ann", "bob")}
+        ids = {request_solve_job(jobs, store, found.id, actor=name).id for name in ("ann", "bob")}
         assert len(ids) == 1
         finish.set()
 
@@ -165,7 +165,7 @@ class TestSolveLeftovers:
         first = Jobs(store)
         with monkeypatch.context() as patch:
             patch.setattr(full_solve, "solve_dataset", stopping)
-            job = request_solve(first, store, get_dataset(store, "demo").id, actor="ann")
+            job = request_solve_job(first, store, get_dataset(store, "demo").id, actor="ann")
             assert started.wait(SECONDS)
             first.close()
         second = Jobs(store)

@@ -6,20 +6,25 @@ import pytest
 
 from app.errors import ConflictError, NotFoundError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
-from app.features.stations.service import load_station, redo_station, submit_station, undo_station
+from app.features.stations.service import (
+    load_station,
+    redo_station,
+    submit_station_edit,
+    undo_station,
+)
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.unit.features.pending import stored_by
 
 EDIT = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
 
 
 def change(store, state, edit=EDIT, **more):
-    return submit_station(store, state.id, edit, if_match=state.etag, actor="ann", **more)
+    return submit_station_edit(store, state.id, edit, if_match=state.etag, actor="ann", **more)
 
 
 @pytest.fixture
@@ -29,21 +34,21 @@ def ids(fill, make_static) -> list[int]:
 
 @pytest.fixture
 def station(store, ids):
-    return load_station(store, load(store, ids[0]).station_ids["cam1"])
+    return load_station(store, load_group_state(store, ids[0]).station_ids["cam1"])
 
 
 class TestSubmitStation:
     def test_changes_the_station_in_every_group_and_makes_them_stale(
         self, store, ids, station
     ) -> None:
-        before = [load(store, number) for number in ids]
+        before = [load_group_state(store, number) for number in ids]
         after = change(store, station)
         assert after.groups == tuple(ids)
         assert after.station.lines["Middle line"] == EDIT.lines["Middle line"]
         assert (after.revision, after.can_undo) == (2, True)
         assert list_stale_groups(store, "demo") == ids
         for old, number in zip(before, ids, strict=True):
-            new = load(store, number)
+            new = load_group_state(store, number)
             assert new.group.view("cam1").station == after.station
             assert new.solution is None
             assert new.etag != old.etag
@@ -67,19 +72,19 @@ class TestSubmitStation:
         ((shown, within),) = kept
         assert within
         assert after.shown is shown
-        assert shown == load(store, ids[1])
-        assert shown.solution == solve(shown.group, shown.policy)
-        assert load(store, ids[0]).solution is None
+        assert shown == load_group_state(store, ids[1])
+        assert shown.solution == solve_group(shown.group, shown.policy)
+        assert load_group_state(store, ids[0]).solution is None
 
     def test_a_verdict_becomes_stale_and_is_kept(self, store, ids, station) -> None:
-        state = load(store, ids[0])
+        state = load_group_state(store, ids[0])
         accepted = set_verdict(store, ids[0], "deferred", if_match=state.etag, actor="ann")
         assert not accepted.verdict.stale
         after = change(store, station)
-        assert load(store, ids[0]).verdict.stale
+        assert load_group_state(store, ids[0]).verdict.stale
         assert [row.stale for row in list_groups(store, 1).items] == [True, False, False, False]
         undo_station(store, station.id, if_match=after.etag, actor="ann")
-        assert not load(store, ids[0]).verdict.stale
+        assert not load_group_state(store, ids[0]).verdict.stale
 
     def test_a_station_of_one_view_is_edited_there(self, store, state) -> None:
         own = load_station(store, next(iter(state.station_ids.values())))
@@ -96,7 +101,7 @@ class TestSubmitStation:
 
     def test_hundreds_of_groups_are_brought_in_step_at_once(self, store, fill, make_static) -> None:
         ids = fill(*(make_static(frame) for frame in range(300)), solved=False)[:1]
-        station = load_station(store, load(store, ids[0]).station_ids["cam1"])
+        station = load_station(store, load_group_state(store, ids[0]).station_ids["cam1"])
         start = time.process_time()
         after = change(store, station)
         assert len(after.groups) == 300
@@ -105,13 +110,13 @@ class TestSubmitStation:
 
 class TestUndoStation:
     def test_leads_back_to_solutions_that_are_there(self, store, ids, station) -> None:
-        before = load(store, ids[0])
+        before = load_group_state(store, ids[0])
         after = change(store, station)
         back = undo_station(store, station.id, if_match=after.etag, actor="ann")
         assert back.station == station.station
         assert (back.can_undo, back.can_redo) == (False, True)
         assert list_stale_groups(store, "demo") == []
-        assert load(store, ids[0]).solution == before.solution
+        assert load_group_state(store, ids[0]).solution == before.solution
         again = redo_station(store, station.id, if_match=back.etag, actor="ann")
         assert again.station == after.station
 

@@ -11,10 +11,10 @@ import pytest
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
-from app.features.groups.submit import load
-from app.features.tracks.around import AROUND, track_around, tracks_of_group
-from app.features.tracks.codec import TrackInputs, make_part
-from app.features.tracks.making import read_records
+from app.features.groups.submit import load_group_state
+from app.features.tracks.around import AROUND, compute_track_excerpt, find_tracks_of_group
+from app.features.tracks.codec import TrackInputs, make_partial_track
+from app.features.tracks.making import read_export_records
 from app.features.tracks.queries import TrackGroup
 from app.features.tracks.service import list_tracks, make_tracks, read_track
 from app.features.verdicts.service import set_verdict
@@ -36,7 +36,7 @@ def track(store: Store, flight: list[int]) -> int:
 
 
 def at_frame(store: Store, track: int) -> np.ndarray:
-    detail = track_around(store, track, FIRST + AT)
+    detail = compute_track_excerpt(store, track, FIRST + AT)
     (row,) = np.flatnonzero(detail.ball.frames == FIRST + AT)
     return np.asarray(detail.ball.position[row])
 
@@ -51,7 +51,7 @@ class TestTrackAround:
         self, store: Store, flight: list[int], track: int
     ) -> None:
         move(store, flight[AT], 60.0)
-        detail = track_around(store, track, FIRST + AT)
+        detail = compute_track_excerpt(store, track, FIRST + AT)
         (changed,) = list_tracks(store, "demo")
         assert changed.stale
         frames = [
@@ -64,21 +64,21 @@ class TestTrackAround:
     def test_reads_what_changed_and_keeps_the_rest(
         self, store: Store, flight: list[int], track: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        track_around(store, track, FIRST + AT)
+        compute_track_excerpt(store, track, FIRST + AT)
         asked: list[str] = []
 
         def reading(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
             asked.extend(group.key for group in groups)
-            return read_records(session, groups)
+            return read_export_records(session, groups)
 
-        monkeypatch.setattr("app.features.tracks.around.read_records", reading)
+        monkeypatch.setattr("app.features.tracks.around.read_export_records", reading)
         move(store, flight[AT], 47.0)
-        detail = track_around(store, track, FIRST + AT)
+        detail = compute_track_excerpt(store, track, FIRST + AT)
         assert [int(key) for key in asked] == [FIRST + AT]
         assert len(detail.ball.contradicted) == 1
 
     def test_has_no_frames_beyond_those_of_the_track(self, store: Store, track: int) -> None:
-        detail = track_around(store, track, FIRST)
+        detail = compute_track_excerpt(store, track, FIRST)
         assert detail.ball.frames[0] == FIRST
         assert AROUND <= len(detail.ball.frames) < 60
 
@@ -86,20 +86,20 @@ class TestTrackAround:
         for group in flight:
             set_verdict(
                 store, group, "rejected", "ball_not_visible",
-                if_match=load(store, group).etag, actor="ann",
+                if_match=load_group_state(store, group).etag, actor="ann",
             )  # fmt: skip
-        detail = track_around(store, track, FIRST + AT)
+        detail = compute_track_excerpt(store, track, FIRST + AT)
         assert detail.ball.reason == "No group near this frame is part of the track."
 
     def test_is_of_the_worst_frame_where_none_is_named(self, store: Store, track: int) -> None:
         (worst,) = [found.summary.worst for found in list_tracks(store, "demo")]
-        assert track_around(store, track).frame == worst
+        assert compute_track_excerpt(store, track).frame == worst
 
     def test_refuses_what_it_does_not_have(self, store: Store, track: int) -> None:
         with pytest.raises(InputError, match="frame 3 is not in the track"):
-            track_around(store, track, 3)
+            compute_track_excerpt(store, track, 3)
         with pytest.raises(NotFoundError, match="there is no track 99"):
-            track_around(store, 99, FIRST)
+            compute_track_excerpt(store, 99, FIRST)
 
 
 class TestInexactCamera:
@@ -114,9 +114,9 @@ class TestInexactCamera:
 
         def part(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
             told.append(known)
-            return make_part(inputs, known)
+            return make_partial_track(inputs, known)
 
-        monkeypatch.setattr("app.features.tracks.around.make_part", part)
+        monkeypatch.setattr("app.features.tracks.around.make_partial_track", part)
         whole = read_track(store, track.id).ball.position[AT]
         assert np.linalg.norm(at_frame(store, track.id) - whole) < 0.05
         assert told == [ViewErrors(track.summary.noise, track.summary.late)]
@@ -135,10 +135,10 @@ def with_a_low_camera(group: Group) -> Group:
 
 class TestTracksOfGroup:
     def test_are_those_of_its_frame(self, store: Store, flight: list[int], track: int) -> None:
-        (found,) = tracks_of_group(store, flight[7])
+        (found,) = find_tracks_of_group(store, flight[7])
         assert (found.track.id, found.frame) == (track, FIRST + 7)
 
     def test_are_none_before_somebody_made_them(self, store: Store, flight: list[int]) -> None:
-        assert tracks_of_group(store, flight[7]) == []
+        assert find_tracks_of_group(store, flight[7]) == []
         with pytest.raises(NotFoundError):
-            tracks_of_group(store, 999)
+            find_tracks_of_group(store, 999)

@@ -10,14 +10,14 @@ from app.errors import DamagedError
 from app.features.tracks.codec import (
     TRACK_VERSION,
     TrackInputs,
-    correct,
-    corrected,
-    inputs_digest,
+    apply_corrections,
+    digest_inputs,
     inputs_from_json,
     inputs_to_json,
     make_track,
     patches_from_json,
     patches_to_json,
+    solve_corrections,
     track_from_json,
     track_to_json,
 )
@@ -26,14 +26,14 @@ from app.formats.export_record import ExportRecord
 from app.json_text import canonical_json_text
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from app.tracking.ball_track import (
     BallEvent,
     BallTrack,
-    Contradiction,
-    Correction,
-    LeftOut,
-    Untracked,
+    ContradictingMeasurement,
+    EventCorrection,
+    LeaveOneOutSummary,
+    UntrackedRun,
     ViewJump,
 )
 from tests.flights import FIRST, flight_groups, places
@@ -42,7 +42,9 @@ from tests.unit.tracking.test_ball_solve import BOTH, FRAMES, TIMES, seen
 
 @pytest.fixture(scope="module")
 def inputs() -> TrackInputs:
-    records = [ExportRecord(item, solve(item, PAPER), "unreviewed") for item in flight_groups(60)]
+    records = [
+        ExportRecord(item, solve_group(item, PAPER), "unreviewed") for item in flight_groups(60)
+    ]
     (stretch,) = gather_stretches(records, PAPER)
     return TrackInputs.of(stretch)
 
@@ -71,14 +73,14 @@ class TestInputs:
     def test_come_back_with_the_same_digest(self, inputs) -> None:
         value = inputs_to_json(inputs)
         assert len(value["cameras"]) == 4
-        assert inputs_digest(inputs_from_json(value)) == inputs_digest(inputs)
+        assert digest_inputs(inputs_from_json(value)) == digest_inputs(inputs)
 
     def test_a_moved_ball_and_a_correction_have_another_digest(self, inputs) -> None:
         pixels = inputs.measurements.pixels.copy()
         pixels[0, 0] += 1e-9
         moved = replace(inputs, measurements=replace(inputs.measurements, pixels=pixels))
-        said = replace(inputs, corrections=(Correction(FIRST, "kick", True),))
-        assert len({inputs_digest(item) for item in (inputs, moved, said)}) == 3
+        said = replace(inputs, corrections=(EventCorrection(FIRST, "kick", True),))
+        assert len({digest_inputs(item) for item in (inputs, moved, said)}) == 3
 
     def test_what_was_not_written_so_is_damage(self, inputs) -> None:
         with pytest.raises(DamagedError):
@@ -94,10 +96,10 @@ class TestTrackJson:
             track,
             position=position,
             events=(BallEvent(FIRST, 4.0, "kick", np.array([1.0, 2.0, 1 / 3]), 0.02),),
-            contradicted=(Contradiction(3, 9.5, "off"),),
-            left_out=LeftOut(px, px, 1.5, 1.5, 1),
+            contradicted=(ContradictingMeasurement(3, 9.5, "off"),),
+            left_out=LeaveOneOutSummary(px, px, 1.5, 1.5, 1),
             offsets=(("cam2", 0.04),),
-            untracked=(Untracked(FIRST, FIRST + 3, 5, "They contradict each other."),),
+            untracked=(UntrackedRun(FIRST, FIRST + 3, 5, "They contradict each other."),),
             jumps=(ViewJump(FIRST + 2, 4.08, 0.5, ("cam1", "cam2")),),
         )
         again = track_from_json(track_to_json(whole))
@@ -114,22 +116,24 @@ class TestTrackJson:
 
 class TestCorrections:
     def test_patches_come_back_bit_for_bit(self, inputs, track) -> None:
-        said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
-        patches = correct(said, track)
+        said = replace(inputs, corrections=(EventCorrection(FIRST + 8, "kick", True),))
+        patches = solve_corrections(said, track)
         again = patches_from_json(json.loads(canonical_json_text(patches_to_json(patches))))
         assert len(patches) == 1
-        assert equal(corrected(said, track, again), corrected(said, track, patches))
+        assert equal(apply_corrections(said, track, again), apply_corrections(said, track, patches))
 
     def test_a_stored_track_is_corrected_as_a_fresh_one(self, inputs, track) -> None:
-        said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
+        said = replace(inputs, corrections=(EventCorrection(FIRST + 8, "kick", True),))
         stored = track_from_json(json.loads(canonical_json_text(track_to_json(track))))
-        assert equal(corrected(said, stored, correct(said, stored)), make_track(said))
+        assert equal(
+            apply_corrections(said, stored, solve_corrections(said, stored)), make_track(said)
+        )
 
 
 def pinned() -> TrackInputs:
     """A made ball before two cameras, part of its way before one, with a correction."""
     measured = seen(BOTH, hide=[("left", 60, 90), ("right", 100, 106)])
-    said = (Correction(130, "kick", True), Correction(231, "bounce", False))
+    said = (EventCorrection(130, "kick", True), EventCorrection(231, "bounce", False))
     return TrackInputs(FRAMES, TIMES, Pitch(), measured, said)
 
 

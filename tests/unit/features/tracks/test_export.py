@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.features.exports.service import export_dataset, require_possible
-from app.features.groups.submit import load
+from app.features.exports.service import export_dataset, require_exportable
+from app.features.groups.submit import load_group_state
 from app.features.verdicts.service import set_verdict
 from tests.flights import FIRST, flight_groups, places
 
@@ -29,7 +29,7 @@ class TestExport:
     def test_tracks_go_out_though_nobody_accepted_a_group(
         self, store, flight, tmp_path: Path
     ) -> None:
-        require_possible(store, "demo", "tracks")
+        require_exportable(store, "demo", "tracks")
         report = export_dataset(store, "demo", "tracks", tmp_path / "out")
         assert (report.counts["tracks"], report.counts["frames"]) == (1, 60)
         found = rows(tmp_path / "out/ball.csv")
@@ -54,7 +54,7 @@ class TestExport:
     def test_a_rejected_group_takes_part_with_all_alone(
         self, store, flight, tmp_path: Path
     ) -> None:
-        etag = load(store, flight[0]).etag
+        etag = load_group_state(store, flight[0]).etag
         set_verdict(store, flight[0], "rejected", "other", note="no ball", if_match=etag, actor="a")
         export_dataset(store, "demo", "tracks", tmp_path / "out")
         export_dataset(store, "demo", "tracks", tmp_path / "all", everything=True)
@@ -80,5 +80,5 @@ class TestExport:
     ) -> None:
         fill(make_group())
         with pytest.raises(InputError, match="follow each other in time") as caught:
-            require_possible(store, "demo", "tracks")
+            require_exportable(store, "demo", "tracks")
         assert caught.value.hint is not None

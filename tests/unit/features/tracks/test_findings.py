@@ -13,10 +13,10 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
-from app.features.findings.service import FindingName, iterate_findings_as_json, set_dismissal
+from app.features.findings.service import FindingReference, iterate_findings_as_json, set_dismissal
 from app.features.groups.edit import set_ball
 from app.features.groups.history import undo_group_edit
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.suggested_edits import list_edits_of_finding
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
@@ -33,7 +33,7 @@ from app.features.tracks.service import (
 from app.features.tracks.tables import TrackModel
 from app.soccer.finding import TRACK_DISAGREES, Finding
 from app.soccer.frames import ImagePoint
-from app.tracking.ball_track import Correction
+from app.tracking.ball_track import EventCorrection
 from tests.flights import FIRST, places
 from tests.rigs import TRUTH
 from tests.unit.features.tracks.test_service import move
@@ -58,7 +58,7 @@ def told(store: Store) -> list[tuple[str, str | None]]:
 
 
 def of_group(store: Store, group: int) -> Finding:
-    solution = load(store, group).solution
+    solution = load_group_state(store, group).solution
     assert solution is not None
     (found,) = [item for item in solution.findings if item.kind == TRACK_DISAGREES]
     return found
@@ -84,7 +84,7 @@ def rows(store: Store) -> list[tuple[int, int | None]]:
 
 class TestFindings:
     def test_name_the_ball_and_where_the_track_is_seen(self, store: Store, beside: int) -> None:
-        view = load(store, beside).group.views[0].key
+        view = load_group_state(store, beside).group.views[0].key
         assert told(store) == [(str(FIRST + AT), view)]
         found = of_group(store, beside)
         assert found.sentence.startswith("It lies ")
@@ -101,7 +101,7 @@ class TestFindings:
     def test_offer_to_move_the_ball_or_to_leave_the_view_out(
         self, store: Store, beside: int
     ) -> None:
-        state, found = load(store, beside), of_group(store, beside)
+        state, found = load_group_state(store, beside), of_group(store, beside)
         moved, left_out = list_edits_of_finding(state.group, found)
         assert (moved.label, left_out.label) == ("Move the ball there", "Leave it out")
         center = moved.edit.apply(state.group).views[0].ball.center
@@ -111,9 +111,9 @@ class TestFindings:
     def test_go_with_the_edit_that_mends_and_come_back_with_its_undo(
         self, store: Store, beside: int
     ) -> None:
-        state = load(store, beside)
+        state = load_group_state(store, beside)
         moved = list_edits_of_finding(state.group, of_group(store, beside))[0]
-        after = submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
+        after = submit_edit(store, beside, moved.edit, if_match=state.etag, actor="ann")
         assert told(store) == []
         with store.read() as session:
             assert find_outdated_rows(session)[1] == []
@@ -125,9 +125,9 @@ class TestFindings:
     def test_are_gone_when_the_track_is_made_without_a_reason_for_them(
         self, store: Store, beside: int
     ) -> None:
-        state = load(store, beside)
+        state = load_group_state(store, beside)
         moved = list_edits_of_finding(state.group, of_group(store, beside))[0]
-        submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
+        submit_edit(store, beside, moved.edit, if_match=state.etag, actor="ann")
         solve_dataset(store, "demo")
         make(store)
         assert told(store) == []
@@ -143,16 +143,16 @@ class TestFindings:
 
     def test_pass_over_a_ball_that_was_moved_since(self, store: Store, beside: int) -> None:
         judge(store, "rejected")
-        state = load(store, beside)
+        state = load_group_state(store, beside)
         ball = state.group.views[0].ball
         away = set_ball(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
-        submit(store, beside, away, if_match=state.etag, actor="ann")
+        submit_edit(store, beside, away, if_match=state.etag, actor="ann")
         judge(store, "none")
         assert told(store) == []
 
     def test_are_checked_off_and_stay_so(self, store: Store, beside: int) -> None:
-        found, state = of_group(store, beside), load(store, beside)
-        name = FindingName(found.kind, found.view)
+        found, state = of_group(store, beside), load_group_state(store, beside)
+        name = FindingReference(found.kind, found.view)
         set_dismissal(store, beside, name, dismissed=True, if_match=state.etag, actor="ann")
         make(store)
         rows = list_groups(store, dataset_id(store, "demo"), f"dismissed:{TRACK_DISAGREES}")
@@ -215,14 +215,14 @@ class TestMeanwhile:
             if len(turns) < making.TRIES - 1:
                 turns.append(FIRST + 30 + len(turns))
                 (track,) = list_tracks(store, "demo")
-                said = tuple(Correction(frame, "kick", True) for frame in turns)
+                said = tuple(EventCorrection(frame, "kick", True) for frame in turns)
                 change_track(
                     store, track.id, TrackChange(corrections=said), track.etag, actor="ben"
                 )
             return read(*given)
 
         move(store, beside, 30.0)
-        monkeypatch.setattr(making, "corrected", corrected_meanwhile)
+        monkeypatch.setattr(making, "apply_corrections", corrected_meanwhile)
         make(store)
         (track,) = list_tracks(store, "demo")
         assert [item.frame for item in track.corrections] == turns == [FIRST + 30, FIRST + 31]
@@ -230,13 +230,13 @@ class TestMeanwhile:
     def test_a_track_that_is_deleted_comes_back(
         self, store: Store, beside: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        digest = making.inputs_digest
+        digest = making.digest_inputs
 
         def deleted_meanwhile(*given: Any) -> Any:
             with store.write() as session:
                 session.execute(delete(TrackModel))
             return digest(*given)
 
-        monkeypatch.setattr(making, "inputs_digest", deleted_meanwhile)
+        monkeypatch.setattr(making, "digest_inputs", deleted_meanwhile)
         make(store)
         assert [track.key for track in list_tracks(store, "demo")] == ["rig"]

@@ -18,8 +18,8 @@ from app.features.independent_annotations.tables import GoldModel
 from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.recordings.follow import BallFollower
 from app.features.tracks import follow
-from app.features.tracks.follow import FollowedViews, follow_view, plan_follow
-from app.features.tracks.queries import place_of_group
+from app.features.tracks.follow import FollowedViews, follow_ball_from_view, plan_ball_following
+from app.features.tracks.queries import find_group_location
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -62,7 +62,7 @@ class TestFollowView:
         self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert (found.group, found.camera, found.frame) == (str(CLICKED), CAMERA, CLICKED)
         assert (found.before, found.after, found.sized) == ("end", "end", True)
         numbers = [number for number in range(FIRST, FIRST + COUNT) if number != CLICKED]
@@ -77,7 +77,7 @@ class TestFollowView:
     ) -> None:
         every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED], video=True)
         ids = fill(*(group for group in every if int(group.key) % 5 == 0))
-        found = follow_view(store, frames, view_of(store, ids[2]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[2]))
         assert [item.frame - FIRST for item in found.items] == [0, 5, 15, 20]
         assert max(off(found).values()) < 1.0
 
@@ -88,7 +88,7 @@ class TestFollowView:
         ids = fill(*(group for group in every if int(group.key) % 5 == 0))
         for number in (FIRST + 7, FIRST + 12, FIRST + 13):
             (folder / CAMERA / f"{number:06d}.jpg").unlink()
-        found = follow_view(store, frames, view_of(store, ids[2]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[2]))
         assert [item.frame - FIRST for item in found.items] == [0, 5, 15, 20]
         assert max(off(found).values()) < 1.0
 
@@ -97,7 +97,7 @@ class TestFollowView:
     ) -> None:
         said = [FIRST + 6, CLICKED, FIRST + 14]
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=said))
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert (found.before, found.after) == ("known", "known")
         assert [item.frame - FIRST for item in found.items] == [7, 8, 9, 11, 12, 13]
 
@@ -109,7 +109,7 @@ class TestFollowView:
         assert gone is not None
         groups[13] = groups[13].with_view(replace(gone, balls=(BallAnnotation(out_of_view=True),)))
         ids = fill(*groups)
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert found.items[-1].frame == FIRST + 12
         assert (found.before, found.after) == ("end", "known")
 
@@ -121,9 +121,9 @@ class TestFollowView:
         assert view is not None and view.ball is not None
         groups[13] = groups[13].with_view(replace(view, balls=(replace(view.ball, inferred=True),)))
         ids = fill(*groups)
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert (found.items[-1].frame, found.after) == (FIRST + 12, "known")
-        assert not plan_follow(store, view_of(store, ids[10])).sequence.clicks
+        assert not plan_ball_following(store, view_of(store, ids[10])).sequence.clicks
 
     def test_a_view_that_is_left_out_gets_no_ball(
         self, store: Store, fill: Fill, frames: BallFollower, folder: Path
@@ -133,7 +133,7 @@ class TestFollowView:
         assert view is not None
         groups[12] = groups[12].with_view(replace(view, included=False))
         ids = fill(*groups)
-        found = follow_view(store, frames, view_of(store, ids[10]), each_way=3)
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]), each_way=3)
         assert [item.frame - CLICKED for item in found.items] == [-3, -2, -1, 1, 3]
 
     def test_groups_of_another_sequence_of_the_match_are_no_neighbours(
@@ -145,7 +145,7 @@ class TestFollowView:
             for index, group in enumerate(groups)
         ]
         ids = fill(*keyed)
-        assert len(plan_follow(store, view_of(store, ids[0])).states) == 3
+        assert len(plan_ball_following(store, view_of(store, ids[0])).states) == 3
 
     def test_the_most_groups_are_told_as_a_limit(
         self,
@@ -157,7 +157,7 @@ class TestFollowView:
     ) -> None:
         monkeypatch.setattr(follow, "MOST_GROUPS", 4)
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert (found.before, found.after) == ("limit", "limit")
 
     def test_groups_that_are_hidden_from_whoever_asks_take_no_part(
@@ -166,7 +166,7 @@ class TestFollowView:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED, FIRST + 13]))
         view = view_of(store, ids[10])
         with store.write() as session:
-            dataset = place_of_group(session, ids[13]).dataset_id
+            dataset = find_group_location(session, ids[13]).dataset_id
             gold = {"group_id": ids[13], "dataset_id": dataset, "start": "bare"}
             session.execute(
                 insert(GoldModel), {**gold, "truth": b"", "marked": "x", "marked_by": "lea"}
@@ -174,18 +174,18 @@ class TestFollowView:
         blind = RestrictedReader("ann", {dataset: frozenset({1})}, lambda _: False)
         token = READER.set(blind)
         try:
-            found = follow_view(store, frames, view, each_way=5)
+            found = follow_ball_from_view(store, frames, view, each_way=5)
         finally:
             READER.reset(token)
         assert [item.frame - CLICKED for item in found.items] == [-5, -4, -3, -2, -1, 1, 2, 4, 5]
         assert found.after == "limit"
-        assert follow_view(store, frames, view, each_way=5).after == "known"
+        assert follow_ball_from_view(store, frames, view, each_way=5).after == "known"
 
     def test_as_far_as_is_asked(
         self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
-        found = follow_view(store, frames, view_of(store, ids[10]), each_way=3)
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]), each_way=3)
         assert [item.frame - CLICKED for item in found.items] == [-3, -2, -1, 1, 2, 3]
         assert (found.before, found.after) == ("limit", "limit")
 
@@ -195,7 +195,7 @@ class TestFollowView:
         hidden = range(FIRST + 18, FIRST + 60)
         groups = filmed_groups(folder, 60, CAMERA, said=[CLICKED], others=False, hidden=hidden)
         ids = fill(*groups)
-        found = follow_view(store, frames, view_of(store, ids[10]))
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
         assert found.after == "lost"
         assert {item.frame for item in found.items if item.ball.state == "followed"} <= set(
             range(FIRST, FIRST + 18)
@@ -207,12 +207,12 @@ class TestFollowView:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[]))
         view = view_of(store, ids[10])
         with pytest.raises(InputError, match="view cam1 has no ball"):
-            follow_view(store, frames, view)
+            follow_ball_from_view(store, frames, view)
         x, y = centers(COUNT, CAMERA)[CLICKED]
-        found = follow_view(store, frames, view, ImagePoint(x + 1.5, y - 1), 4)
+        found = follow_ball_from_view(store, frames, view, ImagePoint(x + 1.5, y - 1), 4)
         assert max(off(found).values()) < 1.0
         with pytest.raises(InputError, match="looks like a ball"):
-            follow_view(store, frames, view, ImagePoint(x + 200, y - 100), 4)
+            follow_ball_from_view(store, frames, view, ImagePoint(x + 200, y - 100), 4)
 
 
 def broken(groups: Sequence[Group], **station: object) -> list[Group]:
@@ -229,7 +229,7 @@ def broken(groups: Sequence[Group], **station: object) -> list[Group]:
 class TestRefusals:
     def refused(self, store: Store, frames: BallFollower, group: int) -> str:
         with pytest.raises((InputError, NotFoundError, ImageError, ConflictError)) as error:
-            follow_view(store, frames, view_of(store, group))
+            follow_ball_from_view(store, frames, view_of(store, group))
         return error.value.message
 
     def test_of_a_camera_that_moves(
@@ -283,7 +283,7 @@ class TestRefusals:
     ) -> None:
         ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
         with store.read() as session:
-            place = place_of_group(session, ids[0])
+            place = find_group_location(session, ids[0])
         assert place is not None
         monkeypatch.setattr(follow, "COPIES", place.dataset_id - 1)
         assert "no ball is followed" in self.refused(store, frames, ids[0])

@@ -15,15 +15,15 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.integrity.records import examine_versions
-from app.features.tracks.codec import TRACK_VERSION, track_again
+from app.features.tracks.codec import TRACK_VERSION, recompute_frozen_track
 from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
+from app.features.versions.frozen_queries import compress_text, decode_frozen_json, read_frozen
 from app.features.versions.service import Version
 from app.features.versions.verify import verify_version
 from app.json_text import canonical_json_text
-from app.tracking.ball_track import Correction
+from app.tracking.ball_track import EventCorrection
 from tests.databases import said_for_sqlite
 from tests.flights import FIRST
 from tests.unit.features.tracks.test_service import move
@@ -33,7 +33,7 @@ from tests.unit.features.tracks.test_service import move
 def accepted(store: Store, flight: list[int]) -> list[int]:
     """The flight with a track that a person corrected and accepted."""
     make_tracks(store, "demo", None, "ann", lambda *_: None)
-    said = TrackChange(corrections=(Correction(FIRST + 40, "out", True),))
+    said = TrackChange(corrections=(EventCorrection(FIRST + 40, "out", True),))
     for change in (said, TrackChange("accepted")):
         (track,) = list_tracks(store, "demo")
         change_track(store, track.id, change, track.etag, actor="ben")
@@ -46,7 +46,7 @@ def frozen(store: Store, name: str = "v1") -> Version:
 
 def track_elsewhere(value: Mapping[str, Any]) -> Json:
     """What a solver of another version makes of a frozen track's inputs."""
-    track = track_again(value)
+    track = recompute_frozen_track(value)
     track["position"][3][0] += 1e-9
     return track
 
@@ -85,7 +85,7 @@ class TestVerify:
         version = frozen(store)
         monkeypatch.setattr(verify_module, "TRACK_VERSION", "later")
         assert verify_version(store, version.id).ok
-        monkeypatch.setattr(verify_module, "track_again", track_elsewhere)
+        monkeypatch.setattr(verify_module, "recompute_frozen_track", track_elsewhere)
         report = verify_version(store, version.id)
         assert (report.ok, report.equal, report.groups) == (False, report.groups, len(accepted))
         assert [(item.place, item.frozen, item.now) for item in report.differences] == [
@@ -101,7 +101,7 @@ class TestVerify:
         self, store, accepted, monkeypatch
     ) -> None:
         version = frozen(store)
-        monkeypatch.setattr(verify_module, "track_again", lambda _: 1 / 0)
+        monkeypatch.setattr(verify_module, "recompute_frozen_track", lambda _: 1 / 0)
         report = verify_version(store, version.id)
         assert (report.equal, report.different) == (report.groups, 1)
         assert report.differences[0].now == "ZeroDivisionError: division by zero"
@@ -110,7 +110,7 @@ class TestVerify:
         version = frozen(store)
         key = version.tracks["rig"]
         with store.write() as session, said_for_sqlite(session):
-            value = read_json(read_frozen(session, version.dataset_id, [key])[key])
+            value = decode_frozen_json(read_frozen(session, version.dataset_id, [key])[key])
             value["track"]["times"][3] += 1e-12
             unseal(session)
             session.execute(

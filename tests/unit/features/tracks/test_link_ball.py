@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.db.idempotency import without_response
+from app.db.idempotency import without_pending_response
 from app.db.json_columns import compress_json
 from app.db.session import now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
-from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.links import get_link
 from app.features.recordings.service import get_recording
 from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
-from app.features.tracks.link_ball import _of_groups, ball_places
+from app.features.tracks.link_ball import _iterate_balls_of_groups, read_ball_positions
 from app.features.tracks.queries import insert_track
-from app.features.tracks.stored import TrackSummary, track_stamp
+from app.features.tracks.stored import TrackSummary, compute_track_stamp
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical_json_text
 from app.soccer.pitch import Pitch
@@ -82,7 +82,7 @@ def tracked(store: Store, views: tuple[Filmed, Filmed]) -> None:
             for at, camera in enumerate(view.cameras)
         ]
         stretch = (first, first + len(frames) - 1)
-        save_cameras(store, recording, stretch, Tracked(frames, ()), [], "ann")
+        save_cameras(store, recording, stretch, TrackedStretch(frames, ()), [], "ann")
 
 
 def uploads(api: Any, views: tuple[Filmed, Filmed]) -> dict[str, str]:
@@ -192,8 +192,8 @@ class TestOfTracks:
     ) -> None:
         insert_track_of(store, made_ball(8.0, seed=3), np.arange(LIVE) / FPS, "final link 1")
         recording, shot = get_recording(store, 1), get_link(store, 1, 1).live
-        assert ball_places(store, recording, shot, 1) == {}
-        assert len(ball_places(store, recording, shot, 2)) == LIVE
+        assert read_ball_positions(store, recording, shot, 1) == {}
+        assert len(read_ball_positions(store, recording, shot, 2)) == LIVE
 
 
 def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str = "final") -> None:
@@ -216,13 +216,13 @@ def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str
     counts = {"measured": count}
     summary = TrackSummary(count, counts, {}, 1, 0, None, None, None, None, FPS, {})
     dataset = get_recording(store, 1).dataset_id
-    with store.write() as session, without_response():
+    with store.write() as session, without_pending_response():
         policy = read_dataset_head(session, dataset).policy
         stretch = {"key": "final 0-149", "match": "final", "first": 0, "last": count - 1}
         values = {
             "dataset_id": dataset,
             **stretch,
-            "stamp": track_stamp(policy, (), SimpleNamespace(**stretch)),
+            "stamp": compute_track_stamp(policy, (), SimpleNamespace(**stretch)),
             "digest": "none",
             "inputs": compress_json(inputs_to_json(inputs)),
             "body": compress_json(track_to_json(made)),
@@ -252,7 +252,7 @@ class TestOfGroups:
             assert answer.status_code == 200, answer.text
         found = get_link(store, 1, 1)
         sides = (found.live, found.replay)
-        assert dict(_of_groups(store, found.live, sides)) == {
+        assert dict(_iterate_balls_of_groups(store, found.live, sides)) == {
             10: ((63.0, 44.0), None),
             20: ((63.0, 44.0), None),
         }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.db.store import Store
-from app.features.tracks.around import track_around
+from app.features.tracks.around import compute_track_excerpt
 from app.features.tracks.service import TrackDetail, list_tracks, make_tracks, read_track
 from tests.bench.link import at_times
 from tests.linked_recording import (
@@ -78,7 +78,7 @@ class TestFollowedRuns:
     ) -> None:
         recording.accept(0)
         recording.accept(1)
-        around = track_around(store, made(store).track.id, 60)
+        around = compute_track_excerpt(store, made(store).track.id, 60)
         assert around.ball.reason is None
         assert set(around.inputs.measurements.views) == {"final", "final link 1"}
 

@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.service import (
@@ -27,7 +27,7 @@ from app.features.tracks.service import (
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
-from app.tracking.ball_track import Correction
+from app.tracking.ball_track import EventCorrection
 from tests.flights import FIRST, flight_groups, places
 from tests.unit.features.tracks.test_stretches import recorded
 
@@ -48,10 +48,10 @@ def change(store: Store, what: TrackChange) -> Track:
 
 def move(store: Store, group: int, by: float) -> None:
     """Move the first ball of a group, and solve it."""
-    state = load(store, group)
+    state = load_group_state(store, group)
     view = state.group.views[0]
     ball = replace(view.ball, point=ImagePoint(view.ball.point.x + by, view.ball.point.y))
-    submit(store, group, set_ball(view.key, ball), if_match=state.etag, actor="ann")
+    submit_edit(store, group, set_ball(view.key, ball), if_match=state.etag, actor="ann")
     solve_dataset(store, "demo")
 
 
@@ -86,7 +86,7 @@ class TestMakeTracks:
 
     def test_a_rejected_group_measures_nothing(self, store, flight) -> None:
         make(store)
-        state = load(store, flight[4])
+        state = load_group_state(store, flight[4])
         set_verdict(
             store, flight[4], "rejected", "ball_not_visible", if_match=state.etag, actor="ann"
         )
@@ -100,7 +100,7 @@ class TestMakeTracks:
 
     def test_corrections_stay_when_it_is_made_again(self, store, flight) -> None:
         make(store)
-        said = (Correction(FIRST + 2, "kick", True),)
+        said = (EventCorrection(FIRST + 2, "kick", True),)
         change(store, TrackChange(corrections=said))
         move(store, flight[30], 2.0)
         make(store)
@@ -142,7 +142,7 @@ class TestStretchesThatChange:
     def test_one_more_instant_leaves_it_its_corrections(self, store) -> None:
         add_instants(store, *range(20))
         make(store)
-        said = (Correction(7, "kick", True),)
+        said = (EventCorrection(7, "kick", True),)
         before = change(store, TrackChange(corrections=said))
         add_instants(store, 20)
         make(store)
@@ -152,7 +152,7 @@ class TestStretchesThatChange:
     def test_joined_ones_have_what_was_said_of_both(self, store) -> None:
         add_instants(store, *range(20), *range(150, 170))
         make(store)
-        said = (Correction(7, "kick", True), Correction(155, "bounce", True))
+        said = (EventCorrection(7, "kick", True), EventCorrection(155, "bounce", True))
         for track, item in zip(list_tracks(store, "demo"), said, strict=True):
             wanted = TrackChange(corrections=(item,))
             change_track(store, track.id, wanted, track.etag, actor="ben")
@@ -163,11 +163,11 @@ class TestStretchesThatChange:
     def test_cut_ones_have_each_what_was_said_of_its_frames(self, store) -> None:
         add_instants(store, *range(20), 85, *range(150, 180))
         make(store)
-        said = (Correction(7, "kick", True), Correction(155, "bounce", True))
+        said = (EventCorrection(7, "kick", True), EventCorrection(155, "bounce", True))
         whole = change(store, TrackChange(corrections=said))
         with store.read() as session:
             cut = session.scalar(select(GroupModel.id).where(GroupModel.key == "final/85.png"))
-        etag = load(store, cut).etag
+        etag = load_group_state(store, cut).etag
         set_verdict(store, cut, "rejected", "ball_not_visible", if_match=etag, actor="ann")
         make(store)
         first, last = list_tracks(store, "demo")
@@ -241,7 +241,7 @@ class TestChangeTrack:
         make(store)
         change(store, TrackChange("accepted"))
         before = _events(store)
-        found = change(store, TrackChange(corrections=(Correction(FIRST + 40, "out", True),)))
+        found = change(store, TrackChange(corrections=(EventCorrection(FIRST + 40, "out", True),)))
         assert found.verdict is None
         assert set(_events(store)) - set(before) == {(FIRST + 40, "out")}
 
@@ -250,7 +250,7 @@ class TestChangeTrack:
         with pytest.raises(
             InputError, match=f"is not in the track .rig., which has the frames {FIRST} to"
         ) as error:
-            change(store, TrackChange(corrections=(Correction(3, "out", True),)))
+            change(store, TrackChange(corrections=(EventCorrection(3, "out", True),)))
         assert error.value.pointer == "/corrections/0/frame"
 
     def test_two_people_do_not_overwrite_each_other(self, store, flight) -> None:

@@ -7,21 +7,21 @@ import pytest
 
 from app.errors import InputError
 from app.features.tracks.codec import TrackInputs, make_track
-from app.features.tracks.making import unused_sentence
+from app.features.tracks.making import format_unused_balls
 from app.features.tracks.stretches import (
     RATE,
     Stretch,
+    find_group_instant,
     gather_stretches,
-    instant_of,
     match_stored_to_stretches,
-    require_stretch,
+    require_any_stretch,
 )
 from app.formats.export_record import ExportRecord
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.bench.link import at_times, film, made_ball
 from tests.cameras import SIZE
 from tests.flights import FIRST, flight_groups
@@ -29,7 +29,7 @@ from tests.rigs import TRUTH
 
 
 def record(group: Group) -> ExportRecord:
-    return ExportRecord(group, solve(group, PAPER), "unreviewed")
+    return ExportRecord(group, solve_group(group, PAPER), "unreviewed")
 
 
 def recorded(group: Group, frame: int, name: str = "final") -> Group:
@@ -78,7 +78,7 @@ class TestGatherStretches:
         stretch = only(gather_stretches([*records[:3], record(out), unsolved], PAPER))
         assert stretch.unused == {"view left out": 1, "not solved": len(records[4].group.views)}
         assert (
-            unused_sentence(stretch.unused)
+            format_unused_balls(stretch.unused)
             == "Not measured: 4 balls (not solved), 1 ball (view left out)."
         )
 
@@ -172,7 +172,7 @@ class TestGatherStretches:
         found = gather_stretches([record(make_group())], PAPER)
         assert found == []
         with pytest.raises(InputError, match='no groups of "demo" follow each other in time'):
-            require_stretch("demo", found)
+            require_any_stretch("demo", found)
 
 
 @dataclass(frozen=True)
@@ -217,9 +217,9 @@ class TestStoredAs:
 
 class TestInstantOf:
     def test_of_a_rig_by_the_number_of_the_frame(self) -> None:
-        instant, from_file = instant_of(flight_groups(1)[0])
+        instant, from_file = find_group_instant(flight_groups(1)[0])
         assert (instant.frame, instant.time, from_file) == (FIRST, FIRST / RATE, False)
 
     def test_of_a_recording_by_its_time_stamp(self) -> None:
-        instant, from_file = instant_of(recorded(flight_groups(1)[0], 7))
+        instant, from_file = find_group_instant(recorded(flight_groups(1)[0], 7))
         assert (instant.frame, instant.time, from_file) == (7, 10.14, True)

@@ -17,7 +17,7 @@ from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.state import VerdictState
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.service import list_groups, summarize_groups
@@ -31,7 +31,7 @@ from tests.unit.features.pending import keyed_request
 
 
 def judge(store: Store, group: int, state: str, actor: str = "ann", **more: Any) -> None:
-    etag = load(store, group).etag
+    etag = load_group_state(store, group).etag
     set_verdict(store, group, state, if_match=etag, actor=actor, **more)
 
 
@@ -40,7 +40,7 @@ def statuses(store: Store) -> list[str]:
 
 
 def verdict_of(store: Store, group: int) -> VerdictState:
-    return load(store, group).verdict
+    return load_group_state(store, group).verdict
 
 
 def before_write(
@@ -156,8 +156,12 @@ class TestGiveVerdicts:
         assert verdict_of(store, ids[0]).actor == "ben"
 
     def test_gives_the_same_state_as_single_verdicts(self, store, ids) -> None:
-        submit(
-            store, ids[1], set_ball("8_1.png", None), if_match=load(store, ids[1]).etag, actor="ann"
+        submit_edit(
+            store,
+            ids[1],
+            set_ball("8_1.png", None),
+            if_match=load_group_state(store, ids[1]).etag,
+            actor="ann",
         )
         give_verdicts(store, 1, "", "accepted", note="seen", actor="ben")
         alone = []
@@ -199,7 +203,7 @@ class TestGiveVerdicts:
             assert replay_log(session) == read_state_snapshot(session)
 
     def test_an_etag_of_before_is_stale(self, store, ids) -> None:
-        etag = load(store, ids[0]).etag
+        etag = load_group_state(store, ids[0]).etag
         give_verdicts(store, 1, "", "deferred", actor="ben")
         with pytest.raises(ConflictError):
             set_verdict(store, ids[0], "accepted", if_match=etag, actor="ann")
@@ -229,8 +233,8 @@ class TestGiveVerdicts:
 
     def test_a_verdict_that_is_out_of_date_is_given_again(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
-        etag = load(store, ids[0]).etag
-        submit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
+        etag = load_group_state(store, ids[0]).etag
+        submit_edit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
         assert (summarize_groups(store, 1).stale, summarize_groups(store, 1, "stale:no").stale) == (
             1,
             0,
@@ -245,11 +249,11 @@ class TestGiveVerdicts:
             with store.write() as session:
                 assert (first.resume(session), second.resume(session)) == (None, None)
             with store.write() as session:
-                first.interrupt(session, {"left": [[1, 2]]})
+                first.save_remaining(session, {"left": [[1, 2]]})
             with pytest.raises(ConflictError, match="is still running"), store.write() as session:
-                second.interrupt(session, {"left": [[1, 2]]})
+                second.save_remaining(session, {"left": [[1, 2]]})
             with store.write() as session:
-                first.interrupt(session, {"left": [[2, 2]]})
+                first.save_remaining(session, {"left": [[2, 2]]})
 
     def test_another_number_than_expected_changes_nothing(self, store, ids) -> None:
         with pytest.raises(ConflictError, match="4 groups would change, not 3"):
@@ -304,7 +308,7 @@ class TestUndoBatch:
         assert after[:2] == before[:2]
         assert [item.state for item in after[2:]] == ["unreviewed"] * 2
         # Of ben there is left what he had said before.
-        assert {item.actor: item.state for item in load(store, ids[1]).verdicts} == {
+        assert {item.actor: item.state for item in load_group_state(store, ids[1]).verdicts} == {
             "ann": "deferred",
             "ben": "accepted",
         }

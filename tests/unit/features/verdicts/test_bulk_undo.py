@@ -9,7 +9,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.queue.service import list_groups
 from app.features.queue.tables import QueueModel
 from app.features.verdicts import bulk
@@ -29,7 +29,9 @@ def statuses(store) -> list[str]:
 
 
 def judge(store, group: int, state: str, **more: Any) -> None:
-    set_verdict(store, group, state, if_match=load(store, group).etag, actor="ann", **more)
+    set_verdict(
+        store, group, state, if_match=load_group_state(store, group).etag, actor="ann", **more
+    )
 
 
 @pytest.fixture
@@ -68,7 +70,7 @@ class TestRedoBatch:
         done = redo_batch(store, undone, actor="ben")
         assert (done.changed, done.kept, done.refused) == (4, 0, ())
         assert statuses(store) == ["rejected"] * 4
-        verdict = load(store, ids[3]).verdict
+        verdict = load_group_state(store, ids[3]).verdict
         assert (verdict.reason, verdict.note, verdict.actor) == ("other", "blurred", "ben")
         assert undo_batch(store, done.batch, actor="ben").restored == 4
         assert redo_batch(store, done.batch, actor="eve").changed == 4
@@ -110,8 +112,8 @@ class TestRedoBatch:
         assert statuses(store) == ["rejected", "deferred", "rejected", "rejected"]
 
     def test_a_group_that_was_edited_since_is_another_one(self, store, ids, undone) -> None:
-        etag = load(store, ids[0]).etag
-        submit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
+        etag = load_group_state(store, ids[0]).etag
+        submit_edit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
         done = redo_batch(store, undone, actor="ben")
         assert (done.changed, done.kept) == (3, 1)
         assert statuses(store)[0] == "unreviewed"

@@ -6,7 +6,7 @@ from app.db.store import Store
 from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.queries import (
     StoredVerdict,
-    count_by_judge,
+    count_groups_by_judge,
     insert_verdicts,
     list_groups_judged_between,
     list_groups_with_newest_verdict_between,
@@ -51,12 +51,12 @@ class TestCountByJudge:
         with filled.write() as session:
             given = [FIRST, LATER, replace(LATER, id=3)]
             insert_verdicts(session, 1, given, actor="ann", at="t")
-            rows = count_by_judge(session, 1, since="2030-01-02")
+            rows = count_groups_by_judge(session, 1, since="2030-01-02")
             assert {tuple(row) for row in rows} == {
                 ("ann", "2030-01-01", 0),
                 ("bob", "2030-01-02", 1),
             }
-            assert count_by_judge(session, 2, since="") == []
+            assert count_groups_by_judge(session, 2, since="") == []
 
 
 class TestPresentKeys:

@@ -193,7 +193,7 @@ class TestStoppedBetweenChunks:
     def test_one_that_an_earlier_version_began_goes_on_with_the_groups_that_it_had_left(
         self, api, monkeypatch
     ) -> None:
-        interrupt = BatchRun.interrupt
+        interrupt = BatchRun.save_remaining
 
         def in_its_words(run: BatchRun, session: Session, left: dict[str, Any]) -> None:
             interrupt(run, session, {"ids": [3], "refused": []})

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.db.session import now
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.verdicts import service as reviewers
 from app.features.verdicts import service as verdict
 from app.features.verdicts.bulk import give_verdicts
@@ -16,7 +16,9 @@ def ids(fill, make_group) -> list[int]:
 
 
 def judge(store, group: int, state: str, actor: str, reason: str | None = None) -> None:
-    set_verdict(store, group, state, reason, if_match=load(store, group).etag, actor=actor)
+    set_verdict(
+        store, group, state, reason, if_match=load_group_state(store, group).etag, actor=actor
+    )
 
 
 class TestListReviewers:

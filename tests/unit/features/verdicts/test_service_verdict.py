@@ -11,7 +11,7 @@ from app.errors import InputError, StaleRevisionError
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history, undo_group_edit
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.verdicts import service as module
@@ -33,7 +33,7 @@ def judge(store, state, verdict, reason=None, note=None, actor="ann", **more):
 @pytest.fixture
 def failing(store, fill, make_group):
     """A group that fails the gate on reprojection."""
-    return load(store, fill(make_group(9, shift=80.0))[0])
+    return load_group_state(store, fill(make_group(9, shift=80.0))[0])
 
 
 class TestSetVerdict:
@@ -79,7 +79,7 @@ class TestSetVerdict:
     def test_accepting_a_ball_that_cannot_be_used_needs_a_note(
         self, store, fill, make_group
     ) -> None:
-        below = load(store, fill(make_group(9, ball=(5.0, 2.0, 10.2)))[0])
+        below = load_group_state(store, fill(make_group(9, ball=(5.0, 2.0, 10.2)))[0])
         assert below.solution.passes
         with pytest.raises(
             InputError, match=r"cannot be used .*10\.20 m below the grass"
@@ -90,13 +90,13 @@ class TestSetVerdict:
         assert (after.verdict.override, after.verdict.note) == (None, "a hole")
 
     def test_a_group_that_is_not_solved_is_solved_first(self, store, fill, make_group) -> None:
-        state = load(store, fill(make_group(9, shift=80.0), solved=False)[0])
+        state = load_group_state(store, fill(make_group(9, shift=80.0), solved=False)[0])
         with pytest.raises(InputError, match="needs a note"):
             judge(store, state, "accepted")
 
     def test_becomes_stale_by_an_edit_and_fresh_by_its_undo(self, store, state) -> None:
         accepted = judge(store, state, "accepted")
-        edited = submit(
+        edited = submit_edit(
             store, state.id, set_ball("7.png", BALL), if_match=accepted.etag, actor="ben"
         )
         assert (edited.verdict.state, edited.verdict.stale) == ("accepted", True)
@@ -121,7 +121,7 @@ class TestSetVerdict:
         assert row.reviewer is None
 
     def test_a_verdict_on_a_group_that_somebody_changed_is_refused(self, store, state) -> None:
-        submit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ben")
+        submit_edit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ben")
         with pytest.raises(StaleRevisionError):
             judge(store, state, "accepted", note="note")
 
@@ -140,14 +140,14 @@ class TestSetVerdict:
 
     def test_answers_with_the_group_as_a_reader_gets_it(self, store, state) -> None:
         after = judge(store, state, "rejected", "sides_confused")
-        assert load(store, state.id) == after
+        assert load_group_state(store, state.id) == after
 
     def test_another_policy_meanwhile_judges_the_verdict(self, store, state, monkeypatch) -> None:
-        read = module.read_solved
+        read = module.read_solved_group
 
         def slow(*arguments, **options):
             found = read(*arguments, **options)
-            monkeypatch.setattr(module, "read_solved", read)
+            monkeypatch.setattr(module, "read_solved_group", read)
             change_policy(
                 store,
                 state.dataset_id,
@@ -157,7 +157,7 @@ class TestSetVerdict:
             )
             return found
 
-        monkeypatch.setattr(module, "read_solved", slow)
+        monkeypatch.setattr(module, "read_solved_group", slow)
         with pytest.raises(InputError, match="fails a gate"):
             judge(store, state, "accepted")
         assert len(read_history(store, state.id)) == 1

@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -18,7 +18,7 @@ from app.soccer.split import Split
 
 
 def judge(store, group_id, state, reason=None, note=None):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor="ann")
 
 
@@ -35,10 +35,10 @@ def two(store, once, fill, make_group):
         for number in ids[:3]:
             judge(store, number, "accepted")
         first = frozen(store, "v1")
-        state = load(store, ids[1])
+        state = load_group_state(store, ids[1])
         box = state.group.view("7.png").ball.box
         ball = BallAnnotation(box=Box(box.x + 0.5, box.y, box.width, box.height))
-        submit(store, ids[1], set_ball("7.png", ball), if_match=state.etag, actor="ben")
+        submit_edit(store, ids[1], set_ball("7.png", ball), if_match=state.etag, actor="ben")
         judge(store, ids[1], "accepted")
         judge(store, ids[2], "rejected", "sides_confused")
         judge(store, ids[3], "accepted")
@@ -126,10 +126,10 @@ def judged_and_moved(store, fill, make_group):
     ids = fill(*(make_group(number) for number in (7, 8, 9, 10)))
     first = frozen(store, "v1", groups="passing")
     for group, key, pixels in ((ids[0], "7.png", 0.25), (ids[1], "8.png", 0.75)):
-        state = load(store, group)
+        state = load_group_state(store, group)
         box = state.group.view(key).ball.box
         ball = BallAnnotation(box=Box(box.x + pixels, box.y, box.width, box.height))
-        submit(store, group, set_ball(key, ball), if_match=state.etag, actor="ben")
+        submit_edit(store, group, set_ball(key, ball), if_match=state.etag, actor="ben")
     judge(store, ids[2], "accepted")
     return first, frozen(store, "v2", groups="passing")
 

@@ -9,7 +9,7 @@ from app.db.log import LogModel
 from app.errors import ConflictError, InputError
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
@@ -31,7 +31,7 @@ BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
 
 def judge(store, group_id, state, reason=None, note=None, actor="ann"):
-    etag = load(store, group_id).etag
+    etag = load_group_state(store, group_id).etag
     return set_verdict(store, group_id, state, reason, note, if_match=etag, actor=actor)
 
 
@@ -138,8 +138,8 @@ class TestFreeze:
         assert rows["10.png"].why == "fails reprojection"
 
     def test_a_group_that_changed_after_its_verdict_stays_out(self, store, judged) -> None:
-        etag = load(store, judged[0]).etag
-        submit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
+        etag = load_group_state(store, judged[0]).etag
+        submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
         assert rows_of(store, frozen(store))[0].why == "changed after its verdict"
 
     def test_two_homes_freeze_the_same_hash(self, store, judged, elsewhere) -> None:
@@ -155,8 +155,8 @@ class TestFreeze:
         first = frozen(store)
         match change:
             case "ball":
-                etag = load(store, judged[0]).etag
-                submit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
+                etag = load_group_state(store, judged[0]).etag
+                submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
                 judge(store, judged[0], "accepted", note="all the same")
             case "verdict":
                 judge(store, judged[4], "accepted")
@@ -182,8 +182,8 @@ class TestFreeze:
         assert (second.hash, second.previous) == (first.hash, first.id)
 
     def test_later_edits_and_deleted_solutions_do_not_reach_a_version(self, store, judged) -> None:
-        before, version = load(store, judged[0]), frozen(store)
-        submit(store, judged[0], set_ball("7.png", BALL), if_match=before.etag, actor="ben")
+        before, version = load_group_state(store, judged[0]), frozen(store)
+        submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=before.etag, actor="ben")
         with store.write() as session:
             session.execute(delete(SolutionModel))
             session.execute(text("DELETE FROM calibration"))

@@ -14,7 +14,7 @@ from app.features.jobs import runner as job_run
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.jobs import verify_work
+from app.features.versions.jobs import run_verify_job
 from app.features.versions.service import Version, get_version
 from app.worker_process import WorkerProcess
 from tests.unit.features.jobs.steps import a_job
@@ -58,7 +58,7 @@ class TestVerifyWork:
         self, store: Store, version: Version
     ) -> None:
         with pytest.raises(OverloadedError, match="the process of the verification was killed"):
-            verify_work(store, Killed(version))
+            run_verify_job(store, Killed(version))
         kept = get_version(store, version.id).verified
         assert kept is not None
         assert (kept.actor, kept.report) == ("ben", None)
@@ -70,10 +70,10 @@ class TestVerifyWork:
         def refuse(_child: WorkerProcess, *_: Any, **__: Any) -> None:
             raise OverloadedError("no process could be started for this") from OSError(12, "memory")
 
-        verify_work(store, JobProgress(asked(version, "ann"), threading.Event()))
+        run_verify_job(store, JobProgress(asked(version, "ann"), threading.Event()))
         monkeypatch.setattr("app.db.database_worker.WorkerProcess.run", refuse)
         with pytest.raises(OverloadedError, match="no process"):
-            verify_work(store, JobProgress(asked(version, "ben"), threading.Event()))
+            run_verify_job(store, JobProgress(asked(version, "ben"), threading.Event()))
         kept = get_version(store, version.id).verified
         assert kept is not None and (kept.actor, kept.problem) == ("ann", None)
 
@@ -81,5 +81,5 @@ class TestVerifyWork:
         self, store: Store, version: Version
     ) -> None:
         with pytest.raises(JobCancelled):
-            verify_work(store, Killed(version, cancelled=True))
+            run_verify_job(store, Killed(version, cancelled=True))
         assert get_version(store, version.id).verified is None

@@ -10,19 +10,19 @@ from sqlalchemy import text
 
 from app.errors import NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.frozen_queries import compress_text, read_text
+from app.features.versions.frozen_queries import compress_text, decode_frozen_text
 from app.features.versions.verify import verify_version
 from app.soccer.solution import Solution
-from app.solving.solve import NO_CALIBRATIONS, solve
+from app.solving.solve import NO_CALIBRATIONS, solve_group
 from tests.databases import said_for_sqlite
 
 
 def one_bit_off(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
     """A solver whose ball lies one bit beside the true one in one group."""
-    solution = solve(group, policy, calibrations)
+    solution = solve_group(group, policy, calibrations)
     if not group.key.endswith("8.png"):
         return solution
     x, y, z = solution.ball.point
@@ -65,12 +65,12 @@ class TestVerify:
             assert verify_version(store, version.id, executor).ok
 
     def test_it_holds_after_the_group_was_edited(self, store, version) -> None:
-        state = load(store, 1)
-        submit(store, 1, set_ball("7.png", None), if_match=state.etag, actor="ben")
+        state = load_group_state(store, 1)
+        submit_edit(store, 1, set_ball("7.png", None), if_match=state.etag, actor="ben")
         assert verify_version(store, version.id).ok
 
     def test_one_bit_is_a_difference_with_its_place(self, store, version, monkeypatch) -> None:
-        monkeypatch.setattr(verify_module, "solve", one_bit_off)
+        monkeypatch.setattr(verify_module, "solve_group", one_bit_off)
         report = verify_version(store, version.id)
         assert not report.ok
         assert (report.equal, report.groups) == (3, 4)
@@ -81,14 +81,14 @@ class TestVerify:
     def test_a_group_that_breaks_does_not_hide_the_others(
         self, store, version, monkeypatch
     ) -> None:
-        monkeypatch.setattr(verify_module, "solve", broken)
+        monkeypatch.setattr(verify_module, "solve_group", broken)
         report = verify_version(store, version.id)
         assert [item.now for item in report.differences] == ["ZeroDivisionError: "] * 4
 
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:", "calibration:"])
     def test_content_that_was_changed_is_found(self, store, version, prefix: str) -> None:
         def change(body: bytes) -> bytes:
-            return compress_text(read_text(body).replace(".5", ".6"))
+            return compress_text(decode_frozen_text(body).replace(".5", ".6"))
 
         tamper(store, prefix, change)
         report = verify_version(store, version.id)

@@ -10,11 +10,14 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.agreement.adjudicate import adjudicate_case, read_case, return_for_correction
-from app.features.agreement.service import compare_or_adopt_submission, compare_submitted
-from app.features.batches.leases import BatchMember, Leases
+from app.features.agreement.service import (
+    compare_or_adopt_submission,
+    compare_submitted_annotations,
+)
+from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.verdicts.service import set_verdict
@@ -66,17 +69,25 @@ def told(allowed, receiver, groups) -> Told:
 
 def judge(store: Store, group: int, state: str, actor: str) -> None:
     reason = "other" if state == "rejected" else None
-    set_verdict(store, group, state, reason, "seen", if_match=load(store, group).etag, actor=actor)
+    set_verdict(
+        store,
+        group,
+        state,
+        reason,
+        "seen",
+        if_match=load_group_state(store, group).etag,
+        actor=actor,
+    )
 
 
 def annotate(store: Store, batch: int, person: str, moved: float) -> int:
-    copy = Leases(store).next(batch, BatchMember(person)).group
+    copy = LeaseService(store).next(batch, BatchMember(person)).group
     assert copy is not None
-    state = load(store, copy)
+    state = load_group_state(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
+    submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     judge(store, copy, "accepted", person)
     return copy
 
@@ -93,8 +104,8 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     assert made[1] == {"dataset": "demo", "actor": "lea", "batch": {**said, **counts}}
     assert handed_on["batch"]["annotators"] == ["bo"] and handed_on["batch"]["name"] == "Derby day"
 
-    Leases(allowed).submit(batch, groups[0], BatchMember("bo"), actor="bo")
-    Leases(allowed).return_group(batch, groups[0], BatchMember("cy"), "no ball", actor="cy")
+    LeaseService(allowed).submit(batch, groups[0], BatchMember("bo"), actor="bo")
+    LeaseService(allowed).return_group(batch, groups[0], BatchMember("cy"), "no ball", actor="cy")
     ((kind, back),) = told.new()
     assert (kind, back["actor"], back["person"]) == (MessageKind.HANDED_BACK, "cy", "bo")
     assert (back["group"], back["batch"]["id"]) == (groups[0], batch) and "no ball" not in str(back)
@@ -115,7 +126,7 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     annotate(allowed, batch, "ada", 0.0)
     copy = annotate(allowed, batch, "bo", 40.0)
     assert compare_or_adopt_submission(allowed, copy) == "open"
-    assert compare_submitted(allowed, groups[0], batch) == "open"
+    assert compare_submitted_annotations(allowed, groups[0], batch) == "open"
     (_, (kind, case)) = told.new()
     assert (kind, case["group"], case["people"]) == (MessageKind.DISPUTED, groups[0], ["ada", "bo"])
     assert case["batch"]["id"] == batch and case["disagreements"] > 0 and case["worst"] > 1

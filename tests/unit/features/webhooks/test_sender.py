@@ -15,9 +15,9 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import set_ball
 from app.features.groups.history import undo_group_edit
-from app.features.groups.submit import submit
+from app.features.groups.submit import submit_edit
 from app.features.jobs.queries import NewJob, insert_job, update_job
-from app.features.maintenance.upkeep import forget_old_deliveries
+from app.features.maintenance.upkeep import delete_old_deliveries
 from app.features.verdicts.service import set_verdict
 from app.features.webhooks import sender as module
 from app.features.webhooks.messages import CHOSEN, MessageKind, sign_message
@@ -29,7 +29,7 @@ from app.features.webhooks.service import (
     make_webhook,
     remove_webhook,
     renew_secret,
-    send_again,
+    resend_delivery,
     send_ping,
 )
 from app.soccer.annotation import BallAnnotation
@@ -83,7 +83,7 @@ class TestTelling:
     def test_what_happens_is_told_signed_and_once(
         self, allowed, sender, receiver, hook, state
     ) -> None:
-        after = submit(
+        after = submit_edit(
             allowed,
             state.id,
             set_ball(state.group.views[0].key, BALL),
@@ -219,11 +219,11 @@ class TestTryingAgain:
         send_ping(allowed, "demo", hook, actor="ann")
         sender.send()
         (delivery,) = list_deliveries(allowed, "demo", hook)
-        send_again(allowed, "demo", hook, delivery.id)
+        resend_delivery(allowed, "demo", hook, delivery.id)
         assert sender.send() == 1
         assert receiver.kinds == [MessageKind.PING, MessageKind.PING]
         with pytest.raises(NotFoundError):
-            send_again(allowed, "demo", hook, delivery.id + 1)
+            resend_delivery(allowed, "demo", hook, delivery.id + 1)
 
     def test_one_that_nobody_listens_to_says_so(
         self, allowed, sender, hook, monkeypatch: pytest.MonkeyPatch
@@ -361,9 +361,9 @@ class TestForgetting:
         sender.send()
         send_ping(allowed, "demo", hook, actor="ann")
         clock.now += timedelta(days=31)
-        assert forget_old_deliveries(allowed, clock.now) == 1
+        assert delete_old_deliveries(allowed, clock.now) == 1
         monkeypatch.setattr(allowed, "write", None)
-        assert forget_old_deliveries(allowed, clock.now) == 0, "and nothing is written"
+        assert delete_old_deliveries(allowed, clock.now) == 0, "and nothing is written"
         (left,) = list_deliveries(allowed, "demo", hook)
         assert left.state == "waiting"
 
@@ -374,6 +374,6 @@ class TestForgetting:
         end_job(allowed, "done")
         assert (sender.look(), sender.send()) == (2, 2)
         clock.now += timedelta(days=31)
-        assert forget_old_deliveries(allowed, clock.now) == 2
+        assert delete_old_deliveries(allowed, clock.now) == 2
         assert sender.look() == 0
         assert receiver.kinds == [MessageKind.JOB_DONE] * 2

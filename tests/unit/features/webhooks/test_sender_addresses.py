@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.errors import ConflictError, InputError
-from app.features.webhooks.sender import require_allowed
+from app.features.webhooks.sender import require_allowed_address
 
 ALLOWED = ["https://hooks.example.org/touchline", "http://127.0.0.1:9000"]
 
@@ -21,7 +21,7 @@ ALLOWED = ["https://hooks.example.org/touchline", "http://127.0.0.1:9000"]
     ],
 )
 def test_what_lies_below_an_allowed_address_is_allowed(url: str) -> None:
-    require_allowed(url, ALLOWED)
+    require_allowed_address(url, ALLOWED)
 
 
 @pytest.mark.parametrize(
@@ -57,11 +57,11 @@ def test_what_lies_below_an_allowed_address_is_allowed(url: str) -> None:
 )
 def test_every_other_one_is_refused_with_its_field(url: str) -> None:
     with pytest.raises(InputError) as refused:
-        require_allowed(url, ALLOWED, "/url")
+        require_allowed_address(url, ALLOWED, "/url")
     assert refused.value.pointer == "/url"
 
 
 def test_where_the_operator_allows_none_the_setting_is_named() -> None:
     with pytest.raises(ConflictError, match="not allowed to send webhooks") as refused:
-        require_allowed(ALLOWED[0], [])
+        require_allowed_address(ALLOWED[0], [])
     assert "TOUCHLINE_WEBHOOKS" in (refused.value.hint or "")

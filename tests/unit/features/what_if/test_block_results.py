@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from app.features.what_if.block_results import Leak, find_split_leaks
+from app.features.what_if.block_results import SplitLeak, find_split_leaks
 
 
 def test_matches_in_several_splits_are_told_by_name_with_their_groups():
@@ -18,8 +18,8 @@ def test_matches_in_several_splits_are_told_by_name_with_their_groups():
         }
     )
     assert find_split_leaks(places) == (
-        Leak("a", (("train", 5), ("valid", 2))),
-        Leak("b", (("test", 1), ("train", 3))),
+        SplitLeak("a", (("train", 5), ("valid", 2))),
+        SplitLeak("b", (("test", 1), ("train", 3))),
     )
 
 

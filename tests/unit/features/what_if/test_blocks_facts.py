@@ -9,11 +9,11 @@ from sqlalchemy import text, update
 
 from app.db.store import Store
 from app.features.groups.revision_queries import list_groups_after
-from app.features.groups.submit import load
+from app.features.groups.submit import load_group_state
 from app.features.solutions.queries import SolutionModel
 from app.features.what_if.blocks import read_tables
 from app.features.what_if.table import YieldTable
-from app.solving.facts import COLUMNS, group_facts, join_facts
+from app.solving.facts import COLUMNS, collect_facts_of_views, join_facts
 from tests.databases import said_for_sqlite
 
 
@@ -42,10 +42,12 @@ def solved(request, store, fill, make_group, make_static) -> list[int]:
 
 class TestReadTables:
     def test_facts_are_those_that_solving_judges(self, store, solved) -> None:
-        states = [load(store, group) for group in solved]
+        states = [load_group_state(store, group) for group in solved]
         expected = join_facts(
             [
-                group_facts(state.group.views, [item.calibration for item in state.solution.views])
+                collect_facts_of_views(
+                    state.group.views, [item.calibration for item in state.solution.views]
+                )
                 for state in states
             ]
         )

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import ConflictError, OverloadedError
 from app.features.groups.edit import IncludeView, set_ball
 from app.features.groups.history import undo_group_edit
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.what_if import blocks as gathered
@@ -72,12 +72,16 @@ class TestInStep:
             group = rng.choice(ids)
             name = f"{numbers[group]}{rng.choice(['', '_1'])}.png"
             change = rng.choice([set_ball(name, None), IncludeView(name, rng.random() < 0.5)])
-            submit(store, group, change, if_match=load(store, group).etag, actor="ann")
+            submit_edit(
+                store, group, change, if_match=load_group_state(store, group).etag, actor="ann"
+            )
 
         def take_back() -> None:
             group = rng.choice(ids)
             with suppress(ConflictError):
-                undo_group_edit(store, group, if_match=load(store, group).etag, actor="ann")
+                undo_group_edit(
+                    store, group, if_match=load_group_state(store, group).etag, actor="ann"
+                )
 
         def bring() -> None:
             fill(make_group(rng.choice(range(14, 20))), solved=False)
@@ -102,8 +106,8 @@ class TestInStep:
         """Its solution is there from before: none is inserted."""
         (group, *_) = fill(make_group(7), make_group(8))
         yields = YieldStore(store)
-        etag = load(store, group).etag
-        etag = submit(store, group, set_ball("7.png", None), if_match=etag, actor="ann").etag
+        etag = load_group_state(store, group).etag
+        etag = submit_edit(store, group, set_ball("7.png", None), if_match=etag, actor="ann").etag
         assert get_yield(yields, 1).passing == 1
         undo_group_edit(store, group, if_match=etag, actor="ann")
         assert get_yield(yields, 1) == anew()
@@ -124,7 +128,13 @@ class TestInStep:
         (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
         yields = YieldStore(store)
         yields.snapshot(1).blocks[0].block.__dict__["groups"] = 2
-        submit(store, group, set_ball("7.png", None), if_match=load(store, group).etag, actor="ann")
+        submit_edit(
+            store,
+            group,
+            set_ball("7.png", None),
+            if_match=load_group_state(store, group).etag,
+            actor="ann",
+        )
         assert get_yield(yields, 1) == anew()
 
 
@@ -179,7 +189,9 @@ class TestAfterARestart:
         get_yield(yields, 1)
         for group, number in zip(ids, range(7, 13), strict=True):
             change = set_ball(f"{number}.png", None)
-            submit(store, group, change, if_match=load(store, group).etag, actor="ann")
+            submit_edit(
+                store, group, change, if_match=load_group_state(store, group).etag, actor="ann"
+            )
             get_yield(yields, 1)
         blocks = {path.stem for path in folder(store).glob("*.facts")}
         named = {block.block.name for block in yields.snapshot(1).blocks}

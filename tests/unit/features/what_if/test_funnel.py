@@ -12,7 +12,7 @@ from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.service import get_dataset
 from app.features.groups.edit import IncludeView, set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
@@ -26,9 +26,9 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.facts import group_facts, join_facts
+from app.solving.facts import collect_facts_of_views, join_facts
 from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups
-from app.solving.solve import solve
+from app.solving.solve import solve_group
 from tests.scenes import make_scenes
 
 SEEDS = 9
@@ -71,7 +71,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory, groups: list[Group]) -> Ite
 def solutions(filled: Store) -> list[tuple[Group, Solution]]:
     """Groups and solutions as stored, in order."""
     ids = [row.id for row in list_groups(filled, 1, limit=500).items]
-    states = [load(filled, number) for number in ids]
+    states = [load_group_state(filled, number) for number in ids]
     return [(state.group, state.solution) for state in states if state.solution is not None]
 
 
@@ -104,7 +104,7 @@ def judge_table(table: YieldTable, policy: Policy) -> Judgement:
 def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
     """What ``solve`` says under another policy; calibrations do not depend on it."""
     known = {view.calibration_key: view.calibration for view in solution.views}
-    return solve(group, policy, known)
+    return solve_group(group, policy, known)
 
 
 def with_paint(solution: Solution) -> Solution:
@@ -149,7 +149,7 @@ class TestJudgeTable:
         painted = [(group, with_paint(solution)) for group, solution in solutions]
         table = join_facts(
             [
-                group_facts(group.views, [view.calibration for view in solution.views])
+                collect_facts_of_views(group.views, [view.calibration for view in solution.views])
                 for group, solution in painted
             ]
         )
@@ -339,12 +339,18 @@ class TestYieldStore:
         ids = fill(make_group(7), make_group(8), make_group(9))
         yields = YieldStore(store)
         assert get_yield(yields, 1).passing == 3
-        state = load(store, ids[1])
-        state = submit(store, ids[1], set_ball("8.png", None), if_match=state.etag, actor="ann")
+        state = load_group_state(store, ids[1])
+        state = submit_edit(
+            store, ids[1], set_ball("8.png", None), if_match=state.etag, actor="ann"
+        )
         found = get_yield(yields, 1)
         assert [step.gate for step in found.funnel if step.dropped] == ["ball"]
-        submit(
-            store, ids[2], IncludeView("9.png", False), if_match=load(store, ids[2]).etag, actor="b"
+        submit_edit(
+            store,
+            ids[2],
+            IncludeView("9.png", False),
+            if_match=load_group_state(store, ids[2]).etag,
+            actor="b",
         )
         assert get_yield(yields, 1).passing == 1
         fresh = get_yield(YieldStore(store), 1)

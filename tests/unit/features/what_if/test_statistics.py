@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import set_ball
 from app.features.groups.history import undo_group_edit
-from app.features.groups.submit import load, submit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.queue.statistics import read_statistics
 from app.features.solutions.service import solve_dataset
@@ -58,12 +58,12 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
     def edit() -> None:
         group = rng.choice(ids)
         change = set_ball(f"{names[group]}.png", None)
-        submit(store, group, change, if_match=load(store, group).etag, actor="ann")
+        submit_edit(store, group, change, if_match=load_group_state(store, group).etag, actor="ann")
 
     def take_back() -> None:
         group = rng.choice(ids)
         with suppress(ConflictError):
-            undo_group_edit(store, group, if_match=load(store, group).etag, actor="ann")
+            undo_group_edit(store, group, if_match=load_group_state(store, group).etag, actor="ann")
 
     def bring() -> None:
         fill(make_group(rng.choice(range(14, 18))), solved=False)
@@ -97,8 +97,8 @@ def test_one_change_reads_one_group_also_after_a_restart(store, fill, make_group
     (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
     StatisticsCache(store).statistics(1)
     assert len(looked) == 1
-    etag = load(store, group).etag
-    submit(store, group, set_ball("7.png", None), if_match=etag, actor="ann")
+    etag = load_group_state(store, group).etag
+    submit_edit(store, group, set_ball("7.png", None), if_match=etag, actor="ann")
     give_verdicts(store, 1, "passes:no", "rejected", "other", "no ball", actor="ben")
     assert StatisticsCache(store).statistics(1) == read_statistics(store, 1)
     assert len(looked) == 1
