@@ -154,7 +154,7 @@ def run() -> None:
             sys.exit(READER_GONE)
         raise
     except ReviewError as error:
-        near = error.nearest() if isinstance(error, NotFoundError) else None
+        near = error.suggest_nearest_name() if isinstance(error, NotFoundError) else None
         print_error(error.message, error.hint or near)
         sys.exit(1)
     except OSError as error:

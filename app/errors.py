@@ -156,7 +156,7 @@ class NotFoundError(ReviewError):
     asked: str = ""
     known: Mapping[int, str] = MappingProxyType({})
 
-    def nearest(self, sees: Callable[[int], bool] = lambda _: True) -> str | None:
+    def suggest_nearest_name(self, sees: Callable[[int], bool] = lambda _: True) -> str | None:
         """A question whether another one was meant, of those that somebody may see."""
         return suggest_similar_name(
             self.asked, [name for key, name in self.known.items() if sees(key)]

@@ -177,7 +177,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     app.include_router(maintenance.health_router)
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     events = services.events
-    install_pages(app, site, None if settings.team else events.moment, events.banner)
+    install_pages(
+        app, site, None if settings.team else events.read_resume_token, events.read_banner_json
+    )
     for router in ROUTERS:
         app.include_router(
             router,
@@ -199,7 +201,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None
     app.add_middleware(KnownHosts, allowed=list_allowed_hosts(settings))
     install_metrics(app, app.state.gate.limits)
     app.add_middleware(RequestLog)
-    app.add_middleware(SecurityHeaders, policy=site.policy)
+    app.add_middleware(SecurityHeaders, policy=site.get_security_policy)
 
 
 @asynccontextmanager

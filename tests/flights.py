@@ -112,7 +112,7 @@ def write_flight_export(out: Path) -> BallTrack:
 def insert_bare_track(session: Session, dataset_id: int, key: str) -> int:
     """A stretch of one frame that has no track; returns its id."""
     frames, times = np.array([FIRST]), np.array([FIRST / RATE])
-    nothing = BallTrack.none(frames, times, "one measurement")
+    nothing = BallTrack.make_empty_track(frames, times, "one measurement")
     empty = np.zeros(0)
     measured = BallMeasurements(np.zeros(0, dtype=np.int64), empty, (), np.zeros((0, 2)), empty, ())
     summary = TrackSummary(1, {"gap": 1}, {}, 0, 0, None, None, None, nothing.reason, RATE, {})

@@ -185,7 +185,7 @@ class PendingResponse(Generic[R]):
         return None if self._request is None else self._request.key
 
     @contextmanager
-    def open(self) -> Iterator[None]:
+    def activate(self) -> Iterator[None]:
         """Let the work that is done meanwhile, in this thread, answer with ``Session.respond``."""
         token = pending_response.set(self)
         try:

@@ -195,7 +195,7 @@ class Store:
                 )
             self._require_untruncated_log(session)
             if self._file is not None:
-                self._file.require_there()
+                self._file.require_same_file()
                 self._file.require_write_ahead_log()
             if lasting:
                 self.sharing.publish(session, COMMITTED)
@@ -248,7 +248,7 @@ class Store:
             raise DamagedError(f"nothing can be changed now: {message}", hint=hint)
         if self._file is not None:
             with self._note_raised_damage():
-                self._file.require_there()
+                self._file.require_same_file()
 
     def require_intact_database(self, wanted: Callable[[], bool] = lambda: True) -> None:
         """Let SQLite look at every page and index; raise DamagedError where it finds a fault.

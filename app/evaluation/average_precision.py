@@ -220,7 +220,7 @@ COLUMNS = (
 def make_detection_summary(judged: Sequence[JudgedFrame], resamples: MatchResamples) -> Table:
     """AP with intervals by match."""
     hits = match_detections_to_balls(judged)
-    place = resamples.places([item.frame.match for item in judged])
+    place = resamples.find_match_columns([item.frame.match for item in judged])
     ap_50, ap = coco_average_precision(judged)
     balls = int(hits.balls.sum())
 
@@ -304,7 +304,7 @@ class ErrorBins:
     unit: str
     edges: tuple[float, ...]
 
-    def place(self, value: float | None) -> int | None:
+    def find_bin_index(self, value: float | None) -> int | None:
         """Index of the bin of a value."""
         if value is None or value < self.edges[0]:
             return None
@@ -315,7 +315,7 @@ class ErrorBins:
         high = self.edges[index + 1] if index + 1 < len(self.edges) else None
         return self.edges[index], high
 
-    def name(self, index: int) -> str:
+    def format_bin_name(self, index: int) -> str:
         """``20 to 30 m``."""
         low, high = self.bounds(index)
         if high is None:
@@ -343,7 +343,7 @@ def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
     kept = [frame for frame in frames if frame.error_m is not None]
     inside: dict[int, list[float]] = {}
     for frame in kept:
-        place = bins.place(getattr(frame, bins.field))
+        place = bins.find_bin_index(getattr(frame, bins.field))
         if place is not None and frame.error_m is not None:
             inside.setdefault(place, []).append(frame.error_m)
     places = sorted(inside)
@@ -381,7 +381,7 @@ def make_detection_table(
     """
     members: dict[int, list[int]] = {}
     for index, frame in enumerate(frames):
-        place = bins.place(getattr(frame, bins.field)) if frame.ball else None
+        place = bins.find_bin_index(getattr(frame, bins.field)) if frame.ball else None
         if place is not None:
             members.setdefault(place, []).append(index)
     rows = []
@@ -395,7 +395,9 @@ def make_detection_table(
             Cell(hits / count, count=count, of=count),
         )
         low, high = bins.bounds(place)
-        rows.append(Row(f"{low:g}", bins.name(place), cells, FrameRange(bins.field, low, high)))
+        rows.append(
+            Row(f"{low:g}", bins.format_bin_name(place), cells, FrameRange(bins.field, low, high))
+        )
     columns = (
         Column("ap_50", "AP@0.5", "", "higher"),
         Column("ap", "AP@[.5:.95]", "", "higher"),

@@ -41,7 +41,7 @@ class MatchResamples:
         share = np.full(len(names), 1 / len(names))
         return MatchResamples(names, rng.multinomial(len(names), share, resamples).astype(float))
 
-    def places(self, matches: Sequence[str]) -> npt.NDArray[np.int64]:
+    def find_match_columns(self, matches: Sequence[str]) -> npt.NDArray[np.int64]:
         """Column of ``counts`` of each match, shape (N,).
 
         Raises:
@@ -50,7 +50,9 @@ class MatchResamples:
         place = {name: index for index, name in enumerate(self.matches)}
         return np.array([place[match] for match in matches], dtype=np.int64)
 
-    def mean(self, values: Sequence[float], matches: Sequence[str], of: int | None = None) -> Cell:
+    def mean_with_interval(
+        self, values: Sequence[float], matches: Sequence[str], of: int | None = None
+    ) -> Cell:
         """The mean with its interval; ``matches`` says where each value comes from.
 
         Args:
@@ -61,7 +63,7 @@ class MatchResamples:
         count, whole = len(values), len(values) if of is None else of
         if not count:
             return Cell(None, count=0, of=whole)
-        array, place = np.asarray(values, dtype=float), self.places(matches)
+        array, place = np.asarray(values, dtype=float), self.find_match_columns(matches)
         sums = np.bincount(place, array, len(self.matches))
         sizes = np.bincount(place, minlength=len(self.matches)).astype(float)
         with np.errstate(invalid="ignore", divide="ignore"):

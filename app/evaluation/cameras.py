@@ -154,7 +154,9 @@ def measure_error_without_marking(
     if camera is None:
         return None
     problem = ResectionProblem.of(size, policy)
-    seen = make_observations(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
+    seen = make_observations(
+        make_lines({marking: lines[marking]}), policy.with_fitted_goal(pitch), size
+    )
     return float(problem.distances(problem.parameters(camera), seen).max())
 
 
@@ -245,7 +247,7 @@ def _make_score_row(
 
     def make_mean_cell(value: Callable[[FrameScore], float]) -> Cell:
         values = [0.0 if item is None else value(item) for item in found]
-        return resamples.mean(values, matches)
+        return resamples.mean_with_interval(values, matches)
 
     cells = (
         make_mean_cell(lambda _item: 1.0),

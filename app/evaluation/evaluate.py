@@ -180,7 +180,10 @@ def _make_box_row(
     matches = [frame.match for frame, _, _ in compared]
     overlaps = [iou(box, careful) for _, box, careful in compared]
     errors = [size_error_percent(box, careful) for _, box, careful in compared]
-    cells = (resamples.mean(overlaps, matches, whole), resamples.mean(errors, matches, whole))
+    cells = (
+        resamples.mean_with_interval(overlaps, matches, whole),
+        resamples.mean_with_interval(errors, matches, whole),
+    )
     return Row(kind, label, cells, behind)
 
 

@@ -229,7 +229,7 @@ class FrameNameIndex:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
         return "is not a number that the name of a picture of the dataset has"
 
-    def examples(self, most: int = 3) -> list[str]:
+    def list_example_names(self, most: int = 3) -> list[str]:
         """How some frames of the dataset are called."""
         found = list(self.frames.values())[:most]
         return [

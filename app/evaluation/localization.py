@@ -202,9 +202,9 @@ def _make_hits_row(
     values, shares = _list_known_values(kept, error), _list_known_values(kept, percent)
     near = [float(value < NEAR_M) for value in values]
     cells = (
-        resamples.mean(values, matches, len(balls)),
-        resamples.mean(shares, matches, len(balls)),
-        resamples.mean(near, matches, len(balls)),
+        resamples.mean_with_interval(values, matches, len(balls)),
+        resamples.mean_with_interval(shares, matches, len(balls)),
+        resamples.mean_with_interval(near, matches, len(balls)),
         _make_median_cell(values, len(balls)),
     )
     return Row(name, f"{label}, IoU > 0", cells, FrameRange(error))
@@ -222,9 +222,9 @@ def _make_all_frames_row(
     ]
     near = [float(_is_error_within_limit(getattr(frame, error))) for frame in balls]
     cells = (
-        resamples.mean(values, matches, len(balls)),
-        resamples.mean(percent, matches, len(balls)),
-        resamples.mean(near, [frame.match for frame in balls]),
+        resamples.mean_with_interval(values, matches, len(balls)),
+        resamples.mean_with_interval(percent, matches, len(balls)),
+        resamples.mean_with_interval(near, [frame.match for frame in balls]),
         _make_median_cell(values, len(balls)),
     )
     return Row(f"{name}_all", f"{label}, all frames", cells, FrameRange("distance_m"))

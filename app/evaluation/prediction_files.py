@@ -135,7 +135,7 @@ def read_predictions(
             _read_yolo(tree, path, run)
         else:
             read_table(tree, path, run, limits)
-    run.finish(path)
+    run.validate_predictions(path)
     return run.found
 
 
@@ -206,7 +206,7 @@ def read_predicted_cameras(
                     f"was made for {other.width} x {other.height}: its principal point is the middle of "
                     f"that; say so (--cameras-size {other.width}x{other.height})"
                 )
-                found.report.note(path.name, name, "principal_point", message)
+                found.report.add_problem_at(path.name, name, "principal_point", message)
             found.cameras[identity] = _resize_camera(camera, made_for, annotated)
     return found
 
@@ -375,11 +375,11 @@ def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) ->
             identity = _format_image_id(value.get("image_id"))
     box = read_field(value, "bbox", lambda item: Box(*fields.parse_numbers(item, 4)))
     score = read_field(value, "score", fields.parse_number) if "score" in value else None
-    if not run.wants(*_read_class(value, known)):
+    if not run.count_class_and_check_ball(*_read_class(value, known)):
         return
     named = known.names.find(identity) or ""
     if own:
-        frame = run.frame(own)
+        frame = run.find_frame(own)
         if problem := _describe_contradiction(run, own, identity, named, frame):
             raise FieldError("file_name", problem)
     elif named or isinstance(value["image_id"], str):
@@ -389,7 +389,7 @@ def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) ->
         run.miss(f"image {identity}", _NUMBER_ALONE)
     if frame is not None:
         with raise_as_field_error("bbox"):
-            run.add(frame, box, score, known.sizes.get(own or named), from_corner=True)
+            run.add_detection(frame, box, score, known.sizes.get(own or named), from_corner=True)
 
 
 def _describe_contradiction(
@@ -440,7 +440,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionCollector) -> None:
         rows.extend((shown, number, frame, cells) for number, cells in boxes)
     tracked = _has_track_ids([cells for _, _, _, cells in rows])
     if tracked:
-        run.found.report.note(str(path), None, None, _TRACKED)
+        run.found.report.add_problem_at(str(path), None, None, _TRACKED)
     for shown, number, frame, cells in rows:
         run.found.report.read += 1
         with report_invalid_record(run.found.report, shown, f"line {number}"):
@@ -472,9 +472,9 @@ def _add_yolo_row(
     if not all(-1 <= value <= 2 for value in (x, y, width, height)):
         raise ValueError("is in pixels; YOLO's numbers are fractions of the image size")
     score = fields.parse_number(cells[5]) if len(cells) > 5 and not tracked else None
-    if not run.wants(category) or frame is None:
+    if not run.count_class_and_check_ball(category) or frame is None:
         return
     across, down = frame.size.width, frame.size.height
     box = Box((x - width / 2) * across, (y - height / 2) * down, width * across, height * down)
     with raise_as_field_error("cx, cy, w, h"):
-        run.add(frame, box, score, frame.size, from_corner=True)
+        run.add_detection(frame, box, score, frame.size, from_corner=True)

@@ -109,30 +109,30 @@ class PredictionCollector:
         self._total = 0
         self._near_corner = 0
 
-    def frame(self, name: str) -> NamedFrame | None:
+    def find_frame(self, name: str) -> NamedFrame | None:
         """The frame of a name; a name that is none is counted."""
         found = self.names.find(name)
         if found is None:
-            self.miss(name, self.names.explain_unknown(name))
+            self.count_unknown_frame(name, self.names.explain_unknown(name))
         else:
             self.matched = True
         return found
 
-    def numbered(self, text: str) -> NamedFrame | None:
+    def find_frame_by_number(self, text: str) -> NamedFrame | None:
         """The frame of a number as its picture or view has it in its name, ``4`` for ``0004.jpg``."""
         found = self.names.find(text) or self.names.find_by_number(text)
         if found is None:
-            self.miss(text, self.names.explain_unknown_number(text))
+            self.count_unknown_frame(text, self.names.explain_unknown_number(text))
         else:
             self.matched = True
         return found
 
-    def miss(self, name: str, why: str) -> None:
+    def count_unknown_frame(self, name: str, why: str) -> None:
         """Count a box whose frame is not known."""
         self.found.unknown[name] += 1
         self.found.reasons[name] = why
 
-    def wants(self, category: int | str, label: str = "") -> bool:
+    def count_class_and_check_ball(self, category: int | str, label: str = "") -> bool:
         """Whether a box of that class is a ball; ``label`` is what the file calls the class."""
         self.categories[category] += 1
         if label:
@@ -143,7 +143,7 @@ class PredictionCollector:
         self.left_out += 1
         return False
 
-    def add(
+    def add_detection(
         self,
         frame: NamedFrame,
         box: Box,
@@ -185,7 +185,7 @@ class PredictionCollector:
             box = box_from_corner_origin(_scale_box(corner, seen, frame.size))
         found.append(Detection(box, 1.0 if score is None else score))
 
-    def finish(self, path: Path) -> None:
+    def validate_predictions(self, path: Path) -> None:
         """Refuse a file that says nothing, or whose ball cannot be told from other classes."""
         report = self.found.report
         unlabelled = [name for name in self.categories if name not in self.labels]
@@ -291,7 +291,7 @@ class report_invalid_record:  # noqa: N801
         if not isinstance(error, ValueError):
             return False
         name = error.name if isinstance(error, FieldError) else None
-        self.report.note(self.path, self.record, name, str(error))
+        self.report.add_problem_at(self.path, self.record, name, str(error))
         return True
 
 

@@ -167,22 +167,22 @@ def _add_row(run: PredictionCollector, cells: Mapping[str, str]) -> None:
                 read_field(cells, "img_h", fields.parse_whole_number),
             )
         with raise_as_field_error(where):
-            run.add(frame, box, score, size)
+            run.add_detection(frame, box, score, size)
 
 
 def _is_ball_row(run: PredictionCollector, cells: Mapping[str, str]) -> bool:
     """Whether the class of a row is the ball's."""
     column = next((name for name in _CLASSES if not is_missing(cells.get(name))), None)
     if column is None:
-        return run.wants(0)
+        return run.count_class_and_check_ball(0)
     text = cells[column].strip()
     named = next(
         (cells[name].strip() for name in _CLASS_NAMES if not is_missing(cells.get(name))), ""
     )
     try:
-        return run.wants(fields.parse_whole_number(text), named)
+        return run.count_class_and_check_ball(fields.parse_whole_number(text), named)
     except ValueError:
-        return run.wants(text, text)
+        return run.count_class_and_check_ball(text, text)
 
 
 def _read_row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
@@ -217,19 +217,19 @@ def _find_row_frame(run: PredictionCollector, cells: Mapping[str, str]) -> Named
             f"{action}" if is_missing(replay) else f"{action}_{fields.parse_whole_number(replay)}"
         )
         parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
-        return run.frame("/".join([part for part in parts if part] + [image]))
+        return run.find_frame("/".join([part for part in parts if part] + [image]))
     if number is not None and not is_missing(cells.get("camera")):
         camera = id_to_text((cells["camera"] or "").strip().removeprefix("cam"))
-        return run.frame(f"cam{camera}/{id_to_text(cells[number])}")
+        return run.find_frame(f"cam{camera}/{id_to_text(cells[number])}")
     # The name of a picture says more than a number, which tools count from where they like. Beside
     # a class, "name" is that of the class.
     named = any(name in cells for name in _CLASSES)
     for name in _NAMES:
         if not is_missing(cells.get(name)) and not (named and name == "name"):
             text = cells[name].strip()
-            return run.frame(id_to_text(text) or text if name == "image_id" else text)
+            return run.find_frame(id_to_text(text) or text if name == "image_id" else text)
     if number is not None:
-        return run.numbered(cells[number].strip())
+        return run.find_frame_by_number(cells[number].strip())
     raise FieldError("frame", "is missing, and so is every other column that can name the frame")
 
 
@@ -277,7 +277,7 @@ def read_tracks(
                 tree, beside, ("kind",), report, limits, partial(_add_event, events)
             )
         report.imported += len(balls.position)
-        found["" if folder == "." else folder] = balls.track(events)
+        found["" if folder == "." else folder] = balls.build_track(events)
     return found
 
 
@@ -324,7 +324,9 @@ class _PredictedTrackBuilder:
         self.position.append((x, y, z))
         self.sigma.append(sigma)
 
-    def track(self, events: list[tuple[str, int | None, float | None]] | None) -> PredictedTrack:
+    def build_track(
+        self, events: list[tuple[str, int | None, float | None]] | None
+    ) -> PredictedTrack:
         """All of them."""
         return PredictedTrack(
             tuple(self.frames),

@@ -85,7 +85,7 @@ class GroundTruthTrack:
     events: tuple[tuple[str, float], ...]
 
     @property
-    def there(self) -> BoolArray:
+    def has_ball(self) -> BoolArray:
         """Frames with a ball, shape (N,)."""
         return np.asarray(np.isfinite(self.position).all(axis=1))
 
@@ -180,7 +180,7 @@ def _match_tracks(
 def _compare_track(
     found: _TrackComparison, track: GroundTruthTrack, predicted: PredictedTrack | None
 ) -> None:
-    there = track.there
+    there = track.has_ball
     rows = np.full(len(track.frames), -1)
     if predicted is not None:
         place = _match_predictions_to_rows(track, predicted)
@@ -266,12 +266,14 @@ def _make_position_row(
         name,
         label,
         (
-            resamples.mean(errors, stretches, of),
+            resamples.mean_with_interval(errors, stretches, of),
             Cell(float(np.median(errors)) if errors else None, count=len(errors), of=of),
-            resamples.mean(near, stretches, of),
-            resamples.mean(near_all, everywhere),
-            resamples.mean([float(np.isfinite(found.error[at])) for at in chosen], everywhere),
-            resamples.mean(inside, [found.stretch[at] for at in sure], len(placed)),
+            resamples.mean_with_interval(near, stretches, of),
+            resamples.mean_with_interval(near_all, everywhere),
+            resamples.mean_with_interval(
+                [float(np.isfinite(found.error[at])) for at in chosen], everywhere
+            ),
+            resamples.mean_with_interval(inside, [found.stretch[at] for at in sure], len(placed)),
         ),
     )
 

@@ -131,7 +131,9 @@ class CocoCategories:
             if self._index.add(value, category):
                 self._all.append(category)
             else:
-                report.note(path, f"category {category.shown}", "id", "is listed twice; left out")
+                report.add_problem_at(
+                    path, f"category {category.shown}", "id", "is listed twice; left out"
+                )
 
     def find(self, value: Any) -> CocoCategory | None:
         """The category of an annotation's ``category_id``; some tools write its name there."""
@@ -175,7 +177,7 @@ class CocoCategories:
             sentence = f"the file brings no ball: none of its categories ({names}) is taken for it"
             sentence += f"; {HOW}"
         if alone:
-            self._report.note(self._path, None, "categories", sentence)
+            self._report.add_problem_at(self._path, None, "categories", sentence)
         else:
             self._report.add_remark(f"{self._path}: {sentence}")
 
@@ -183,13 +185,13 @@ class CocoCategories:
         for index, item in enumerate(listed):
             record = f"categories[{index}]"
             if not isinstance(item, dict) or id_to_text(item.get("id")) is None:
-                self._report.note(
+                self._report.add_problem_at(
                     self._path, record, "id", "must be a number or a text; this entry is left out"
                 )
                 continue
             name = item.get("name")
             if not isinstance(name, str) or not name.strip():
-                self._report.note(self._path, record, "name", "is missing or no text")
+                self._report.add_problem_at(self._path, record, "name", "is missing or no text")
                 name = ""
             yield item["id"], self._make_category(item["id"], name.strip(), item)
 

@@ -178,18 +178,18 @@ class _CameraFieldReader:
 
     def read_field(self, name: str, parse: Callable[[Any], T]) -> T:
         if name not in self.value:
-            raise self.error(name, "is missing")
+            raise self.make_field_error(name, "is missing")
         try:
             return _require_plausible_magnitude(parse(self.value[name]))
         except ValueError as error:
-            raise self.error(name, str(error)) from error
+            raise self.make_field_error(name, str(error)) from error
 
     def read_distortion(self, name: str, count: int) -> tuple[float, ...]:
         if self.value.get(name) is None:
             return (0.0,) * count
         return self.read_field(name, lambda value: fields.parse_numbers(value, count))
 
-    def error(self, name: str, problem: str) -> DatasetFormatError:
+    def make_field_error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self.path, self.record, name, problem)
 
 
@@ -198,17 +198,19 @@ def _read_lens(reader: _CameraFieldReader) -> tuple[str, tuple[float, ...]]:
     name = reader.value.get(LENS)
     if name is None or name == BROWN_CONRADY:
         if reader.value.get(LENS_COEFFICIENTS) is not None:
-            raise reader.error(
+            raise reader.make_field_error(
                 LENS_COEFFICIENTS, f"need a {LENS} that is one of {_list_lens_names()}"
             )
         radial, tangential, prism = (reader.read_distortion(*each) for each in _DISTORTION)
         k1, k2, k3, k4, k5, k6 = radial
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
     if not isinstance(name, str) or name not in LENSES:
-        raise reader.error(LENS, f"is {quote_text(str(name), 40)}; lenses are {_list_lens_names()}")
+        raise reader.make_field_error(
+            LENS, f"is {quote_text(str(name), 40)}; lenses are {_list_lens_names()}"
+        )
     for other, count in _DISTORTION:
         if any(reader.read_distortion(other, count)):
-            raise reader.error(
+            raise reader.make_field_error(
                 other, f"must be left out or zero, because the lens {name} has no such coefficients"
             )
     count = LENSES[name].count
@@ -236,7 +238,7 @@ def _read_rotation(reader: _CameraFieldReader) -> FloatArray:
     apart = float(np.degrees(2 * np.arcsin(min(chord / np.sqrt(8.0), 1.0))))
     if apart > MAX_DISAGREEMENT_DEGREES:
         problem = f"disagrees with pan, tilt and roll by {apart:.2g} degrees"
-        raise reader.error("rotation_matrix", problem)
+        raise reader.make_field_error("rotation_matrix", problem)
     return rotation
 
 

@@ -96,7 +96,7 @@ def read_cameras(
         files = _select_camera_files(names)
         if names and not files:
             endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
-            report.note(
+            report.add_problem_at(
                 str(path),
                 None,
                 None,
@@ -185,7 +185,7 @@ def _read_camera_file(
         items = _parse_camera_items(tree.read_bytes(name), name, key, shown, report, limits)
     except DatasetFormatError as error:
         report.read += 1
-        report.skip(error)
+        report.add_problem(error)
         return
     stems = Counter(_camera_key_of_record(record, deep=False) for record, _ in items if record)
     for record, item in items:
@@ -207,7 +207,7 @@ def _read_camera_file(
             if covariance is not None:
                 stated.covariances[called] = covariance
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
 
 
 def _read_covariance(item: Any, camera: Camera, shown: str, record: str | None) -> Any:
@@ -380,7 +380,7 @@ def write_camera_files(
         counts["groups"] += 1
         for view in record.group.views:
             name, camera = (
-                _make_camera_file_path(record.group, record.named(view)),
+                _make_camera_file_path(record.group, record.with_export_file_key(view)),
                 record.camera(view),
             )
             if camera is None:

@@ -79,7 +79,7 @@ class JoinedAnnotations:
         return len(self._names.get(name, [])) == 1
 
     def _report_problem(self, record: str, field: str | None, problem: str) -> None:
-        self._report.note(self._path, record, field, problem)
+        self._report.add_problem_at(self._path, record, field, problem)
 
     def _add_image(self, index: int, item: Any) -> None:
         if not isinstance(item, dict):

@@ -172,7 +172,7 @@ def _report_picture_problems(
             problem = f"has no picture of its own: {fits} cannot be told apart by {name}"
             if len(item.rivals) == 1:
                 problem = f"has no picture of its own: {fits} fits another image as well"
-            report.note(
+            report.add_problem_at(
                 file.path, frame.record, "file_name", f"{problem}; write the folder before the name"
             )
         elif item.place is None:
@@ -191,7 +191,7 @@ def _report_picture_problems(
             f" (looked in {where} and everywhere else)"
         )
         if finder.has_pictures:
-            report.note(file.path, None, "file_name", sentence)
+            report.add_problem_at(file.path, None, "file_name", sentence)
         else:
             report.add_remark(f"{file.path}: {sentence}")
 
@@ -223,7 +223,7 @@ def _merge_records_of_frame(frame: CocoFrame, other: CocoFrame, report: ReaderRe
     """Add what another record says of a frame; what contradicts is named, and the first one counts."""
     first = f"{frame.path}, {frame.record}" if other.path != frame.path else frame.record
     if other.size != frame.size:
-        report.note(
+        report.add_problem_at(
             other.path,
             other.record,
             "width",
@@ -237,7 +237,7 @@ def _merge_records_of_frame(frame: CocoFrame, other: CocoFrame, report: ReaderRe
         frame.camera = other.camera
     elif other.camera is not None and other.camera != frame.camera:
         problem = f"differs from the camera in {first}, which is used"
-        report.note(other.path, other.record, "camera", problem)
+        report.add_problem_at(other.path, other.record, "camera", problem)
     if not frame.split:
         frame.split = other.split
     elif other.split and other.split != frame.split:
@@ -245,7 +245,7 @@ def _merge_records_of_frame(frame: CocoFrame, other: CocoFrame, report: ReaderRe
             f"puts this image into the split {other.split}, and {first} puts it into"
             f" {frame.split}; {frame.split} counts"
         )
-        report.note(other.path, other.record, "split", problem)
+        report.add_problem_at(other.path, other.record, "split", problem)
     for ball in other.balls:
         _add_ball(frame, ball, other, first, report)
     shown = [_class_and_points(box) for box in frame.boxes]
@@ -266,7 +266,7 @@ def _add_ball(
             frame.balls[place] = replace(kept, occluded=occluded)
             return
     if frame.balls:
-        report.note(
+        report.add_problem_at(
             other.path,
             other.record,
             "annotations",
@@ -339,7 +339,7 @@ def _drop_duplicate_frames(
                 f"is a second view {frame.view} of group {key}, with another picture than"
                 f" {other.record}; left out"
             )
-            report.note(frame.path, frame.record, "view", problem)
+            report.add_problem_at(frame.path, frame.record, "view", problem)
     return list(views.values())
 
 
@@ -359,7 +359,9 @@ def _choose_split(frames: Sequence[CocoFrame], key: str, report: ReaderReport) -
     for other in splits[1:]:
         frame = next(item for item in frames if item.split == other)
         problem = f"puts a view of group {key} into {other}, another one is in {splits[0]}"
-        report.note(frame.path, frame.record, "split", f"{problem}; the group is in {splits[0]}")
+        report.add_problem_at(
+            frame.path, frame.record, "split", f"{problem}; the group is in {splits[0]}"
+        )
     return splits[0] if splits else ""
 
 

@@ -96,7 +96,7 @@ def read_coco(
             if value is not None:
                 file = _CocoFileReader(tree, name, finder, value, report, ball_category)
                 files.append(file)
-                for view in file.views():
+                for view in file.read_views():
                     yield from groups.add(view, tree.shown(name))
                 file.release_parsed_content()
         yield from groups.release_incomplete_groups()
@@ -104,7 +104,9 @@ def read_coco(
         yield from group_frames(foreign, tree, names, calibration, report)
         _report_ball_categories(files, report)
         if not files:
-            report.note(str(root), None, None, "holds no COCO file (images and annotations)")
+            report.add_problem_at(
+                str(root), None, None, "holds no COCO file (images and annotations)"
+            )
 
 
 def _read_coco_file(
@@ -116,12 +118,12 @@ def _read_coco_file(
         content = tree.read_bytes(name)
         value = read_json(content, shown, max_bytes=limits.file_bytes, report=report)
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
         return None
     if isinstance(value, dict) and isinstance(value.get("images"), list):
         if not is_gamestate(value.get("annotations")):
             return value
-        report.note(shown, None, None, describe_document(value))
+        report.add_problem_at(shown, None, None, describe_document(value))
         return None
     report.add_remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
@@ -177,13 +179,13 @@ class _CocoFileReader:
         """A list that need not be there."""
         found = self._value.get(name)
         if found is not None and not isinstance(found, list):
-            self._report.note(self.path, None, name, "is not a list; left out")
+            self._report.add_problem_at(self.path, None, name, "is not a list; left out")
         return found if isinstance(found, list) else []
 
     def _report_problem(self, record: str, field: str | None, problem: str) -> None:
-        self._report.note(self.path, record, field, problem)
+        self._report.add_problem_at(self.path, record, field, problem)
 
-    def views(self) -> Iterator[PlacedView]:
+    def read_views(self) -> Iterator[PlacedView]:
         """Images of ours as views; those of others become ``frames``.
 
         What is wrong with one is reported and leaves it out.
@@ -198,7 +200,7 @@ class _CocoFileReader:
                 else:
                     self.frames.frames.append(self._read_foreign_image(image, index))
             except DatasetFormatError as error:
-                self._report.skip(self._add_annotation_count_to_error(error, index))
+                self._report.add_problem(self._add_annotation_count_to_error(error, index))
 
     def _add_annotation_count_to_error(
         self, error: DatasetFormatError, index: int
@@ -212,11 +214,11 @@ class _CocoFileReader:
 
     def _read_own_image(self, image: StateReader, index: int) -> PlacedView:
         state = StateReader(image.value[STATE], self.path, image.record)
-        view = state.view(image.size(), Extras())
+        view = state.read_view(image.read_size(), Extras())
         changed = self._apply_box_changes(index, view, state.value.get(ORIGIN) == CORNER)
-        media = self._find_own_media(image.text("file_name", ""))
+        media = self._find_own_media(image.read_short_text("file_name", ""))
         view = replace(view, balls=changed, media=media)
-        return PlacedView(state.head(), state.count("position"), view)
+        return PlacedView(state.read_group_head(), state.read_count("position"), view)
 
     def _apply_box_changes(
         self, index: int, view: View, from_corner: bool
@@ -276,7 +278,7 @@ class _CocoFileReader:
 
     def _read_bbox(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
-            return StateReader.box(item.get("bbox"))
+            return StateReader.parse_box(item.get("bbox"))
         except ValueError as error:
             self._report_problem(record, "bbox", f"{error}; left out")
             return None
@@ -287,12 +289,12 @@ class _CocoFileReader:
         return None if place is None else self._tree.media(place)
 
     def _read_foreign_image(self, image: StateReader, index: int) -> CocoFrame:
-        parts = split_picture_name(image.text("file_name"))
+        parts = split_picture_name(image.read_short_text("file_name"))
         key = self._make_image_key(image, parts)
         group, view = self._read_group_and_view(image, key)
         split = self._home.split or find_split_in_folders(parts[:-1])
         frame = CocoFrame(
-            self.path, image.record, parts, key, group, view, image.size(), split,
+            self.path, image.record, parts, key, group, view, image.read_size(), split,
             self._read_foreign_camera(image), named=image.value.get("view") is not None,
         )  # fmt: skip
         for record, item in self._joined.of_image[index]:
@@ -301,7 +303,7 @@ class _CocoFileReader:
 
     def _make_image_key(self, image: StateReader, parts: tuple[str, ...]) -> str:
         """Key of an image: its name; of one on another machine the last part, where that is enough."""
-        text = image.text("file_name")
+        text = image.read_short_text("file_name")
         key = "/".join(parts)
         try:
             if not parts:

@@ -44,7 +44,7 @@ class ExportRecord:
         """``train``, ``test``, ``valid`` or empty: that of the view, or else of its group."""
         return self.splits.get(view.key, self.group.split)
 
-    def named(self, view: View) -> View:
+    def with_export_file_key(self, view: View) -> View:
         """A view with the key by which its files are called."""
         return with_export_key(view, self.names.get(view.key))
 
@@ -112,7 +112,7 @@ def choose_ball_box(record: ExportRecord, view: View, kind: str) -> Box | None:
 
 def find_export_frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
-    placed, called = record.frames.get(view.key), record.named(view)
+    placed, called = record.frames.get(view.key), record.with_export_file_key(view)
     return placed or frame_path_by_match(
         record.group, called, record.split(view), guess_frame_suffix(view)
     )

@@ -101,9 +101,11 @@ def read_frames(
             if suffix in IMAGE_SUFFIXES:
                 pictures.append(name)
             elif suffix in VIDEO_SUFFIXES:
-                report.note(tree.shown(name), None, None, IS_VIDEO)
+                report.add_problem_at(tree.shown(name), None, None, IS_VIDEO)
             elif not is_system_file(name):
-                report.note(tree.shown(name), None, None, "is no JPEG, PNG or WebP picture")
+                report.add_problem_at(
+                    tree.shown(name), None, None, "is no JPEG, PNG or WebP picture"
+                )
         groups = _group_by_name(pictures, grouping, pattern)
         if grouping and pictures:
             _report_groups(report, groups, grouping)
@@ -113,7 +115,7 @@ def read_frames(
                 label = PurePosixPath(key).name
                 yield Group(key, tuple(views), label=f"Image {label}" if names == [key] else label)
         if not pictures and not report.problems:
-            report.note(str(root), None, None, "holds no picture (JPEG, PNG or WebP)")
+            report.add_problem_at(str(root), None, None, "holds no picture (JPEG, PNG or WebP)")
 
 
 def _group_by_name(
@@ -155,7 +157,7 @@ def _read_views(
         try:
             size = _read_image_size(tree, name, size_of)
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
             continue
         report.imported += 1
         key = PurePosixPath(name).name if short else name
@@ -215,7 +217,7 @@ class FrameList:
             try:
                 self._add_frame(item)
             except (InputError, NotFoundError) as error:
-                report.note(shown, f"frames/{number}", None, error.message)
+                report.add_problem_at(shown, f"frames/{number}", None, error.message)
 
     def _add_frame(self, item: Any) -> None:
         def read_text_field(name: str) -> str | None:
@@ -275,7 +277,7 @@ class FrameList:
             names = ", ".join(f"{group}/{view}" for group, view in list(unused)[:5])
             more = ", ..." if len(unused) > 5 else ""
             problem = f"{count} no view of what was read: {names}{more}"
-            self._report.note(self._shown, None, "frames", problem)
+            self._report.add_problem_at(self._shown, None, "frames", problem)
 
     def _replace_listed_frame(self, group: str, view: View) -> View:
         media = self._media.get((group, view.key))

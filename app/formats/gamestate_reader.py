@@ -100,7 +100,7 @@ def read_gamestate(
         names = tree.names()
         files = [name for name in names if PurePosixPath(name).name == LABELS]
         if not files:
-            report.note(str(root), None, None, f"holds no {LABELS}")
+            report.add_problem_at(str(root), None, None, f"holds no {LABELS}")
         seen: dict[tuple[str, str], str] = {}
         stems: dict[str, set[str]] = {}
         for name in files:
@@ -112,7 +112,7 @@ def read_gamestate(
                     problem = f"describes the sequence {sequence.key} again and is left out; {seen[place]} is used"
                     raise DatasetFormatError(sequence.path, None, None, problem)
             except DatasetFormatError as error:
-                report.skip(error)
+                report.add_problem(error)
                 continue
             seen[place] = sequence.path
             yield from sequence.groups(calibration, stems.setdefault(sequence.key, set()))
@@ -168,7 +168,7 @@ class _LabelledSequence:
     def _get_list(self, name: str) -> list[Any]:
         value = self._value.get(name)
         if not isinstance(value, list):
-            self._report.note(self.path, None, name, "is missing or not a list")
+            self._report.add_problem_at(self.path, None, name, "is missing or not a list")
             return []
         return value
 
@@ -185,7 +185,9 @@ class _LabelledSequence:
             image = _AnnotatedImage(record, size)
             if not index.add(identity, image):
                 problem = f"is {identity}, the id of an earlier image, too: that one gets all its annotations"
-                self._report.note(self.path, str(record["file_name"]), "image_id", problem)
+                self._report.add_problem_at(
+                    self.path, str(record["file_name"]), "image_id", problem
+                )
             images.append(image)
         self._join_annotations(index)
         common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
@@ -223,10 +225,10 @@ class _LabelledSequence:
                     _read_side_length(image, "width"), _read_side_length(image, "height")
                 )
             except UnsafePathError as error:
-                self._report.note(self.path, where, "file_name", error.message)
+                self._report.add_problem_at(self.path, where, "file_name", error.message)
                 continue
             except ValueError as error:
-                self._report.note(self.path, where, None, str(error))
+                self._report.add_problem_at(self.path, where, None, str(error))
                 continue
             names.add(PurePosixPath(key).stem)
             yield image.get("image_id", image.get("id")), image, size
@@ -238,13 +240,15 @@ class _LabelledSequence:
             where = f"annotations[{index}]"
             image = images.find(item.get("image_id")) if isinstance(item, dict) else None
             if image is None:
-                self._report.note(self.path, where, "image_id", "names no image of the file")
+                self._report.add_problem_at(
+                    self.path, where, "image_id", "names no image of the file"
+                )
                 continue
             name = categories.find(item.get("category_id"))
             if name is None:
                 shown = str(item.get("category_id"))[:40]
                 problem = f"is {shown}, which is not a category; the annotation is kept for export and not used"
-                self._report.note(self.path, where, "category_id", problem)
+                self._report.add_problem_at(self.path, where, "category_id", problem)
             if name == PITCH:
                 self._add_lines(image, item, image.size, where)
             elif name is not None and is_ball_name(name):
@@ -269,7 +273,9 @@ class _LabelledSequence:
         self, image: _AnnotatedImage, item: dict[str, Any], size: ImageSize, where: str
     ) -> None:
         if "pitch" in image.kept:
-            self._report.note(self.path, where, None, "is a second pitch of its image; left out")
+            self._report.add_problem_at(
+                self.path, where, None, "is a second pitch of its image; left out"
+            )
             return
         image.kept["pitch"] = {name: value for name, value in item.items() if name != "lines"}
         try:
@@ -277,13 +283,13 @@ class _LabelledSequence:
             lines = item.get("lines") or {}
             image.lines, image.other_lines = lines_from_json(lines, size, shown, self._report)
         except DatasetFormatError as error:
-            self._report.note(self.path, where, "lines", error.problem)
+            self._report.add_problem_at(self.path, where, "lines", error.problem)
 
     def _add_ball(self, image: _AnnotatedImage, item: dict[str, Any], where: str) -> None:
         try:
             image.balls.append(_read_ball(item))
         except ValueError as error:
-            self._report.note(
+            self._report.add_problem_at(
                 self.path, where, "bbox_image", f"{error}; kept for export and not used"
             )
             image.kept.setdefault("others", []).append(item)

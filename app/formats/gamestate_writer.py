@@ -158,7 +158,7 @@ def _reserve_image_name(
     names: dict[tuple[str, str], str], record: ExportRecord, view: View
 ) -> None:
     """Keep the name of an image; raises InputError where another one of its sequence has it."""
-    name = frame_file_name(record.group, record.named(view))
+    name = frame_file_name(record.group, record.with_export_file_key(view))
     whose = f"{record.group.key}, {view.key}"
     first = names.setdefault(
         (record.group.match, normalize_file_name(PurePosixPath(name).stem)), whose
@@ -219,7 +219,7 @@ def _image_to_json(
 ) -> dict[str, Any]:
     kept, name = (
         read_source_fields(view).get("image"),
-        frame_file_name(record.group, record.named(view)),
+        frame_file_name(record.group, record.with_export_file_key(view)),
     )
     if isinstance(kept, dict):
         return kept | ({"file_name": name} if view.key in record.names else {})

@@ -89,7 +89,7 @@ def _object_names(path: StoredPath) -> Iterable[str]:
     if not path.is_dir():
         return [path.name]
     start = len(path.key) + 1 if path.key else 0
-    return (item.key[start:] for item in path.store.below(path.key))
+    return (item.key[start:] for item in path.store.iterate_objects_below(path.key))
 
 
 def _names_below(root: Path, inside: str, depth: int) -> Iterator[str]:

@@ -63,9 +63,9 @@ def open_issia_3d(
         names = tree.names()
         tables = [name for name in names if PurePosixPath(name).name == TABLE_3D]
         if not tables:
-            report.note(str(folder), None, None, f"holds no {TABLE_3D}")
+            report.add_problem_at(str(folder), None, None, f"holds no {TABLE_3D}")
         for name in tables[1:]:
-            report.note(
+            report.add_problem_at(
                 tree.shown(name), None, None, f"is a second {TABLE_3D}; {tables[0]} is used"
             )
         for name in tables[:1]:
@@ -85,10 +85,10 @@ def _read_table(
             try:
                 frame = _parse_frame_number(cells)
             except ValueError as error:
-                report.note(shown, record, "frame", str(error))
+                report.add_problem_at(shown, record, "frame", str(error))
                 continue
             if frame in seen:
-                report.note(shown, record, "frame", f"is a second row of frame {frame}")
+                report.add_problem_at(shown, record, "frame", f"is a second row of frame {frame}")
                 continue
             if not seen:
                 _report_unpaired_columns(cells, shown, report)
@@ -97,7 +97,7 @@ def _read_table(
                 cells, frame, found, DatasetFormatError(shown, record, None, ""), report
             )
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
 
 
 def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: ReaderReport) -> None:
@@ -107,7 +107,7 @@ def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: Rea
         other = "y" if axis == "x" else "x"
         if (other, camera) not in there:
             problem = f"has no column {other}_cam{camera} beside it; left out"
-            report.note(shown, None, f"{axis}_cam{camera}", problem)
+            report.add_problem_at(shown, None, f"{axis}_cam{camera}", problem)
 
 
 def _parse_frame_number(cells: Mapping[str, str]) -> int:
@@ -132,7 +132,7 @@ def _read_ball_centers(
         try:
             point = _parse_ball_center(cells, axis[1])
         except ValueError as error:
-            report.note(place.path, place.record, f"cam{axis[1]}", f"{error}; left out")
+            report.add_problem_at(place.path, place.record, f"cam{axis[1]}", f"{error}; left out")
             continue
         if point is not None:
             track = found.tracks.setdefault(int(axis[1]), ViperTrack())

@@ -69,7 +69,7 @@ class IssiaOptions:
         """Size of the images of a camera."""
         return self.size or track.size or DEFAULT_SIZE
 
-    def offset(self, camera: int) -> int:
+    def get_frame_offset(self, camera: int) -> int:
         """Offset of one camera."""
         if isinstance(self.frame_offset, int):
             return self.frame_offset
@@ -241,25 +241,27 @@ def _read_tracks(
         if is_viper(tree, name):
             files.append(name)
         else:
-            report.note(tree.shown(name), None, None, "is XML of another kind than XGTF; left out")
+            report.add_problem_at(
+                tree.shown(name), None, None, "is XML of another kind than XGTF; left out"
+            )
     if not files:
-        report.note(str(tree.path), None, None, "holds no XGTF file")
+        report.add_problem_at(str(tree.path), None, None, "holds no XGTF file")
     for name in files:
         shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
         for camera, track in _assign_tracks_to_cameras(
             stem, read_viper(tree, name, report, limits), shown, report
         ):
             if camera is None:
-                report.note(shown, None, None, "has no camera number in its name")
+                report.add_problem_at(shown, None, None, "has no camera number in its name")
             elif camera in found.tracks:
-                report.note(
+                report.add_problem_at(
                     shown,
                     None,
                     None,
                     f"is left out: another file of camera {camera} was read already",
                 )
             else:
-                found.tracks[camera] = _shift_frames(track, options.offset(camera))
+                found.tracks[camera] = _shift_frames(track, options.get_frame_offset(camera))
                 _report_size_difference(camera, track, shown, options, report)
                 if not track.balls:
                     report.add_remark(f"{shown} brings no ball for camera {camera}.")
@@ -283,7 +285,7 @@ def _assign_tracks_to_cameras(
     yield parse_camera_number(stem), tracks[0]
     for number, track in enumerate(tracks[1:], 2):
         balls, persons = track.ball_point_count, track.person_box_count
-        report.note(
+        report.add_problem_at(
             shown,
             f"source {number} ({track.source})",
             None,
@@ -321,18 +323,22 @@ def _read_given_cameras(
     if not files:
         return {}
     for name in files[1:]:
-        report.note(tree.shown(name), None, None, f"is a second {CALIBRATION}; {files[0]} is used")
+        report.add_problem_at(
+            tree.shown(name), None, None, f"is a second {CALIBRATION}; {files[0]} is used"
+        )
     side = ReaderReport()
     cameras = read_camera_files(tree, files[:1], side)
     for problem in side.problems:
-        report.skip(problem)
+        report.add_problem(problem)
     shown, given = tree.shown(files[0]), dict[int, Camera]()
     for name, camera in cameras.items():
         number = parse_camera_number(name)
         if number is None:
-            report.note(shown, name[:80], None, "has no camera number in its name; left out")
+            report.add_problem_at(
+                shown, name[:80], None, "has no camera number in its name; left out"
+            )
         elif given.setdefault(number, camera) is not camera:
-            report.note(shown, name[:80], None, f"is a second camera {number}; left out")
+            report.add_problem_at(shown, name[:80], None, f"is a second camera {number}; left out")
     return given
 
 
@@ -359,12 +365,12 @@ def _index_line_files_by_camera(
         number = parse_camera_number(PurePosixPath(file.stem).name)
         if number is None:
             sentence = "has no camera number in its name; left out"
-            report.note(f"{file.place}.json", None, None, sentence)
+            report.add_problem_at(f"{file.place}.json", None, None, sentence)
         elif lines.setdefault(number, file) is not file:
             sentence = f"is a second file of lines of camera {number}; left out"
-            report.note(f"{file.place}.json", None, None, sentence)
+            report.add_problem_at(f"{file.place}.json", None, None, sentence)
     for problem in side.problems:
-        report.skip(problem)
+        report.add_problem(problem)
     return lines
 
 

@@ -165,7 +165,7 @@ def read_json_lines(content: bytes, path: str, report: ReaderReport) -> list[Any
         return None
     for problem in problems:
         report.read += 1
-        report.skip(problem)
+        report.add_problem(problem)
     return found
 
 

@@ -304,7 +304,9 @@ def _is_earlier_zip_in_store(out: StoredPath) -> bool:
 
 def _is_earlier_export_in_store(out: StoredPath) -> bool:
     """The same of a folder; one whose manifest never came is somebody's own, too."""
-    present = {item.key.removeprefix(f"{out.key}/") for item in out.store.below(out.key)}
+    present = {
+        item.key.removeprefix(f"{out.key}/") for item in out.store.iterate_objects_below(out.key)
+    }
     if not present:
         return True
     try:
@@ -317,7 +319,7 @@ def _is_earlier_export_in_store(out: StoredPath) -> bool:
 
 def _publish_to_store(staging: Path, out: StoredPath, progress: ReportProgress | None) -> None:
     """Put files in place, the manifest last; that of an earlier export goes first."""
-    store, earlier = out.store, {item.key for item in out.store.below(out.key)}
+    store, earlier = out.store, {item.key for item in out.store.iterate_objects_below(out.key)}
     manifest = (out / MANIFEST).key
     if manifest in earlier:
         # Until the new one is complete the old files are what an export cut off left behind.

@@ -66,7 +66,7 @@ class ViewRow:
     provenance: Mapping[str, str | None]
 
     @cached_property
-    def annotated(self) -> dict[str, Any]:
+    def annotated_values(self) -> dict[str, Any]:
         """Everything that was said of the view."""
         return view_to_json(self.view)
 
@@ -242,7 +242,7 @@ def _get_reprojected_ball_pixels(row: ViewRow) -> Any:
 
 
 def _make_annotated_value_getter(name: str) -> Getter:
-    return lambda row: row.annotated[name]
+    return lambda row: row.annotated_values[name]
 
 
 def _make_left_out_getter(name: str) -> Getter:
@@ -250,11 +250,13 @@ def _make_left_out_getter(name: str) -> Getter:
 
 
 def _make_annotated_json_getter(name: str) -> Getter:
-    return lambda row: json_text(row.annotated[name])
+    return lambda row: json_text(row.annotated_values[name])
 
 
 def _make_optional_annotated_getter(name: str) -> Getter:
-    return lambda row: json_text(row.annotated[name]) if name in row.annotated else None
+    return lambda row: (
+        json_text(row.annotated_values[name]) if name in row.annotated_values else None
+    )
 
 
 _SIDES = ("x", "y", "width", "height")
@@ -348,7 +350,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("lines", TEXT, _make_annotated_json_getter("lines")),
     ("balls", TEXT, _make_annotated_json_getter("balls")),
     ("given", TEXT, _make_annotated_json_getter("given")),
-    ("given_covariance", LIST, lambda row: row.annotated.get("given_covariance")),
+    ("given_covariance", LIST, lambda row: row.annotated_values.get("given_covariance")),
     ("picture", TEXT, _make_optional_annotated_getter("picture")),
     ("proposed", TEXT, _make_optional_annotated_getter("proposed")),
     ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
@@ -407,7 +409,7 @@ def read_parquet(
         names = tree.names()
         tables = [name for name in names if name.lower().endswith(".parquet")]
         if not tables:
-            report.note(str(root), None, None, "holds no Parquet file")
+            report.add_problem_at(str(root), None, None, "holds no Parquet file")
         groups = GroupAssembler(report)
         for name in tables:
             for view in _read_views(tree, name, names, report, limits):
@@ -426,12 +428,12 @@ def _read_views(
             try:
                 placed = _parse_view_row(row, shown, f"row {number}")
             except DatasetFormatError as error:
-                report.skip(error)
+                report.add_problem(error)
                 continue
             media = _find_row_media(tree, str(row.get("file_name") or ""), present)
             yield replace(placed, view=replace(placed.view, media=media))
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
 
 
 def _read_rows(tree: FileTree, name: str, limits: ImportLimits) -> Iterator[Mapping[str, Any]]:
@@ -485,8 +487,8 @@ def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> PlacedVie
     if row.get("left_out_reason") is not None:
         value["left_out"] = {"reason": row["left_out_reason"], "note": row.get("left_out_note")}
     state = StateReader(value, path, record)
-    view = state.view(state.size(), extras_from_json(parsed["extras"]))
-    return PlacedView(state.head(), state.count("position"), view)
+    view = state.read_view(state.read_size(), extras_from_json(parsed["extras"]))
+    return PlacedView(state.read_group_head(), state.read_count("position"), view)
 
 
 def _find_row_media(tree: FileTree, name: str, present: set[str]) -> Media | None:

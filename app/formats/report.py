@@ -35,16 +35,18 @@ class ReaderReport:
     dropped: int = 0
     remarks: list[str] = field(default_factory=list)
 
-    def skip(self, error: DatasetFormatError) -> None:
+    def add_problem(self, error: DatasetFormatError) -> None:
         """Note that something was left out; the reader goes on."""
         if len(self.problems) < MAX_PROBLEMS:
             self.problems.append(error)
         else:
             self.dropped += 1
 
-    def note(self, path: str, record: str | None, where: str | None, problem: str) -> None:
+    def add_problem_at(
+        self, path: str, record: str | None, where: str | None, problem: str
+    ) -> None:
         """The same from its parts."""
-        self.skip(DatasetFormatError(path, record, where, problem))
+        self.add_problem(DatasetFormatError(path, record, where, problem))
 
     def add_remark(self, sentence: str) -> None:
         """Say once what was decided, or what there is besides."""

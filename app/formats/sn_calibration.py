@@ -201,7 +201,7 @@ def read_lines_of_images(value: Any, path: str, report: ReaderReport) -> list[Li
         raise DatasetFormatError(path, None, None, f"{describe_document(value)}; {MEANT}")
     for problem in problems:
         report.read += 1
-        report.skip(problem)
+        report.add_problem(problem)
     return found
 
 
@@ -283,18 +283,22 @@ def read_match_info(
                     tree.shown(name), None, None, "is not an object with a record for each image"
                 )
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
             continue
         folder = PurePosixPath(name).parent
         for image, item in value.items():
             record = {"match": item} if isinstance(item, str) else item
             if not PurePosixPath(image).name:
-                report.note(tree.shown(name), image[:80], None, "is not the name of an image")
+                report.add_problem_at(
+                    tree.shown(name), image[:80], None, "is not the name of an image"
+                )
             elif isinstance(record, dict):
                 key = str((folder / image).with_suffix(""))
                 found[key] = {**found.get(key, {}), **record}
             else:
-                report.note(tree.shown(name), image[:80], None, "is neither text nor an object")
+                report.add_problem_at(
+                    tree.shown(name), image[:80], None, "is neither text nor an object"
+                )
     return found
 
 

@@ -116,7 +116,7 @@ def read_line_files_of_tree(
                     named = f"{key}/{named}"
             report.read += 1
             if named in seen:
-                report.note(
+                report.add_problem_at(
                     tree.shown(name), document.name, None, "is a second record of its image"
                 )
                 continue
@@ -154,7 +154,7 @@ def _read_line_documents(tree: FileTree, name: str, report: ReaderReport) -> lis
         return read_line_documents(tree.read_bytes(name), tree.shown(name), report)
     except DatasetFormatError as error:
         report.read += 1
-        report.skip(error)
+        report.add_problem(error)
         return []
 
 
@@ -240,7 +240,7 @@ def _select_points_near_image(
     if far:
         x, y = next(point for _, point in line if _is_far_outside(point))
         problem = f"({x:g}, {y:g}) is far outside the image, and the file is normalised"
-        report.note(path, None, name, f"{problem}; {_describe_left_out_points(far)}")
+        report.add_problem_at(path, None, name, f"{problem}; {_describe_left_out_points(far)}")
     return [point for _, point in line if not _is_far_outside(point)]
 
 
@@ -257,7 +257,7 @@ def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Num
     try:
         listed = fields.require_list(value)
     except ValueError as error:
-        report.note(path, None, name, f"{error}; the line is left out")
+        report.add_problem_at(path, None, name, f"{error}; the line is left out")
         return []
     for number, item in enumerate(listed, 1):
         try:
@@ -266,7 +266,7 @@ def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Num
             bad.append(number)
             first = first or str(error)
     if bad:
-        report.note(path, None, name, f"{first}; {_describe_left_out_points(bad)}")
+        report.add_problem_at(path, None, name, f"{first}; {_describe_left_out_points(bad)}")
     return points
 
 
@@ -287,7 +287,7 @@ def _read_marking_name(name: str, path: str, report: ReaderReport) -> str | None
     found = find_marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
         problem = UnknownMarkingError(name).message
-        report.note(path, None, name, f"{problem}; kept for export and not used")
+        report.add_problem_at(path, None, name, f"{problem}; kept for export and not used")
     return found
 
 

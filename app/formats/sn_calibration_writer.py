@@ -139,7 +139,7 @@ def write_sn_calibration(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                place = view_file_path(record.group, record.named(view))
+                place = view_file_path(record.group, record.with_export_file_key(view))
                 camera = record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place

@@ -97,7 +97,7 @@ class MatchFrameFinder:
             archive = self._tree.open_nested_zip(self._match + ARCHIVE, report)
         except DatasetFormatError as error:
             problem = f"{error.problem} Its match is imported without these frames."
-            report.note(error.path, error.record, error.field, problem)
+            report.add_problem_at(error.path, error.record, error.field, problem)
             return
         images = filter(_is_image_name, archive.names())
         self._members = {name: archive.stored_name(name) for name in images}
@@ -166,7 +166,7 @@ class _RecordBuilder:
     other_lines: list[Mapping[str, Any]] = field(default_factory=list)
 
     def report_problem(self, where: str, problem: str) -> None:
-        self.report.note(self.path, self.record, where, problem)
+        self.report.add_problem_at(self.path, self.record, where, problem)
 
 
 def record_from_json(value: Any, path: str, record: str, report: ReaderReport) -> ImageRecord:

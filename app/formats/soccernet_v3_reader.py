@@ -50,7 +50,7 @@ def read_soccernet_v3(
         names = tree.names()
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders:
-            report.note(str(root), None, None, f"holds no {LABELS}")
+            report.add_problem_at(str(root), None, None, f"holds no {LABELS}")
         reader = MatchReader(tree, names, report, limits)
         for folder in folders:
             yield from reader.read_match(folder)
@@ -81,7 +81,7 @@ class MatchReader:
                 problem = f"is a second file of match {match}; {self.seen[match]} is used"
                 raise DatasetFormatError(path, None, None, problem)
         except DatasetFormatError as error:
-            self.report.skip(error)
+            self.report.add_problem(error)
             return
         self.seen[match] = path
         inside = list_files_in_folder(self.names, folder)
@@ -163,7 +163,7 @@ class _MatchLabelsReader:
         return {GAME: kept} | ({REST: rest} if rest else {})
 
     def report_problem(self, record: str | None, where: str | None, problem: str) -> None:
-        self.report.note(self.path, record, where, problem)
+        self.report.add_problem_at(self.path, record, where, problem)
 
     def groups(self) -> Iterator[Group]:
         links = self._replays_by_action()
@@ -238,7 +238,7 @@ class _MatchLabelsReader:
         try:
             return record_from_json(value, self.path, image, self.report)
         except DatasetFormatError as error:
-            self.report.skip(error)
+            self.report.add_problem(error)
             return None
 
     def _make_view(self, image: str, record: ImageRecord) -> View:

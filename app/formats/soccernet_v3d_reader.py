@@ -107,13 +107,15 @@ def read_snv3d_table(
     if not tables:
         return SoccerNetV3DTable("", {}, {})
     for name in tables[1:]:
-        report.note(tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used")
+        report.add_problem_at(
+            tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used"
+        )
     folder = tables[0][: -len(TABLE)]
     rows: dict[str, dict[str, dict[str, TableRow]]] = {}
     try:
         _read_table(tree, tables[0], rows, report, limits)
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
     return SoccerNetV3DTable(folder, rows, _read_split_lists(tree, names, folder, report))
 
 
@@ -129,11 +131,11 @@ def _read_table(
         try:
             row = _TableRowParser(cells, shown, f"line {line}", report).to_table_row()
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
             continue
         views = rows.setdefault(row.match, {}).setdefault(row.action_image, {})
         if row.image in views:
-            report.note(shown, f"line {line}", None, f"is a second row of {row.image}")
+            report.add_problem_at(shown, f"line {line}", None, f"is a second row of {row.image}")
         views.setdefault(row.image, row)
 
 
@@ -204,7 +206,7 @@ class _TableRowParser:
             if width <= 0 or height <= 0:
                 raise ValueError("is a box whose width or height is not positive")
         except ValueError as error:
-            self._report.skip(self._make_cell_error("ball_bbox", f"{error}; left out"))
+            self._report.add_problem(self._make_cell_error("ball_bbox", f"{error}; left out"))
             return None
         return BallAnnotation(box=Box(x, y, width, height))
 
@@ -217,7 +219,7 @@ class _TableRowParser:
             return camera_from_json(value, self._path, self._line)
         except DatasetFormatError as error:
             where = f"calibration, {error.field}" if error.field else "calibration"
-            self._report.skip(self._make_cell_error(where, f"{error.problem}; left out"))
+            self._report.add_problem(self._make_cell_error(where, f"{error.problem}; left out"))
             return None
 
 
@@ -231,7 +233,7 @@ def _read_split_lists(
             try:
                 _read_split_list(tree, folder + name, split, found, report)
             except DatasetFormatError as error:
-                report.skip(error)
+                report.add_problem(error)
     return found
 
 
@@ -249,9 +251,11 @@ def _read_split_list(
         if not line.strip():
             continue
         if not slash:
-            report.note(shown, f"line {number}", None, "is not <match>/<action>[_<replay>]")
+            report.add_problem_at(
+                shown, f"line {number}", None, "is not <match>/<action>[_<replay>]"
+            )
         elif found.setdefault((PurePosixPath(match).name, stem), split) != split:
-            report.note(
+            report.add_problem_at(
                 shown,
                 f"line {number}",
                 None,
@@ -294,7 +298,7 @@ def read_soccernet_v3d(
         table = read_snv3d_table(tree, names, report, limits)
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders and not table.rows:
-            report.note(str(root), None, None, f"holds neither {LABELS} nor {TABLE}")
+            report.add_problem_at(str(root), None, None, f"holds neither {LABELS} nor {TABLE}")
         reader = _DatasetReader(table, calibration, report)
         matches = MatchReader(tree, names, report, limits, LABELS)
         for folder in folders:
@@ -320,7 +324,7 @@ class _DatasetReader:
         self._seen.add((group.match, main))
         rows = self._table.rows.get(group.match, {}).get(main, {})
         for image in rows.keys() - {view.key for view in group.views}:
-            self._report.note(
+            self._report.add_problem_at(
                 path,
                 image,
                 None,
@@ -354,7 +358,7 @@ class _DatasetReader:
             return camera_from_json(image["calibration"], path, record)
         except DatasetFormatError as error:
             where = f"calibration, {error.field}" if error.field else "calibration"
-            self._report.note(path, record, where, f"{error.problem}; left out")
+            self._report.add_problem_at(path, record, where, f"{error.problem}; left out")
             return None
 
     def read_table_only_groups(
@@ -380,7 +384,9 @@ class _DatasetReader:
     ) -> Group | None:
         if main not in rows:
             problem = "has rows of replays and none of the main picture; the group is left out"
-            self._report.note(f"{self._table.folder}{TABLE}", f"{match}/{main}", None, problem)
+            self._report.add_problem_at(
+                f"{self._table.folder}{TABLE}", f"{match}/{main}", None, problem
+            )
             return None
         ordered = sorted(rows.values(), key=lambda row: -1 if row.replay is None else row.replay)
         views = []

@@ -135,7 +135,7 @@ class ZipTree:
                 f"has a damaged list of members: it should have {len(members) + lost:,} and has"
                 f" {len(members):,}; copy it again, or read the folder that it was made of"
             )
-            report.note(str(self.path), None, None, damage)
+            report.add_problem_at(str(self.path), None, None, damage)
         # Names that differ in case alone are one file on some disks: which one is meant?
         names = [decode_member_name(member) for member in members]
         folded = Counter(name.rstrip("/").casefold() for name in names)
@@ -150,7 +150,7 @@ class ZipTree:
             else:
                 # As the zip file spells it: that is what a person looks for.
                 shown = member.filename if "\\" in member.filename else name
-                report.note(str(self.path), shown[:200], None, problem)
+                report.add_problem_at(str(self.path), shown[:200], None, problem)
         return checked
 
     def _check_total_size_and_count(self, members: list[zipfile.ZipInfo]) -> None:
@@ -230,7 +230,7 @@ class FolderTree:
                 self._list_folder(inside, found, pending)
             except OSError as error:
                 problem = f"cannot be read ({error.strerror})"
-                self._report.note(self.shown(inside), None, None, problem)
+                self._report.add_problem_at(self.shown(inside), None, None, problem)
         return sorted(found)
 
     def _list_folder(self, inside: str, found: list[str], pending: list[str]) -> None:
@@ -253,7 +253,7 @@ class FolderTree:
             problem = "is a link to a folder or to nothing, which is not followed"
         except UnsafePathError:
             problem = "is a link that leads out of its folder, which is not followed"
-        self._report.note(self.shown(name), None, None, problem)
+        self._report.add_problem_at(self.shown(name), None, None, problem)
         return False
 
     def read_bytes(self, name: str) -> bytes:
@@ -320,7 +320,11 @@ class StoreTree:
         self._limits = limits
         self._found: dict[str, StoredObject] = {}
         start = len(self.path.key) + 1 if self.path.key else 0
-        found = self.path.store.below(self.path.key) if path.stored is None else [path.stored]
+        found = (
+            self.path.store.iterate_objects_below(self.path.key)
+            if path.stored is None
+            else [path.stored]
+        )
         for stored in found:
             name = stored.key[start:]
             if self._is_readable_name(name, report):
@@ -332,7 +336,7 @@ class StoreTree:
         try:
             return bool(require_safe_path(name))
         except UnsafePathError as error:
-            report.note(str(self.path), name[:200], None, error.message)
+            report.add_problem_at(str(self.path), name[:200], None, error.message)
             return False
 
     def names(self) -> list[str]:
@@ -391,7 +395,7 @@ def open_tree(
     if path.is_dir():
         return FolderTree(path, report, limits)
     if not path.exists():
-        report.note(str(path), None, None, "does not exist")
+        report.add_problem_at(str(path), None, None, "does not exist")
         return None
     try:
         with open_regular_file(path) as file:
@@ -401,9 +405,9 @@ def open_tree(
             )
         return ZipTree(path, report, limits) if is_zip else SingleFileTree(path, report, limits)
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
     except OSError as error:
-        report.note(str(path), None, None, f"cannot be read ({error.strerror})")
+        report.add_problem_at(str(path), None, None, f"cannot be read ({error.strerror})")
     return None
 
 
@@ -425,5 +429,5 @@ def _open_store_tree(
     try:
         return ZipTree(path, report, limits)
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
     return None

@@ -134,7 +134,7 @@ class ViewFileBuffer:
                 with translate_disk_errors():
                     self._connection.execute("COMMIT")
 
-    def put(self, path: str, text: str) -> None:
+    def write_file(self, path: str, text: str) -> None:
         """Keep a file.
 
         Raises:

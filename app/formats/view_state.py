@@ -100,7 +100,7 @@ class StateReader:
         """What is wrong with a field."""
         return DatasetFormatError(self.path, self.record, field, problem)
 
-    def text(self, name: str, default: str | None = None) -> str:
+    def read_short_text(self, name: str, default: str | None = None) -> str:
         """A short text; ``default`` where there is none."""
         found = self.value.get(name, default)
         if found is None and default is not None:
@@ -111,20 +111,20 @@ class StateReader:
             )
         return found
 
-    def key(self, name: str) -> str:
+    def read_path_safe_text(self, name: str) -> str:
         """A text that may become part of a path."""
-        found = self.text(name)
+        found = self.read_short_text(name)
         try:
             return require_safe_path(found)
         except UnsafePathError as error:
             raise self.error(name, error.message) from error
 
-    def flag(self, name: str, default: bool) -> bool:
+    def read_flag(self, name: str, default: bool) -> bool:
         """True or false."""
         found = self.value.get(name)
         return found if isinstance(found, bool) else default
 
-    def size(self) -> ImageSize:
+    def read_size(self) -> ImageSize:
         """``width`` and ``height``."""
         sides = []
         for name in ("width", "height"):
@@ -137,58 +137,58 @@ class StateReader:
             sides.append(side)
         return ImageSize(*sides)
 
-    def head(self) -> GroupHead:
+    def read_group_head(self) -> GroupHead:
         """Back from ``group_head_to_json``."""
         try:
             length, width = fields.parse_numbers(self.value.get("pitch") or [105.0, 68.0], 2)
             pitch = Pitch(length, width)
         except (ValueError, InputError) as error:
             raise self.error("pitch", str(error)) from error
-        match = self.text("match", "")
+        match = self.read_short_text("match", "")
         return GroupHead(
-            self.key("group"),
-            self.key("match") if match else "",
-            self.text("split", ""),
-            self.text("label", ""),
+            self.read_path_safe_text("group"),
+            self.read_path_safe_text("match") if match else "",
+            self.read_short_text("split", ""),
+            self.read_short_text("label", ""),
             pitch,
-            self.count("views"),
+            self.read_count("views"),
         )
 
-    def count(self, name: str) -> int:
+    def read_count(self, name: str) -> int:
         """A whole number from 0; 0 where there is none."""
         try:
             return max(fields.parse_whole_number(self.value.get(name) or 0), 0)
         except ValueError as error:
             raise self.error(name, str(error)) from error
 
-    def view(self, size: ImageSize, extras: Extras) -> View:
+    def read_view(self, size: ImageSize, extras: Extras) -> View:
         """Back from ``view_to_json``."""
-        key = self.key("view")
-        calibration = self.text("calibration", "given")
+        key = self.read_path_safe_text("view")
+        calibration = self.read_short_text("calibration", "given")
         if calibration not in CALIBRATIONS:
             raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
-        given, (lines, not_visible) = self.value.get("given"), self.lines()
+        given, (lines, not_visible) = self.value.get("given"), self.read_lines()
         station = Station(
-            key=self.key("station"),
+            key=self.read_path_safe_text("station"),
             size=size,
-            shared=self.flag("shared", False),
+            shared=self.read_flag("shared", False),
             lines=lines,
             calibration=calibration,
-            flipped=self.flag("flipped", False),
-            picture=self.picture(),
-            proposed=self.proposed(lines),
+            flipped=self.read_flag("flipped", False),
+            picture=self.read_picture_geometry(),
+            proposed=self.read_proposed_lines(lines),
             not_visible=not_visible,
         )
         camera = None if given is None else camera_from_json(given, self.path, self.record)
         try:
-            station = station.with_given_camera(camera, self.covariance())
+            station = station.with_given_camera(camera, self.read_covariance())
         except InputError as error:
             raise self.error("given_covariance", error.message) from error
-        included = self.flag("included", True)
-        why = None if included else self.left_out()
-        return View(key, station, self.balls(), None, included, extras, why)
+        included = self.read_flag("included", True)
+        why = None if included else self.read_left_out()
+        return View(key, station, self.read_balls(), None, included, extras, why)
 
-    def covariance(self) -> tuple[float, ...] | None:
+    def read_covariance(self) -> tuple[float, ...] | None:
         """What is known of the given camera, 64 numbers row by row; None where nothing is."""
         found = self.value.get("given_covariance")
         if found is None:
@@ -203,7 +203,7 @@ class StateReader:
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error
 
-    def picture(self) -> PictureGeometry | None:
+    def read_picture_geometry(self) -> PictureGeometry | None:
         """What was done to the picture since it was taken; None where nothing was."""
         found = self.value.get("picture")
         if found is None:
@@ -217,7 +217,7 @@ class StateReader:
         except (ValueError, InputError) as error:
             raise self.error("picture", str(error)) from error
 
-    def left_out(self) -> ViewExclusion | None:
+    def read_left_out(self) -> ViewExclusion | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
         found = self.value.get("left_out")
         if found is None:
@@ -231,7 +231,7 @@ class StateReader:
         except (ValueError, InputError) as error:
             raise self.error("left_out", str(error)) from error
 
-    def lines(self) -> tuple[Lines, tuple[str, ...]]:
+    def read_lines(self) -> tuple[Lines, tuple[str, ...]]:
         """Back from ``lines_to_json``: the lines, and what is said not to be visible."""
         lines = {}
         try:
@@ -245,7 +245,7 @@ class StateReader:
             raise self.error("lines", str(error)) from error
         return make_lines(lines), tuple(sorted(name for name in lines if not lines[name]))
 
-    def proposed(self, lines: Lines) -> tuple[str, ...]:
+    def read_proposed_lines(self, lines: Lines) -> tuple[str, ...]:
         """Names of the lines that were accepted as they were proposed."""
         try:
             found = set(fields.require_list(self.value.get("proposed") or []))
@@ -253,7 +253,7 @@ class StateReader:
             raise self.error("proposed", "is not a list of markings") from error
         return tuple(name for name in lines if name in found)
 
-    def balls(self) -> tuple[BallAnnotation, ...]:
+    def read_balls(self) -> tuple[BallAnnotation, ...]:
         """Back from ``ball_to_json``."""
         try:
             values = fields.require_list(self.value.get("balls") or [])
@@ -267,7 +267,7 @@ class StateReader:
         if (box is None) == (point is None) and not out_of_view:
             raise ValueError("has a ball with both a box and a point, or with neither")
         return BallAnnotation(
-            box=None if box is None else self.box(box),
+            box=None if box is None else self.parse_box(box),
             point=None if point is None else self._read_point(point),
             occluded=value.get("occluded") is True,
             out_of_view=out_of_view,
@@ -276,7 +276,7 @@ class StateReader:
         )
 
     @staticmethod
-    def box(value: Any) -> Box:
+    def parse_box(value: Any) -> Box:
         """``[x, y, w, h]``, pixels.
 
         Raises:
@@ -350,7 +350,9 @@ class GroupAssembler:
         key = item.head.key
         waiting = [] if key in self._done else self._waiting.setdefault(key, [])
         if key in self._done or any(other.view.key == item.view.key for other in waiting):
-            self._report.note(path, key, item.view.key, "comes twice; the first one counts")
+            self._report.add_problem_at(
+                path, key, item.view.key, "comes twice; the first one counts"
+            )
             return
         waiting.append(item)
         if len(waiting) == item.head.views:

@@ -106,16 +106,18 @@ def read_viper(
             opened = gzip.GzipFile(fileobj=stream) if packed else stream
             reader.read_elements(_LimitedStream(opened, limits.file_bytes, shown))
     except DatasetFormatError as error:
-        report.skip(error)
+        report.add_problem(error)
     except DefusedXmlException:
-        report.note(shown, None, None, "holds a DTD or an entity, which is refused")
+        report.add_problem_at(shown, None, None, "holds a DTD or an entity, which is refused")
     except ParseError as error:
         place = f"line {error.position[0]}"
-        report.note(shown, None, place, f"is not sound XML from here on; {reader.kept_summary}")
+        report.add_problem_at(
+            shown, None, place, f"is not sound XML from here on; {reader.kept_summary}"
+        )
     except (LookupError, ValueError) as error:
-        report.note(shown, None, None, f"is in an encoding that cannot be read ({error})")
+        report.add_problem_at(shown, None, None, f"is in an encoding that cannot be read ({error})")
     except _BROKEN:
-        report.note(shown, None, None, f"is damaged or cut off; {reader.kept_summary}")
+        report.add_problem_at(shown, None, None, f"is damaged or cut off; {reader.kept_summary}")
     return reader.finish_tracks()
 
 
@@ -180,7 +182,9 @@ class _ViperFileReader:
         """The tracks; reports what was not read, a line for each kind of object and shape."""
         for (name, what), count in self._left_out.items():
             entries = plural(count, "entry is", "entries are")
-            self._report.note(self._shown, f"object {name}", what, f"{entries} left out: {_SHAPES}")
+            self._report.add_problem_at(
+                self._shown, f"object {name}", what, f"{entries} left out: {_SHAPES}"
+            )
 
         for track in self.tracks:
             if track.size is not None and not track.size.width * track.size.height:
@@ -219,7 +223,9 @@ class _ViperFileReader:
                 self._count_left_out(kind, f"{name[:80]}, {shape[:20]}")
         except ValueError as error:
             where = f"framespan {(span or '')[:40]}"
-            self._report.note(self._shown, f"{kind.title()} {identity}", where, str(error))
+            self._report.add_problem_at(
+                self._shown, f"{kind.title()} {identity}", where, str(error)
+            )
 
     def _count_left_out(self, kind: str, what: str) -> None:
         key = (kind, what)
@@ -254,7 +260,7 @@ class _ViperFileReader:
         except ValueError:
             side = 0
         if not 1 <= side <= _MAX_SIDE:
-            self._report.note(
+            self._report.add_problem_at(
                 self._shown, name, "value", f"{quote_text(text, 40)} is not a size; left out"
             )
             return

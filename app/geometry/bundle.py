@@ -53,7 +53,7 @@ class Rays:
         """How many points there are."""
         return int(self.point.max(initial=-1)) + 1
 
-    def only(self, kept: BoolArray) -> Rays:
+    def select_subset(self, kept: BoolArray) -> Rays:
         """The rays of some points, shape (points,), in the same order."""
         return self._select_rays(kept, kept[self.point])
 

@@ -63,7 +63,7 @@ class RadiusProfile:
             angle < self.inner, self.slope * angle, _polynomial_value(self.terms, angle)
         )
 
-    def growth(self, angle: FloatArray) -> FloatArray:
+    def radius_derivative(self, angle: FloatArray) -> FloatArray:
         """Derivative of the radius by the angle, shape (N,)."""
         return np.where(
             angle < self.inner,
@@ -83,7 +83,7 @@ class RadiusProfile:
             error = self.radius(angle) - radius
             low, high = np.where(error < 0, angle, low), np.where(error > 0, angle, high)
             with np.errstate(all="ignore"):
-                moved = angle - error / self.growth(angle)
+                moved = angle - error / self.radius_derivative(angle)
             inside = (moved >= low) & (moved <= high)
             moved = np.where(error == 0, angle, np.where(inside, moved, (low + high) / 2))
             # What has settled stays: a point is the same among others as it is alone.
@@ -170,7 +170,7 @@ def distort_jacobian(points: FloatArray, profile: RadiusProfile) -> FloatArray:
     points = require_shape(points, (None, 2), "points")
     ideal, angle = _radius_and_angle(points)
     across = _radius_ratio(profile, ideal, angle)
-    along = profile.growth(angle) / (1 + ideal * ideal)
+    along = profile.radius_derivative(angle) / (1 + ideal * ideal)
     outwards = points / np.where(ideal > 0, ideal, 1.0)[:, None]
     radial = outwards[:, :, None] * outwards[:, None, :]
     jacobian: FloatArray = (

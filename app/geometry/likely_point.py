@@ -53,7 +53,7 @@ class CameraTable:
     lens: FloatArray
 
     @property
-    def columns(
+    def kernel_arrays(
         self,
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
         """All of them, as the kernels take them."""
@@ -119,7 +119,7 @@ def find_most_likely_points(
         np.empty((count, views)),
     )
     _refine_points(
-        *cameras.columns,
+        *cameras.kernel_arrays,
         *(pixels, chosen, noise),
         *(made.points, made.covariances, made.distances, made.found),
     )

@@ -83,7 +83,7 @@ class AccessControl:
         self._threads = CapacityLimiter(THREADS)
         self._touching: dict[tuple[bool, int], asyncio.Task[None]] = {}
 
-    async def log_in(self, scope: Scope) -> Login:
+    async def authenticate(self, scope: Scope) -> Login:
         """Whose request it is.
 
         Raises:
@@ -98,7 +98,7 @@ class AccessControl:
         scope[ASKS] = login.actor
         return login
 
-    async def allow(self, subject: RequestSubject, login: Login) -> list[OwnedMention]:
+    async def authorize(self, subject: RequestSubject, login: Login) -> list[OwnedMention]:
         """Where everything is that a request names, as far as its reader may know.
 
         Raises:
@@ -129,7 +129,7 @@ class AccessControl:
             return False
         return await run_sync(is_any_mention_hidden, self._store, owned, limiter=self._threads)
 
-    def admit(self, scope: Scope, login: Login) -> None:
+    def attach_login(self, scope: Scope, login: Login) -> None:
         """Let a request be its sender's from here on."""
         scope[LOGIN] = login
         READER.set(login.reader)
@@ -146,8 +146,8 @@ class AccessControl:
     ) -> bool:
         """Whether somebody may go on reading, with the rights that they had when they began."""
         try:
-            login = await self.log_in(scope)
-            await self.allow(subject, login)
+            login = await self.authenticate(scope)
+            await self.authorize(subject, login)
         except AccessError:
             return False
         except StorageError:

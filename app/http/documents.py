@@ -119,7 +119,7 @@ def respond_with(
         def respond(*, keyed_request: KeyedRequest | None = None, **given: Any) -> Response:
             made = partial(make, **{name: given[name] for name in names})
             pending = PendingResponse(keyed_request, made, make_stored_response)
-            with pending.open():
+            with pending.activate():
                 outcome: Any = route(**given)  # type: ignore[call-arg]
             return (
                 outcome if isinstance(outcome, Response) else pending.make_or_get_response(outcome)

@@ -149,7 +149,7 @@ async def _handle_review_error(request: Request, error: Exception) -> Response:
     status = find_http_status(error)
     hint = error.hint
     if isinstance(error, NotFoundError) and error.known:
-        hint = hint or error.nearest(get_current_visibility(request.scope).sees)
+        hint = hint or error.suggest_nearest_name(get_current_visibility(request.scope).sees)
     problem = make_problem(
         status,
         error.message,

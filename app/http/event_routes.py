@@ -77,7 +77,7 @@ class EventStreamStart:
         ] = None,
     ):
         self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
-        newest = self.newest = services.events.position()
+        newest = self.newest = services.events.read_log_position()
         seen = last_event_id or ""
         self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
         moment = None if self.resumed else _MOMENT.fullmatch(since or "")

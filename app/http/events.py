@@ -193,15 +193,15 @@ class EventPublisher:
         store.listen(self._wake.set)
         store.sharing.subscribe(self._receive_lease)
 
-    def position(self) -> int:
+    def read_log_position(self) -> int:
         """Id of the newest entry of the log."""
         return read_position(self._store)
 
-    def moment(self) -> str:
+    def read_resume_token(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
         return "-".join(map(str, find_newest_entry_and_solution(self._store)))
 
-    def banner(self) -> str:
+    def read_banner_json(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""
         banner = read_banner(self._store)
         return "" if banner is None else encode_document(banner).decode()

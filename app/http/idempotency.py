@@ -89,7 +89,7 @@ class RequestDigest:
             self._ended = True
         return message
 
-    async def whole(self) -> str:
+    async def compute_digest(self) -> str:
         """The digest, once all of the body has passed."""
         while not self._ended:
             await self.receive()
@@ -112,7 +112,7 @@ class IdempotencyHandler:
         self._under_way: dict[tuple[str, str], asyncio.Event] = {}
         self._finding, self._storing = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
 
-    async def answer(
+    async def answer_once(
         self, request: Request, digest: RequestDigest, actor: str, hidden: Hidden, work: Work
     ) -> Response:
         """The response to a request that changes something.
@@ -139,7 +139,7 @@ class IdempotencyHandler:
             known = await self._find_stored_response(store, keys[0], actor)
             if known is None or await hidden():
                 return await self._execute_and_store(request, digest, keys[0], actor, work)
-            is_same = await digest.whole() == known.request_digest
+            is_same = await digest.compute_digest() == known.request_digest
             if is_same and known.is_in_progress:
                 return await self._execute_and_store(request, digest, keys[0], actor, work)
             return _make_replayed_response(known, is_same=is_same)
@@ -192,12 +192,12 @@ class IdempotencyHandler:
         store: Store = request.app.state.services.store
         # What is asked for by bytes is known once they have passed.
         if not digest.is_streamed:
-            keyed = KeyedRequest(IdempotencyKey(key, actor, await digest.whole()))
+            keyed = KeyedRequest(IdempotencyKey(key, actor, await digest.compute_digest()))
             request.scope[KEYED_REQUEST] = keyed
         response = await work()
         if not (keyed and keyed.stored) and _is_storable(response):
             try:
-                sent = make_stored_response(response, await digest.whole())
+                sent = make_stored_response(response, await digest.compute_digest())
                 await run_sync(store_sent_response, store, key, actor, sent, limiter=self._storing)
             except StorageError as error:
                 # The work is done; a repetition is answered with the state as it is then.

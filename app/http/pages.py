@@ -217,9 +217,9 @@ class BrowserSite:
         self.folder, self.team = folder, team
         self._version: str | None = None
         self._page: IndexPage | None = None
-        self.index()
+        self.get_index_page()
 
-    def index(self) -> IndexPage | None:
+    def get_index_page(self) -> IndexPage | None:
         """The page as it is on disk now; None where the application is not installed."""
         try:
             version = self._digest_folder()
@@ -245,7 +245,7 @@ class BrowserSite:
                 digest.update(f"{folder}/{name} {status.st_mtime_ns} {status.st_size}\n".encode())
         return digest.hexdigest()[:16]
 
-    def policy(self) -> str:
+    def get_security_policy(self) -> str:
         """The Content-Security-Policy of every response."""
         return self._page.policy if self._page else make_content_security_policy()
 
@@ -350,7 +350,7 @@ def install_pages(
     router = APIRouter(include_in_schema=False, route_class=Route)
 
     def require_index_page() -> IndexPage:
-        index = site.index()
+        index = site.get_index_page()
         if index is None:
             raise HTTPException(status_code=404)
         return index
@@ -399,5 +399,5 @@ def _install_modules(app: FastAPI, site: BrowserSite) -> None:
 
     app.mount("/assets/{version}", serve_versioned_module, name="assets")
     app.mount("/static", fresh, name="static")
-    if index := site.index():
+    if index := site.get_index_page():
         kept.warm(index.modules)

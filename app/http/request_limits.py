@@ -53,7 +53,7 @@ class RequestClass:
     width: int
 
     @property
-    def each(self) -> int:
+    def per_person_limit(self) -> int:
         """How many of them one person of a team may have at work."""
         return 1 if self.width < 4 else self.width // 2
 
@@ -168,7 +168,7 @@ class ClassLimiter:
     def _get_person_limiter(self, who: str) -> CapacityLimiter:
         """As many as there are people in the team at most."""
         if who not in self._people:
-            self._people[who] = CapacityLimiter(self.request_class.each)
+            self._people[who] = CapacityLimiter(self.request_class.per_person_limit)
         return self._people[who]
 
 

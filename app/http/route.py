@@ -95,7 +95,7 @@ class Route(APIRoute):
     async def _answer_request(self, handler: Handler, request: Request) -> Response:
         gate, access, login = get_request_pipeline(request.scope), None, None
         if self.permission.action is not None and (access := gate.access) is not None:
-            login = await access.log_in(request.scope)
+            login = await access.authenticate(request.scope)
         try:
             body = RequestBody()
             if request.method not in SAFE_METHODS:
@@ -123,8 +123,8 @@ class Route(APIRoute):
             scope["query_string"].decode("latin-1"),
             body.value,
         )
-        owned = await access.allow(asked, login)
-        access.admit(scope, login)
+        owned = await access.authorize(asked, login)
+        access.attach_login(scope, login)
         _replace_names_by_ids(scope, owned)
 
         async def answer_if_existing(request: Request) -> Response:
@@ -152,7 +152,7 @@ class Route(APIRoute):
             request, body.value, has_value=body.has_value, is_streamed=self._takes_bytes
         )
         read = ReadRequest(request, body, digest.receive if self._takes_bytes else None)
-        return await gate.idempotency.answer(
+        return await gate.idempotency.answer_once(
             request,
             digest,
             find_actor_name(request.scope, LOCAL_USER),
@@ -216,7 +216,7 @@ async def require_logged_in(scope: Scope) -> None:
     """Raise NotLoggedInError where a stranger asks a server of a team."""
     access = get_request_pipeline(scope).access
     if access is not None:
-        await access.log_in(scope)
+        await access.authenticate(scope)
 
 
 async def respond_to_unknown_route(scope: Scope, receive: Receive, send: Send) -> None:

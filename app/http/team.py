@@ -101,7 +101,7 @@ class AttemptLimits:
 
     def _count_attempt(self, limit: RateLimitItem, *key: str) -> None:
         if self._shared is not None:
-            wait = self._shared.hit("/".join(key), limit.amount, limit.get_expiry())
+            wait = self._shared.count_attempt("/".join(key), limit.amount, limit.get_expiry())
             if wait is not None:
                 raise TooManyTriesError(max(1, math.ceil(wait)))
         elif not self._windows.hit(limit, *key):
@@ -182,7 +182,7 @@ class TeamLogin:
 
     def make_landing_url(self, request: Request) -> str:
         """The address to which the provider sends people back."""
-        return self.base(request) + LANDING
+        return self.get_base_url(request) + LANDING
 
     def require_sign_on(self) -> SignOn:
         """The provider by which people come in; raises ConflictError where there is none."""
@@ -201,13 +201,13 @@ class TeamLogin:
                 f"on this server people log in only with {label}", hint=f"Log in with {label}."
             )
 
-    def site(self, request: Request) -> PasskeySite:
+    def make_passkey_site(self, request: Request) -> PasskeySite:
         """For whom passkeys are: the address that people open, as the operator said, or this machine.
 
         Raises:
             ConflictError: Browsers make no passkeys for it.
         """
-        url = urlsplit(self.base(request))
+        url = urlsplit(self.get_base_url(request))
         name = url.hostname or ""
         if name == "localhost" or (url.scheme == "https" and not _is_ip_address(name)):
             port = f":{url.port}" if url.port not in (None, 80, 443) else ""
@@ -240,7 +240,7 @@ class TeamLogin:
             self.attempts.count_token(self.address(request))
             raise
 
-    def base(self, request: Request) -> str:
+    def get_base_url(self, request: Request) -> str:
         """The beginning of addresses that are shown to people."""
         return self.url or f"{request.url.scheme}://{request.headers['host']}"
 

@@ -240,7 +240,7 @@ def read_media_facts(media: Media) -> dict[str, int]:
         status = _require_regular_file(Path(media.path))
         if media.member is None:
             return {"bytes": status.st_size}
-        size, crc = _ARCHIVES.facts(Path(media.path), media.member)
+        size, crc = _ARCHIVES.read_size_and_crc(Path(media.path), media.member)
     except (NotFoundError, ImageError, StorageError):
         return {}
     return {"bytes": size, "crc32": crc}

@@ -182,7 +182,7 @@ class FrameProvider:
         """Start a process before anybody waits for it."""
         self._pool.submit(preload_libraries, bounded=False)
 
-    def cached(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture | None:
+    def read_cached(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture | None:
         """What was made before, where it is kept.
 
         Raises:
@@ -204,7 +204,7 @@ class FrameProvider:
         """
         return self._submit_fetch(media, bounded=True)
 
-    def ask(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
+    def request_picture(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
         """Have a picture made; its future has it, or the errors of ``read_frame``.
 
         Raises:
@@ -214,7 +214,7 @@ class FrameProvider:
 
     def read(self, media: Media, width: int | None, flipped: bool) -> EncodedPicture:
         """A picture, waited for however many others wait: for background work."""
-        found = self.cached(media, width, flipped)
+        found = self.read_cached(media, width, flipped)
         if found is not None:
             return found
         fetching = self._submit_fetch(media, bounded=False)
@@ -263,7 +263,9 @@ class FrameProvider:
             media, work, media, flipped, self._settings, *arguments, explain=explain
         )
 
-    def ask_to(self, media: Media | None, work: Callable[..., Any], *arguments: Any) -> PoolTask:
+    def request_work(
+        self, media: Media | None, work: Callable[..., Any], *arguments: Any
+    ) -> PoolTask:
         """Have a function called that reads a frame itself, ``work(*arguments, settings)``.
 
         Its future may have ``WorkerEnded``, or say why its video cannot be indexed.
@@ -297,7 +299,7 @@ class FrameProvider:
         if media is not None:
             # Of a video that is not there, or is none, its reader says so at once.
             with suppress(NotFoundError):
-                indexing = self._videos.ask(media)
+                indexing = self._videos.request_indexing(media)
         if indexing is None:
             return submit(bounded=True)
         waiting = PoolTask(explain)
@@ -321,7 +323,7 @@ class FrameProvider:
 
     def _submit_fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
         if media.frame is not None:
-            return self._videos.ask(media, bounded=bounded)
+            return self._videos.request_indexing(media, bounded=bounded)
         if not is_in_object_store(media) or is_cached(media, self._settings):
             return None
 
@@ -376,7 +378,7 @@ class VideoIndexer:
         self._unkept: OrderedDict[str, tuple[str, Times]] = OrderedDict()
         self._lock = threading.Lock()
 
-    def ask(self, media: Media, *, bounded: bool = True) -> PoolTask | None:
+    def request_indexing(self, media: Media, *, bounded: bool = True) -> PoolTask | None:
         """Have the video of a frame indexed; None where it is, and where it is no video.
 
         Its future may have the errors of ``read_video_times``.
@@ -404,7 +406,7 @@ class VideoIndexer:
         running.future.add_done_callback(partial(_forward_result, waiting.future))
         return waiting
 
-    def make_ready(
+    def index_videos(
         self,
         pictures: Iterable[Media | None],
         done: int,
@@ -423,7 +425,7 @@ class VideoIndexer:
             indexing = None
             if media is not None:
                 with suppress(NotFoundError):
-                    indexing = self.ask(media, bounded=False)
+                    indexing = self.request_indexing(media, bounded=False)
             while indexing is not None and not indexing.future.done():
                 wait([indexing.future], REPORT_SECONDS)
                 if progress is not None and media is not None:

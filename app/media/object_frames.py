@@ -71,7 +71,7 @@ class ArchiveMembers:
         except NotImplementedError as error:
             raise ImageError(f"{path.name}/{member} is compressed in an unknown way") from error
 
-    def facts(self, path: Path, member: str) -> tuple[int, int]:
+    def read_size_and_crc(self, path: Path, member: str) -> tuple[int, int]:
         """Size and CRC-32 of a member, as the archive's directory says."""
         archive, name = self._find_member(path, member)
         try:

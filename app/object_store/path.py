@@ -160,7 +160,7 @@ def find_path(settings: Settings, address: str) -> StoredPath:
     if key:
         with suppress(NotFoundError):
             return path.of(store.head(key))
-    if next(store.below(key), None) is None:
+    if next(store.iterate_objects_below(key), None) is None:
         raise NotFoundError(f"there is nothing at {path}")
     return path
 

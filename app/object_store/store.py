@@ -113,7 +113,7 @@ class ObjectStore:
             NotFoundError: Nothing.
             StorageError: The store cannot be asked.
         """
-        with self._translated(key):
+        with self._translate_errors(key):
             return _make_stored_object(self._engine.head(self._store, key))
 
     def read(self, key: str, start: int, end: int, etag: str) -> bytes:
@@ -124,7 +124,7 @@ class ObjectStore:
             StorageError: The store cannot be asked, or ends in the midst of it.
         """
         options = {"range": (start, end), "if_match": etag}
-        with self._translated(key):
+        with self._translate_errors(key):
             data = bytes(self._engine.get(self._store, key, options=options).bytes())
         if len(data) != end - start:
             raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
@@ -142,7 +142,7 @@ class ObjectStore:
             TooLargeError: It is larger.
             NotFoundError, StorageError: As of ``read``.
         """
-        with self._translated(key):
+        with self._translate_errors(key):
             answer = self._engine.get(self._store, key, options={"if_match": etag} if etag else {})
             found = _make_stored_object(answer.meta)
             if found.size > limit:
@@ -152,23 +152,23 @@ class ObjectStore:
             raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
         return data, found
 
-    def below(self, folder: str) -> Iterator[StoredObject]:
+    def iterate_objects_below(self, folder: str) -> Iterator[StoredObject]:
         """Every object below a folder (empty: the whole store), by key.
 
         Raises:
             StorageError: The store cannot be asked.
         """
-        with self._translated(folder):
+        with self._translate_errors(folder):
             for some in self._engine.list(self._store, folder or None, chunk_size=LISTED):
                 yield from map(_make_stored_object, some)
 
-    def folder(self, folder: str) -> tuple[list[str], list[StoredObject]]:
+    def list_folder(self, folder: str) -> tuple[list[str], list[StoredObject]]:
         """Names of folders in a folder, and the objects in it.
 
         Raises:
             StorageError: The store cannot be asked.
         """
-        with self._translated(folder):
+        with self._translate_errors(folder):
             found = self._engine.list_with_delimiter(self._store, folder or None)
         names = [prefix.rsplit("/", 1)[-1] for prefix in found["common_prefixes"]]
         return names, [_make_stored_object(item) for item in found["objects"]]
@@ -179,7 +179,7 @@ class ObjectStore:
         Raises:
             StorageError: The store refuses.
         """
-        with self._translated(key):
+        with self._translate_errors(key):
             self._engine.put(self._slow, key, content)
 
     @contextmanager
@@ -195,7 +195,7 @@ class ObjectStore:
         Raises:
             StorageError: The store refuses.
         """
-        with self._translated(key):
+        with self._translate_errors(key):
             file = self._engine.open_writer(
                 self._slow,
                 key,
@@ -204,26 +204,26 @@ class ObjectStore:
                 max_concurrency=PARTS_AT_ONCE,
             )
         try:
-            yield cast(IO[bytes], _ObjectWriter(file, lambda: self._translated(key)))
+            yield cast(IO[bytes], _ObjectWriter(file, lambda: self._translate_errors(key)))
         except BaseException as error:
             # The parts that are there already are taken back, if the store can be asked.
             with suppress(OSError, self._engine.exceptions.BaseError):
                 file.__exit__(type(error), error, error.__traceback__)
             raise
-        with self._translated(key):
+        with self._translate_errors(key):
             file.close()
 
     def delete(self, key: str) -> None:
         """Delete an object; one that is gone already stays so."""
-        with self._translated(key):
+        with self._translate_errors(key):
             self._engine.delete(self._store, key)
 
-    def signed(self, key: str, seconds: int) -> str:
+    def make_signed_url(self, key: str, seconds: int) -> str:
         """An address of the store itself under which a browser gets an object for so long."""
-        with self._translated(key):
+        with self._translate_errors(key):
             return str(self._engine.sign(self._store, "GET", key, timedelta(seconds=seconds)))
 
-    def _translated(self, key: str) -> AbstractContextManager[None]:
+    def _translate_errors(self, key: str) -> AbstractContextManager[None]:
         return translate_store_errors(self.name, self.address(key), self._engine.exceptions)
 
 

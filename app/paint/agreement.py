@@ -43,7 +43,7 @@ class PaintAgreement:
     points: int
 
     @property
-    def product(self) -> float:
+    def combined_score(self) -> float:
         """Both in one number, 0 to 1."""
         return self.supported * self.explained
 

@@ -100,7 +100,7 @@ class DetectedPaint:
     strengths: FloatArray
 
     @property
-    def share(self) -> float:
+    def painted_fraction(self) -> float:
         """Of the visible places of markings, how many show paint."""
         return len(self.offsets) / max(self.traced.visible, 1)
 

@@ -123,5 +123,5 @@ def find_shared_pitch(
     if shown is None:
         return None
     return shown, [
-        second_moment_about_plan(frame.parameters, *shown.camera(frame)) for frame in painted
+        second_moment_about_plan(frame.parameters, *shown.fit_camera(frame)) for frame in painted
     ]

@@ -167,7 +167,7 @@ class RankedCamera:
     known: FloatArray | None = None
 
     @property
-    def uncertain_m(self) -> float:
+    def position_sigma_m(self) -> float:
         """Largest standard deviation of the position that the paint leaves, metres."""
         covariance = self.snapped.planned
         if covariance is None:
@@ -182,7 +182,7 @@ class RankedCamera:
     @property
     def score(self) -> float:
         """Supported x explained, and half of that where a marking is contradicted."""
-        return self.agreement.product * (0.5 if self.is_contradicted else 1.0)
+        return self.agreement.combined_score * (0.5 if self.is_contradicted else 1.0)
 
 
 def propose_camera(
@@ -433,11 +433,11 @@ def _move_to_known_position(
 ) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
     the markings there as well."""
-    if item.uncertain_m <= MOST_UNCERTAIN_M:
+    if item.position_sigma_m <= MOST_UNCERTAIN_M:
         return replace(item, known=None)
     camera = item.snapped.camera
     away = np.linalg.norm(match.stands - camera.position, axis=1)
-    if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.uncertain_m):
+    if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.position_sigma_m):
         return replace(item, known=None)
     policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
     start, known = (
@@ -546,7 +546,7 @@ def explain_uncertain_camera(ranked: Sequence[RankedCamera]) -> str | None:
         return "the best camera shows many markings where there is no paint"
     # Where the match knows the position no paint has to tell it.
     is_known = best.known is not None
-    if best.uncertain_m > MOST_UNCERTAIN_M and not is_known:
+    if best.position_sigma_m > MOST_UNCERTAIN_M and not is_known:
         return "too few markings are seen to determine where the camera stands"
     lead = SOLE_LEAD if lead is None else lead
     if lead < LEAST_LEAD:

@@ -140,20 +140,25 @@ def snap_to_prepared_picture(
     for index, window in enumerate(windows):
         strict = index >= len(windows) - STRICT_ROUNDS
         spacing = SPACING_PX if strict else COARSE_PX
-        evidence = rounds.seek(parameters, window, spacing)
+        evidence = rounds.find_paint_near(parameters, window, spacing)
         if not _has_enough_paint(evidence, twice, spacing, least):
             return _keep_start(rounds, evidence, NO_PAINT)
-        parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
+        parameters = parameters + rounds.problem.compute_step(
+            parameters, rounds.to_paint_offsets(evidence), strict
+        )
         if not np.isfinite(parameters).all():
             return _keep_start(rounds, evidence, PAINT_DISAGREES)
-    evidence = rounds.seek(parameters, windows[-1])
-    if not _has_enough_paint(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
+    evidence = rounds.find_paint_near(parameters, windows[-1])
+    if (
+        not _has_enough_paint(evidence, twice, least=least)
+        or evidence.painted_fraction < LEAST_SEEN
+    ):
         return _keep_start(rounds, evidence, NO_PAINT)
     places = evidence.traced.places[:, :2]
-    noise = rounds.problem.noise(parameters, rounds.seen(evidence), places, pitch)
+    noise = rounds.problem.noise(parameters, rounds.to_paint_offsets(evidence), places, pitch)
     if noise is None:
         return _keep_start(rounds, evidence, NO_PAINT)
-    camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
+    camera, before = rounds.camera(parameters), rounds.find_paint_near(rounds.first, windows[-1])
     error, moved = (
         float(np.median(np.abs(evidence.offsets))),
         _median_shift_px(start, camera, evidence),
@@ -162,7 +167,7 @@ def snap_to_prepared_picture(
         error > rounds.unit * WORST_PX
         or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
         or rounds.problem.mahalanobis_squared(parameters) > most_surprising
-        or evidence.share < KEPT_SHARE * before.share
+        or evidence.painted_fraction < KEPT_SHARE * before.painted_fraction
     ):
         return _keep_start(rounds, evidence, PAINT_DISAGREES, error, moved)
     own, size = noise.parameters, rounds.size
@@ -192,7 +197,7 @@ class _SnapProblem:
             parameters, self.start.principal_point, self._reading.half_diagonal
         )
 
-    def seek(
+    def find_paint_near(
         self, parameters: FloatArray, window: float, spacing: float = SPACING_PX
     ) -> DetectedPaint:
         traced = trace_visible_markings(
@@ -206,7 +211,7 @@ class _SnapProblem:
         known = START_SIGMAS * sigma + START_PX * self.unit
         return find_paint(self._reading, traced, np.minimum(window, known))
 
-    def seen(self, evidence: DetectedPaint) -> PaintOffsets:
+    def to_paint_offsets(self, evidence: DetectedPaint) -> PaintOffsets:
         """The evidence as it is solved with."""
         traced = evidence.traced
         apart = (traced.pixels - self.start.principal_point) / self._reading.half_diagonal

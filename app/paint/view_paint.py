@@ -45,7 +45,7 @@ class PictureScale:
         """Of a picture, shape (H, W, 3), and its annotated size."""
         return PictureScale(image.shape[1] / size.width, image.shape[0] / size.height)
 
-    def sentence(self, x: float, y: float) -> ImagePoint:
+    def to_annotation_point(self, x: float, y: float) -> ImagePoint:
         """A place of the picture in pixels of the annotations; centres of pixels are whole."""
         return ImagePoint((x + 0.5) / self.x - 0.5, (y + 0.5) / self.y - 0.5)
 
@@ -54,21 +54,24 @@ class PictureScale:
         x, y = ((box.x + 0.5) * self.x - 0.5, (box.y + 0.5) * self.y - 0.5)
         return Box(x, y, box.width * self.x, box.height * self.y)
 
-    def evidence(self, snapped: SnappedCamera) -> PaintEvidence:
+    def to_annotation_evidence(self, snapped: SnappedCamera) -> PaintEvidence:
         """The paint that was found, in pixels of the annotations."""
         found = to_paint_evidence(snapped.evidence, snapped.camera)
         points = {
-            name: tuple(PaintPoint(*self.sentence(x, y), sigma / self.x) for x, y, sigma in places)
+            name: tuple(
+                PaintPoint(*self.to_annotation_point(x, y), sigma / self.x)
+                for x, y, sigma in places
+            )
             for name, places in found.points.items()
         }
         return replace(found, points=points)
 
-    def line_like(self, paint: BoolArray) -> tuple[ImagePoint, ...]:
+    def to_annotation_line_points(self, paint: BoolArray) -> tuple[ImagePoint, ...]:
         """Some of the pixels of a mask, shape (H, W), in pixels of the annotations."""
         rows, columns = np.nonzero(paint)
         step = -(-len(rows) // MOST_LINE_LIKE) or 1
         places = zip(columns[::step].tolist(), rows[::step].tolist(), strict=True)
-        return tuple(self.sentence(x, y) for x, y in places)
+        return tuple(self.to_annotation_point(x, y) for x, y in places)
 
 
 def explain_unreadable_picture(image: Image, size: ImageSize) -> str | None:
@@ -156,7 +159,7 @@ def read_paint_of_image(
         people: Boxes in which nothing is believed, pixels of ``size``; what is larger than people
             are is looked into all the same.
     """
-    pitch = policy.fitted(pitch)
+    pitch = policy.with_fitted_goal(pitch)
     why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewPaint("nothing", sentence=why)
@@ -168,7 +171,7 @@ def read_paint_of_image(
     hidden = [scale.box(box) for box in choose_hiding_boxes(people, size)]
     seen_grass = exclude_hidden_boxes(grass, hidden)
     paint = find_line_like_pixels(image, grass) & seen_grass
-    nothing = ViewPaint("nothing", line_like=scale.line_like(paint))
+    nothing = ViewPaint("nothing", line_like=scale.to_annotation_line_points(paint))
     why = _explain_unusable_calibration(start)
     if why is not None:
         return replace(nothing, sentence=why)
@@ -191,7 +194,7 @@ def read_paint_of_image(
         outcome="kept" if snapped.reason else "snapped",
         reason=snapped.reason,
         sentence=SENTENCES[snapped.reason] if snapped.reason else "",
-        evidence=scale.evidence(snapped),
+        evidence=scale.to_annotation_evidence(snapped),
         supported=seen.supported,
         explained=seen.explained,
         error_px=None if snapped.error_px is None else snapped.error_px / scale.x,

@@ -68,7 +68,7 @@ def propose_lines_in_image(
         pitch: The pitch.
         policy: Prior of the distortion, and which line of the paint its markings are.
     """
-    pitch = policy.painted(pitch)
+    pitch = policy.with_painted_goal(pitch)
     why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewProposal("nothing", why, {})
@@ -80,9 +80,12 @@ def propose_lines_in_image(
         )
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
     if found.outcome == "proposed" and snapped is not None:
-        lines = dict(scale.evidence(snapped).thin_points())
+        lines = dict(scale.to_annotation_evidence(snapped).thin_points())
         goals = find_goal_lines(image, snapped.camera, pitch)
-        lines |= {name: tuple(scale.sentence(*place) for place in goals[name]) for name in goals}
+        lines |= {
+            name: tuple(scale.to_annotation_point(*place) for place in goals[name])
+            for name in goals
+        }
     return ViewProposal(
         found.outcome,
         "" if found.reason is None else f"{found.reason[:1].upper()}{found.reason[1:]}.",
@@ -114,7 +117,7 @@ class _DrawnLinesFit:
     lines: Lines
     apart: Mapping[str, float]
 
-    def cost(self, far: float) -> float:
+    def contradiction_cost(self, far: float) -> float:
         """How much the drawn lines speak against it, pixels."""
         return float(np.mean([min(distance, far) for distance in self.apart.values()]))
 
@@ -139,7 +142,7 @@ def keep_undrawn_markings(
         return found
     turned = make_lines({opposite_marking(name): points for name, points in found.lines.items()})
     sides = [_fit_drawn_lines(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)]
-    side = min(sides, key=lambda item: item.cost(FAR_PERCENT / 100 * size.diagonal))
+    side = min(sides, key=lambda item: item.contradiction_cost(FAR_PERCENT / 100 * size.diagonal))
     rest = {name: points for name, points in side.lines.items() if name not in drawn}
     sentence = _describe_contradiction(side.apart, APART_PERCENT / 100 * size.diagonal)
     if not rest:
@@ -172,7 +175,7 @@ def _fit_drawn_lines(
 ) -> _DrawnLinesFit:
     camera = calibrate(lines, pitch, size, policy).camera
     fits = measure_calibration(
-        Calibration("lines", camera), drawn, policy.fitted(pitch), size
+        Calibration("lines", camera), drawn, policy.with_fitted_goal(pitch), size
     ).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
     return _DrawnLinesFit(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})

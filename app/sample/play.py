@@ -246,7 +246,7 @@ class Play:
         """What the ball does at a time."""
         return self.modes[min(max(round(seconds / BALL_STEP), 0), len(self.modes) - 1)]
 
-    def at(self, seconds: float) -> Instant:
+    def instant_at(self, seconds: float) -> Instant:
         """Everything that moves, at a time between the first and the last."""
         at = min(max(seconds / PEOPLE_STEP, 0.0), len(self.feet) - 1.001)
         low, share = int(at), at - int(at)

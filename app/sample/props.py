@@ -101,7 +101,9 @@ class Patch:
             round(((y - self.top + 0.5) * self.fine - 0.5) * _SUB),
         )
 
-    def polyline(self, points: FloatArray, colour: Colour, opacity: float, thickness: int) -> None:
+    def draw_polyline(
+        self, points: FloatArray, colour: Colour, opacity: float, thickness: int
+    ) -> None:
         """A thin line through image pixels, ``thickness`` in enlarged pixels."""
         path = [self.to_enlarged_pixels(points).reshape(-1, 1, 2)]
         cv2.polylines(
@@ -150,7 +152,7 @@ def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     opacity = float(np.clip(0.16 + 0.5 * wide, 0.2, 0.75))
     ends = np.cumsum([len(strand) for strand in strands])
     for path in np.split(everything, ends[:-1]):
-        patch.polyline(path, WHITE, opacity, max(1, round(wide)))
+        patch.draw_polyline(path, WHITE, opacity, max(1, round(wide)))
     patch.draw_on_frame(gain)
 
 

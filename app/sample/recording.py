@@ -266,7 +266,7 @@ def _make_cameras_of_shot(part: ShotPlan, play: Play, times: FloatArray) -> list
             [across, np.full((len(times), 1), -50.0), np.full((len(times), 1), -13.0)]
         )
         return aim_cameras(MAIN, aims, np.full(len(times), CROWD_FOCAL), 0.0)  # fmt: skip
-    instants = [play.at(time) for time in times]
+    instants = [play.instant_at(time) for time in times]
     # Somebody who stands where few lines are: a camera cannot be told from what is seen.
     outfield = np.r_[1:TEAM, TEAM + 1 : 2 * TEAM]
     places = np.array([instant.feet[outfield] for instant in instants])
@@ -328,7 +328,7 @@ class _ShotRenderer:
         found = self._kept.get(picture)
         if found is None:
             shot = self.shot
-            instant = self._play.at(max(shot.seconds(picture), 0.0))
+            instant = self._play.instant_at(max(shot.seconds(picture), 0.0))
             image = render_picture(
                 self._backdrop, shot.camera(picture), instant, self._fixture.look
             )
@@ -435,7 +435,7 @@ def _frame_truth_to_json(play: Play, shot: _FilmedShot, frame: int) -> dict[str,
     picture, is_mix = shot.shown(frame)
     low = math.floor(picture)
     seconds = max(shot.seconds(picture), 0.0)
-    camera, instant = shot.camera(low), play.at(seconds)
+    camera, instant = shot.camera(low), play.instant_at(seconds)
     pixel = camera.project(instant.ball[None])[0]
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
     in_view = bool(is_inside_image(pixel[None])[0]) and depth > 0

@@ -56,7 +56,7 @@ class PictureGeometry:
         """Whether the numbers themselves count, and not what the lines of the view say."""
         return max(self.sigma) <= KNOWN_SIGMA
 
-    def middle(self, size: ImageSize) -> tuple[float, float]:
+    def optical_center(self, size: ImageSize) -> tuple[float, float]:
         """Where the optical axis is in a picture of that size, pixels."""
         half = size.diagonal / 2
         right, down = self.shift
@@ -70,7 +70,7 @@ class PictureGeometry:
             size: Of the picture.
         """
         x0, y0 = (size.width - 1) / 2, (size.height - 1) / 2
-        x1, y1 = self.middle(size)
+        x1, y1 = self.optical_center(size)
         return make_lines(
             {
                 name: [(x0 + (x - x1) / self.aspect, y0 + y - y1) for x, y in points]
@@ -86,7 +86,9 @@ class PictureGeometry:
             size: Of the picture.
         """
         x, y = camera.focal_length
-        return replace(camera, focal_length=(x * self.aspect, y), principal_point=self.middle(size))
+        return replace(
+            camera, focal_length=(x * self.aspect, y), principal_point=self.optical_center(size)
+        )
 
 
 def camera_aspect(camera: Camera) -> float:

@@ -90,7 +90,7 @@ class Splitter:
             return Splitter(split)
         return Splitter(split, _draw_test_matches(split, set(matches)))
 
-    def group(self, match: str, given: str, views: Sequence[str]) -> str:
+    def split_of_group(self, match: str, given: str, views: Sequence[str]) -> str:
         """Split of a group; empty where its views are on both sides."""
         if self.split.kind == "given":
             return given

@@ -221,8 +221,8 @@ def ray_covariances(
     found: FloatArray = noise[:, None, None] * np.eye(2)
     plain: dict[int, CameraNumbers] = {}
     for row, observation in enumerate(observations):
-        if observation.numbers is not None and observation.numbers.picture is None:
-            plain[row] = observation.numbers
+        if observation.camera_numbers is not None and observation.camera_numbers.picture is None:
+            plain[row] = observation.camera_numbers
         else:
             found[row] += calibration_covariance(
                 observation.calibration, observation.size, points[row]

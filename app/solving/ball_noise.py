@@ -191,7 +191,7 @@ class _NoisePrior:
     share: float
 
     @property
-    def costs(self) -> FloatArray:
+    def prior_costs(self) -> FloatArray:
         """Of each of ``SIGMAS``."""
         return sigma_prior_cost(_LOGS, self.sigma, self.spread)
 
@@ -256,7 +256,7 @@ def _jackknife_sigma(
     # Where neighbours err alike, there are fewer independent numbers than there seem to be.
     weight = log_sigma_posterior_variance(0.0, numbers, known.spread) / variance
     sigma = math.exp(
-        calibrated_log_sigma(_LOGS, weight * _sigma_costs(rows[kept], found) + known.costs)
+        calibrated_log_sigma(_LOGS, weight * _sigma_costs(rows[kept], found) + known.prior_costs)
     )
     wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)
@@ -269,8 +269,12 @@ def _fit_sigma(rows: FloatArray, known: _NoisePrior) -> tuple[float, float, floa
     share by the likelihood."""
     kept = rows[_find_inliers(rows, known)]
     if not kept[:, 2].any():
-        return _find_lowest_cost(_sigma_costs(kept, known.share) + known.costs)[1], known.share, 0.0
-    fits = [_find_lowest_cost(_sigma_costs(kept, share) + known.costs) for share in SHARES]
+        return (
+            _find_lowest_cost(_sigma_costs(kept, known.share) + known.prior_costs)[1],
+            known.share,
+            0.0,
+        )
+    fits = [_find_lowest_cost(_sigma_costs(kept, share) + known.prior_costs) for share in SHARES]
     prior = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
     costs = prior + [least for least, _ in fits]
     at = int(np.argmin(costs))
@@ -295,7 +299,7 @@ def _find_inliers(rows: FloatArray, known: _NoisePrior) -> BoolArray:
     kept: BoolArray = squared <= np.median(squared)
     trimmed = HALF
     for _ in range(_ROUNDS):
-        place = int(np.argmin(_sigma_costs(rows[kept], known.share, trimmed) + known.costs))
+        place = int(np.argmin(_sigma_costs(rows[kept], known.share, trimmed) + known.prior_costs))
         variance = SIGMAS[place] ** 2 * rows[:, 1] + known.share**2 * rows[:, 2] + rows[:, 4]
         wider = squared <= LIMIT * variance
         trimmed = TRIMMED

@@ -84,7 +84,7 @@ def calibrate(
         size: Annotated size.
         policy: Robust scale, prior of the distortion, whether labels are checked.
     """
-    pitch = policy.fitted(pitch)
+    pitch = policy.with_fitted_goal(pitch)
     observations = make_observations(lines, pitch, size)
     measurements = count_measurements(observations)
     if measurements < MIN_MEASUREMENTS:
@@ -125,7 +125,7 @@ def calibrate_near_position(
     """
     if alone.camera is None:
         return alone
-    problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
+    problem, pitch = ResectionProblem.of(size, policy), policy.with_fitted_goal(pitch)
     left_out = [suspect.marking for suspect in alone.suspects]
     observations = make_observations(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
@@ -152,7 +152,7 @@ def calibrate_picture(
     Args:
         picture: What was done to it.
     """
-    problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
+    problem, pitch = ResectionProblem.of(size, policy), policy.with_fitted_goal(pitch)
     observations = make_observations(lines, pitch, size)
     if count_measurements(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
@@ -201,7 +201,7 @@ def analyse_lone_frame(
         return None
     problem = ResectionProblem.of(size, policy)
     left_out = [suspect.marking for suspect in found.suspects]
-    pitch = policy.fitted(pitch)
+    pitch = policy.with_fitted_goal(pitch)
     observations = make_observations(lines, pitch, size)
     parameters = problem.parameters(found.camera)
     return estimate_lone_frame(problem, parameters, observations, pitch, policy, left_out)
@@ -285,7 +285,7 @@ def _measure_against_station(
 ) -> Calibration:
     """A calibration measured against the lines of its station, and what is said not to be visible."""
     size, shortest = station.size, min_counted_marking_px(policy, station.size)
-    fitted = policy.fitted(pitch)
+    fitted = policy.with_fitted_goal(pitch)
     return measure_calibration(found, station.lines, fitted, size, station.not_visible, shortest)
 
 
@@ -315,7 +315,7 @@ def calibrate_from_paint(
     resection = ResectionProblem.of(size, policy)
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
     problem = PaintProblem.of(resection, resection.parameters(clicked.camera), known)
-    found = solve_paint(problem, reading.evidence, policy.fitted(pitch))
+    found = solve_paint(problem, reading.evidence, policy.with_fitted_goal(pitch))
     if found is None:
         return replace(clicked, paint=replace(fit, reason=PAINT_DISAGREES))
     pitch_covariance = found.pitch

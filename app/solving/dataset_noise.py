@@ -64,7 +64,9 @@ def estimate_view_line_noise(
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
     problem, parameters = _make_resection_problem(calibration, size, policy)
-    return problem.line_noise(parameters, make_observations(lines, policy.fitted(pitch), size))
+    return problem.line_noise(
+        parameters, make_observations(lines, policy.with_fitted_goal(pitch), size)
+    )
 
 
 def collect_view_line_evidence(
@@ -77,7 +79,7 @@ def collect_view_line_evidence(
     """
     problem, parameters = _make_resection_problem(calibration, size, policy)
     rows = problem.compute_noise_rows(
-        parameters, make_observations(lines, policy.fitted(pitch), size)
+        parameters, make_observations(lines, policy.with_fitted_goal(pitch), size)
     )
     return collect_line_evidence(*rows).rescaled_to_pixels(problem.unit)
 
@@ -136,7 +138,7 @@ class NoiseGroup:
         )
         return NoiseGroup(group, solution.ball, tuple(views))
 
-    def misses(self, policy: Policy) -> tuple[RayResidual, ...]:
+    def ray_residuals(self, policy: Policy) -> tuple[RayResidual, ...]:
         """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
         return (
             ()
@@ -189,7 +191,7 @@ def estimate_noise(groups: Sequence[NoiseGroup], policy: Policy) -> DatasetNoise
     lines = estimate_line_noise([*evidence.values()])
     if lines is not None:
         policy = _replace_line_noise(policy, lines)
-    misses = tuple(group.misses(policy) for group in groups)
+    misses = tuple(group.ray_residuals(policy) for group in groups)
     ball = estimate_ball_noise([miss for some in misses for miss in some], policy)
     return DatasetNoise(lines, ball, misses)
 
@@ -285,7 +287,7 @@ class SourceFactors:
                 found.append(SourceNoise(source.name, middle, low, high, math.exp(log), numbers))
         return tuple(sorted(found, key=lambda item: -item.sigma_px))
 
-    def factor(self, sources: Sequence[BallSource]) -> float:
+    def noise_factor(self, sources: Sequence[BallSource]) -> float:
         """How noisy a ball of these sources is beside the dataset's; one where it may be alike.
 
         What is asked is whether all of them together differ: of a camera whose balls one person

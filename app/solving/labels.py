@@ -74,7 +74,7 @@ class _RemovalTrial:
         return all(doubt.is_outlier for doubt in self.doubts)
 
     @property
-    def explains(self) -> bool:
+    def explains_all_points(self) -> bool:
         """Whether all others fit, and what was left out fits another class."""
         return self.worst <= FITS and all(doubt.has_fitting_label for doubt in self.doubts)
 
@@ -147,7 +147,9 @@ class _LabelSearch:
 
     def is_convincing(self, trial: _RemovalTrial, cost: float) -> bool:
         """Whether a trial is good enough to believe, against the cost with all markings."""
-        return trial.explains or (trial.fit.cost < DECISIVE * cost and trial.worst <= SETTLES)
+        return trial.explains_all_points or (
+            trial.fit.cost < DECISIVE * cost and trial.worst <= SETTLES
+        )
 
     def try_without_minority_half(self, observations: Observations) -> _RemovalTrial | None:
         """The trial without the few markings of the other side, if that settles everything."""
@@ -170,7 +172,7 @@ class _LabelSearch:
             trial = self.try_without_markings(observations, [marking])
             if trial is None or not trial.removes_only_outliers:
                 continue
-            if trial.explains:
+            if trial.explains_all_points:
                 return trial
             trials.append(trial)
         return min(trials, key=lambda item: item.fit.cost, default=None)

@@ -140,10 +140,13 @@ def estimate_lone_frame(
         if left_out:
             # What looks mislabelled on the pitch in use may lie where another pitch has it.
             whole = _LoneFrameProblem(problem, observations, pitch, sigma).fit(parameters)
-            if whole.worst_px(left_out) <= RELABELLED * GAMMA_SHARE * problem.size.diagonal:
-                return replace(whole.information(), explains=tuple(left_out))
+            if (
+                whole.largest_distance_px(left_out)
+                <= RELABELLED * GAMMA_SHARE * problem.size.diagonal
+            ):
+                return replace(whole.to_lone_frame(), explains=tuple(left_out))
         kept = observations.without(*left_out)
-        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).information()
+        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).to_lone_frame()
     except np.linalg.LinAlgError:
         return None
 
@@ -167,21 +170,21 @@ class _LoneFrameFit:
     off: FloatArray
     rows: _WeightedResiduals
 
-    def worst_px(self, markings: Collection[str]) -> float:
+    def largest_distance_px(self, markings: Collection[str]) -> float:
         """Largest distance of a point of some markings."""
         seen = np.isin(self.frame.observations.marking, [MARKINGS.index(name) for name in markings])
         return float(self.rows.distance[seen].max(initial=0.0))
 
-    def information(self) -> LoneFrame:
+    def to_lone_frame(self) -> LoneFrame:
         """As it is used."""
         carry = _camera_jacobian(self.rows)
-        spread, off = self.frame.noise(self.rows), carry @ self.off
+        spread, off = self.frame.compute_covariance(self.rows), carry @ self.off
         covariance = carry @ spread @ carry.T + np.outer(off, off)
         if not np.isfinite(covariance).all():
             raise np.linalg.LinAlgError("the lines do not determine the camera")
         return LoneFrame(
             covariance,
-            self.frame.on(self.unknowns),
+            self.frame.pitch_at_unknowns(self.unknowns),
             np.sqrt(np.diag(spread)[SIZES]),
         )
 
@@ -193,7 +196,7 @@ class _LoneFrameProblem:
     pitch: Pitch
     sigma: FloatArray
 
-    def on(self, unknowns: FloatArray) -> Pitch:
+    def pitch_at_unknowns(self, unknowns: FloatArray) -> Pitch:
         """The pitch of some unknowns."""
         length, width = unknowns[SIZES].tolist()
         return replace(
@@ -212,7 +215,7 @@ class _LoneFrameProblem:
         off = step - self._compute_step(start, rows, PARAMETERS)
         return _LoneFrameFit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
 
-    def noise(self, rows: _WeightedResiduals) -> FloatArray:
+    def compute_covariance(self, rows: _WeightedResiduals) -> FloatArray:
         """Covariance of the thirteen, shape (13, 13)."""
         # Residuals in units of a click, so that the prior weighs what it says.
         freedom = max(len(rows.apart) - PARAMETERS, 1)
@@ -292,7 +295,9 @@ class _LoneFrameProblem:
     def _compute_residuals(self, unknowns: FloatArray) -> _WeightedResiduals:
         camera, warp = unknowns[:PARAMETERS], unknowns[WARP]
         seen = undo_warp(self.problem, self.observations, warp)
-        seen = Observations(pitch_curves(self.on(unknowns)), seen.pixels, seen.marking)
+        seen = Observations(
+            pitch_curves(self.pitch_at_unknowns(unknowns)), seen.pixels, seen.marking
+        )
         half = self.problem.size.diagonal / 2
 
         def residuals_at(pixels: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -122,7 +122,9 @@ class _FittedFrame:
     def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
         # What markings have in common is in FRAME_SIGMA.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
-        observations = make_observations(frame.lines, policy.fitted(frame.pitch), frame.size)
+        observations = make_observations(
+            frame.lines, policy.with_fitted_goal(frame.pitch), frame.size
+        )
         return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
     def at(self, warp: FloatArray) -> _FittedFrame:

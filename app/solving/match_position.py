@@ -160,14 +160,14 @@ class FramePlaces:
         self._equations = PlaceEquations(places, WANDER_M)
         self._left_out: int | None = None
 
-    def without(self, index: int) -> FramePlaces:
+    def without_frame(self, index: int) -> FramePlaces:
         """The same but for one of them; what they hold is shared, so a match costs it once."""
         rest = copy(self)
         rest._left_out = index
         rest.__dict__.pop("_model", None)
         return rest
 
-    def prior(self, pan: float) -> PositionPrior | None:
+    def position_prior(self, pan: float) -> PositionPrior | None:
         """Prior of a frame of the same match that looks that way; None where too few are known."""
         model = self._fitted_model
         if model is None:
@@ -206,7 +206,7 @@ def calibrate_with_match_position(
     if alone.camera is None:
         return alone
     pan = parameters_from_camera(alone.camera, size.diagonal / 2)[PAN]
-    near = others.prior(float(pan))
+    near = others.position_prior(float(pan))
     return (
         alone if near is None else calibrate_near_position(alone, near, lines, pitch, size, policy)
     )
@@ -225,7 +225,7 @@ def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
     """
     known = [(index, place) for index, place in enumerate(places) if place is not None]
     runs = _MatchRuns([place for _, place in known])
-    runs.join()
+    runs.join_neighbours()
     run = {known[at][0]: number for number, at in enumerate(runs.first_places)}
     return _fill_runs(run, len(places))
 
@@ -245,7 +245,7 @@ class _MatchRuns:
         """The first place of each run."""
         return sorted(self._end)
 
-    def join(self) -> None:
+    def join_neighbours(self) -> None:
         """Join neighbours until none gains by it."""
         for first in self.first_places:
             self._queue_join(first)

@@ -79,7 +79,7 @@ class PaintProblem:
         """Pixels of this picture for a pixel at 960 x 540."""
         return max(self.resection.unit, LEAST_UNIT)
 
-    def step(self, parameters: FloatArray, seen: PaintOffsets, strict: bool) -> FloatArray:
+    def compute_step(self, parameters: FloatArray, seen: PaintOffsets, strict: bool) -> FloatArray:
         """The step towards the paint, shape (8,): iteratively reweighted least squares.
 
         The offsets o are taken as linear in the step d, o - J d; each solve is that of
@@ -110,7 +110,7 @@ class PaintProblem:
         )  # fmt: skip
         return moved
 
-    def robust(self, rest: FloatArray, sigmas: FloatArray) -> FloatArray:
+    def robust_weights(self, rest: FloatArray, sigmas: FloatArray) -> FloatArray:
         """Strict weight of each place by how far off it lies, pixels, both shape (N,)."""
         scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
@@ -133,7 +133,7 @@ class PaintProblem:
             places: Where on the pitch each of it lies, metres, shape (N, 2).
             pitch: The pitch.
         """
-        robust = self.robust(seen.offsets, seen.sigmas)
+        robust = self.robust_weights(seen.offsets, seen.sigmas)
         prior = self.prior(parameters).sigma ** -2.0
         terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
         return estimate_paint_noise(seen, robust, prior, self.information, terms)
@@ -182,7 +182,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         seen = measure_offsets(problem, parameters, curve_points, sigmas, pitch)
         strict = index >= SOFT_ROUNDS
         try:
-            moved = problem.step(parameters, seen, strict)
+            moved = problem.compute_step(parameters, seen, strict)
         except np.linalg.LinAlgError:
             return None
         parameters = parameters + moved

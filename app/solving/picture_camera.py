@@ -140,7 +140,7 @@ class PictureProblem:
         return apart, jacobian
 
     @_ABSURD_IS_INFINITE
-    def fit(self, camera: FloatArray) -> FloatArray:
+    def fit_camera_and_picture(self, camera: FloatArray) -> FloatArray:
         """The camera and picture that fit best, shape (11,).
 
         Args:
@@ -276,7 +276,7 @@ def estimate_picture(
         return picture
     seen = undo_warp(problem, observations, picture_to_warp(picture))
     search = PictureProblem.of(problem, observations, picture)
-    unknowns = search.fit(problem.resect(seen).parameters)
+    unknowns = search.fit_camera_and_picture(problem.resect(seen).parameters)
     covariance = search.covariance(unknowns)
     if not np.isfinite(covariance).all():
         raise DegenerateGeometryError("the lines do not determine the camera")

@@ -194,7 +194,7 @@ def estimate_pitch(
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
             are of one match show pitches of several sizes.
     """
-    pitch = policy.fitted(Pitch())
+    pitch = policy.with_fitted_goal(Pitch())
     seen = [
         _FittedFrame.of(frames[index], pitch, policy) for index in select_informative_frames(frames)
     ]

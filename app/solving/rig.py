@@ -119,13 +119,13 @@ class Rig:
     pitch: Pitch
 
     @property
-    def start(self) -> FloatArray:
+    def initial_parameters(self) -> FloatArray:
         """The cameras as they are thought to stand now, shape (K, 8)."""
         return np.array([camera.parameters for camera in self.cameras])
 
     def only(self, kept: BoolArray) -> Rig:
         """The same cameras with some of the instants, shape (F,)."""
-        return replace(self, rays=self.rays.only(kept), times=self.times[kept])
+        return replace(self, rays=self.rays.select_subset(kept), times=self.times[kept])
 
 
 @dataclass(frozen=True)
@@ -169,10 +169,10 @@ def make_rig(
         )
     for camera in sharing:
         _require_adjustable(camera)
-    fitted = policy.calibration.fitted(pitch)
+    fitted = policy.calibration.with_fitted_goal(pitch)
     rig = Rig(tuple(sharing), *_collect_rays_of_frames(sharing, frames, policy), fitted)
-    points = optimize_points(rig.start, rig.rays, np.inf)
-    at = linearize(rig.start, points, rig.rays)
+    points = optimize_points(rig.initial_parameters, rig.rays, np.inf)
+    at = linearize(rig.initial_parameters, points, rig.rays)
     apart = np.hypot(*at.residuals.T) * rig.rays.sigma
     limits = policy.tau_px(2 * rig.rays.half_diagonals)
     # Where the cameras are far off themselves, most rays pass each other that far.
@@ -186,7 +186,7 @@ def adjust_rig(rig: Rig) -> RigFit:
     """The cameras that explain lines and balls best, and how well they are known."""
     anchors = [sample_grass_in_view(camera) for camera in rig.cameras]
     observed = [_make_camera_observations(camera, rig.pitch) for camera in rig.cameras]
-    parameters, ball_sigma, line_sigma = rig.start, 1.0, LINE_SIGMA_PX
+    parameters, ball_sigma, line_sigma = rig.initial_parameters, 1.0, LINE_SIGMA_PX
     for scale in (WIDE, TIGHT, TIGHT):
         rays = replace(rig.rays, sigma=rig.rays.sigma * ball_sigma)
         problem = _RigProblem(rig.cameras, rays, observed, anchors, line_sigma, scale)

@@ -145,7 +145,9 @@ def propose_rig(
     fit = adjust_rig(rig)
     halved = adjust_rig(rig.only(~odd)) if odd.any() and not odd.all() else None
     balls = optimize_points(fit.parameters, rig.rays, np.inf)
-    moved = np.linalg.norm(balls - optimize_points(rig.start, rig.rays, np.inf), axis=1)
+    moved = np.linalg.norm(
+        balls - optimize_points(rig.initial_parameters, rig.rays, np.inf), axis=1
+    )
     used = {camera.key for camera in rig.cameras}
     return RigProposal(
         cameras=tuple(
@@ -224,7 +226,9 @@ def _compare_camera(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camer
         picture_px=_median_or_none(np.hypot(*moved.T)) or 0.0,
         position_sigma_m=float(np.sqrt(np.trace(covariance[X : Z + 1, X : Z + 1]))),
         picture_sigma_px=_median_or_none(np.sqrt(variances)) or 0.0,
-        lines_before_px=_median_or_none(measure_line_distances(camera, rig.start[row], rig.pitch))
+        lines_before_px=_median_or_none(
+            measure_line_distances(camera, rig.initial_parameters[row], rig.pitch)
+        )
         if lines
         else None,
         lines_after_px=_median_or_none(measure_line_distances(camera, parameters, rig.pitch))
@@ -242,7 +246,7 @@ def _compare_pairs(
         if len(rows) == 0:
             continue
         before, after = (
-            ray_pair_distances_px(rig.start, rays)[0],
+            ray_pair_distances_px(rig.initial_parameters, rays)[0],
             ray_pair_distances_px(fit.parameters, rays)[0],
         )
         out = odd[rows] if halved is not None else np.zeros(len(rows), bool)

@@ -109,7 +109,7 @@ class BallObservation:
         return self.camera.undistort_jacobian(np.array(self.center))
 
     @cached_property
-    def numbers(self) -> CameraNumbers | None:
+    def camera_numbers(self) -> CameraNumbers | None:
         """The camera as numbers; None where nobody says how exact it is."""
         return CameraNumbers.of(self.calibration, self.size.diagonal)
 

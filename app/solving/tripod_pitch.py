@@ -143,7 +143,7 @@ class TripodPitch:
         return self.covariance[_PLACE, _PLACE]
 
     @property
-    def sizes_sigma(self) -> FloatArray:
+    def size_sigmas(self) -> FloatArray:
         """Standard deviations of length and width, metres, shape (2,); nothing of a size that was measured."""
         return np.asarray(PAINT_SIZE_SIGMA_M * np.sqrt(np.diag(self.covariance)[_PITCH][SIZES]))
 
@@ -153,7 +153,7 @@ class TripodPitch:
         return self._term_with_sigma(CROWN, CROWN_SIGMA_M)
 
     @property
-    def inward(self) -> tuple[float, float]:
+    def inward_paint_shift(self) -> tuple[float, float]:
         """How far the paint lies inside the plan, and its standard deviation, metres."""
         return self._term_with_sigma(INWARD, INWARD_SIGMA_M)
 
@@ -165,20 +165,20 @@ class TripodPitch:
     def are_sizes_known(self) -> tuple[bool, bool]:
         """Whether length and width are shown."""
         limit = np.minimum(TOLD_SHARE * PAINT_SIZE_SIGMA_M, UNKNOWN_SIGMA_M)
-        length, width = (self.sizes_sigma <= limit).tolist()
+        length, width = (self.size_sigmas <= limit).tolist()
         return length, width
 
     def clearly_different_pitch(self) -> Pitch | None:
         """The size that is shown, to a tenth of a metre, where it certainly is not the plan's."""
         found, used = (np.array([each.length, each.width]) for each in (self.pitch, self.plan))
-        limit = np.maximum(CERTAIN_SIGMAS * self.sizes_sigma, LEAST_DIFFERENCE_M)
+        limit = np.maximum(CERTAIN_SIGMAS * self.size_sigmas, LEAST_DIFFERENCE_M)
         off = (np.abs(found - used) > limit) & self.are_sizes_known
         if not off.any():
             return None
         length, width = np.where(off, found.round(1), used).tolist()
         return replace(self.plan, length=length, width=width)
 
-    def line(self, marking: str) -> FloatArray:
+    def sample_marking(self, marking: str) -> FloatArray:
         """Points along a marking as it is shown, pitch frame, metres, shape (N, 3)."""
         points = self.pitch.sample(marking, STEP_M, STEP_M)
         which = np.full(len(points), MARKINGS.index(marking))
@@ -189,11 +189,11 @@ class TripodPitch:
         grass = project_paint_to_grass(frame, self.size)
         return compute_paint_shift(grass, frame.sightings.curve, self.terms, self.pitch)
 
-    def camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
+    def fit_camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
         """The camera of a frame on the pitch that is shown, shape (8,), and its covariance, shape (8, 8)."""
         frames = _TripodProblem([frame], self.size, self.plan, self.policy, self)
         for _ in range(ALONE_ROUNDS):
-            parts = frames.parts()
+            parts = frames.build_normal_equations()
             frames.parameters = (
                 frames.parameters + np.linalg.solve(parts.own, parts.own_right[..., None])[..., 0]
             )
@@ -208,7 +208,9 @@ class TripodPitch:
     def covariance_of(self, frame: PaintSightings, parameters: FloatArray) -> FloatArray:
         """The same of parameters that are known already, shape (8, 8)."""
         at = replace(frame, parameters=parameters)
-        parts = _TripodProblem([at], self.size, self.plan, self.policy, self).parts()
+        parts = _TripodProblem(
+            [at], self.size, self.plan, self.policy, self
+        ).build_normal_equations()
         own = np.linalg.inv(parts.own[0])
         carried = own @ parts.between[0]
         covariance = own + carried @ self.covariance @ carried.T
@@ -318,7 +320,7 @@ class _TripodProblem:
         shift = compute_paint_shift(self._grass[at], seen.marking, known.terms, known.pitch)
         return replace(seen, offsets=shift_offsets(seen.offsets, seen.jacobian, shift))
 
-    def parts(self) -> _NormalEquations:
+    def build_normal_equations(self) -> _NormalEquations:
         """The equations where frames and what they share are now."""
         count, known = len(self.parameters), self._known
         own, between = (
@@ -338,7 +340,7 @@ class _TripodProblem:
             terms = pitch_and_marking_terms(
                 self._grass[at], seen.marking, seen.jacobian, self._plan
             )
-            robust = self._problem.robust(seen.offsets, seen.sigmas)
+            robust = self._problem.robust_weights(seen.offsets, seen.sigmas)
             each = robust * cautious_weights(seen.marking, seen.sigmas) / seen.sigmas**2
             weighted = seen.jacobian * (each / known.noise)[:, None]
             weighted_terms = terms * (each / known.noise)[:, None]
@@ -389,7 +391,7 @@ class _TripodProblem:
             numpy.linalg.LinAlgError: Nothing determines it.
         """
         for _ in range(ROUNDS):
-            parts = self.parts()
+            parts = self.build_normal_equations()
             alone = np.linalg.solve(parts.own, parts.own_right[..., None])[..., 0]
             carried = _parameter_derivatives(parts)
             below = parts.right - np.einsum("nis,ni->s", parts.between, alone)
@@ -405,7 +407,7 @@ class _TripodProblem:
             self._known = replace(self._known, noise=noise)
             if np.abs(step[_PITCH]).max() < SETTLED:
                 break
-        parts = self.parts()
+        parts = self.build_normal_equations()
         covariance = np.linalg.inv(_eliminate_frames(parts, _parameter_derivatives(parts)))
         away = self.parameters[:, X : Z + 1] - self._known.position
         return replace(

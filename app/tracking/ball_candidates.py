@@ -114,7 +114,7 @@ def reweight_by_other_views(
     """The same places, each as much likelier or less as other views say."""
     looks = found.looks
     for one in expected:
-        there = OTHERS_GAIN - 0.5 * (one.away(found.places) / one.sigma_px) ** 2
+        there = OTHERS_GAIN - 0.5 * (one.distance_to(found.places) / one.sigma_px) ** 2
         looks = looks + np.logaddexp(np.log(OTHERS_ERR), np.log(1 - OTHERS_ERR) + there)
     return replace(found, looks=looks)
 

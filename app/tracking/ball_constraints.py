@@ -80,12 +80,12 @@ class InstantConstraints:
     sigma: FloatArray
 
     @property
-    def windows(self) -> list[tuple[int, int, int]]:
+    def required_event_windows(self) -> list[tuple[int, int, int]]:
         """First and last knot before which each event that is wanted may happen, and its kind."""
         ends = np.flatnonzero(self.due).tolist()
         return [(int(self.begin[end]), end, int(self.wanted[end])) for end in ends]
 
-    def allows(self, kind: int, origin: int, to: int) -> bool:
+    def allows_event(self, kind: int, origin: int, to: int) -> bool:
         """Whether an event that stands before one knot may stand before another."""
         if int(self.wanted[origin]) == kind:
             return bool(self.wanted[to] == kind and self.begin[to] == self.begin[origin])

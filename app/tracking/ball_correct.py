@@ -202,7 +202,7 @@ def _solve_rows(
         return None
     near, options = measurements.part(numbers), TrackOptions()
     known = ViewErrors(dict(track.noise), dict(track.offsets))
-    shift = known.time_shifts(near.names)
+    shift = known.time_shifts(near.view_names)
     said = TrackConstraints(
         tuple(_build_event_constraints(track, corrections)),
         tuple(_build_place_constraints(track, begin, end, first, last, corrections, pitch)),

@@ -183,7 +183,7 @@ def _find_ball_by_appearance(
     there = None if camera is None else expected_ball_diameter(camera, seen.x, seen.y)
     if expected is not None and there is not None:
         size *= expected / there
-    return find_similar_ball(colour.grey(image), click.x, click.y, size), colour
+    return find_similar_ball(colour.to_grey(image), click.x, click.y, size), colour
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ class BallFrame:
         height, width = self.image.shape[:2]
         rows = np.clip(np.arange(top, bottom), 0, height - 1)
         columns = np.clip(np.arange(left, right), 0, width - 1)
-        return self.colour.grey(self.image[rows[0] : rows[-1] + 1][rows - rows[0]][:, columns])
+        return self.colour.to_grey(self.image[rows[0] : rows[-1] + 1][rows - rows[0]][:, columns])
 
 
 def estimate_background_homography(

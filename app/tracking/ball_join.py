@@ -59,7 +59,7 @@ def join_runs(
         pitch: Where the ball is played.
         options: As of the track.
     """
-    blank = BallTrack.none(frames, times, "")
+    blank = BallTrack.make_empty_track(frames, times, "")
     position, velocity = blank.position.copy(), blank.velocity.copy()
     covariance = blank.covariance.copy()
     state: list[BallState] = list(blank.state)
@@ -128,7 +128,7 @@ def join_runs(
         else None,
         offsets=tuple(
             (name, float(late))
-            for name, late in zip(measurements.names, shift, strict=True)
+            for name, late in zip(measurements.view_names, shift, strict=True)
             if abs(late) > LEAST_TOLD_S
         ),
         noise=_mean_noise_by_view(measurements, runs),
@@ -207,7 +207,7 @@ def _find_events(
     )
     shown = change >= LEAST_CHANGE
     when = fitted.event_time.copy()
-    for begin, end, wanted in knots.asked.windows:
+    for begin, end, wanted in knots.asked.required_event_windows:
         own = np.flatnonzero(
             (places >= begin) & (places <= end) & (history.event[places] == wanted)
         )

@@ -97,7 +97,7 @@ class BallColour:
         slope = apart / (SHADED * float(apart @ (ball - ground))) * CONTRAST
         return BallColour(np.append(slope, BACKGROUND_LEVEL - float(slope @ ground)))
 
-    def grey(self, image: Image) -> Grey:
+    def to_grey(self, image: Image) -> Grey:
         """The grey picture, shape (H, W)."""
         turned = cv2.transform(image, self.weights[None].astype(np.float32))
         return np.asarray(turned, np.uint8)
@@ -286,11 +286,11 @@ def find_ball(
     if best is None or best[0] < LEAST_LIKE:
         return None
     colour = BallColour.of(image, *best[1:])
-    spot = fit_disc(colour.grey(image), *best[1:])
+    spot = fit_disc(colour.to_grey(image), *best[1:])
     if spot is None:
         return None
     colour = BallColour.of(image, spot.x, spot.y, spot.diameter)
-    return fit_disc(colour.grey(image), spot.x, spot.y, spot.diameter) or spot, colour
+    return fit_disc(colour.to_grey(image), spot.x, spot.y, spot.diameter) or spot, colour
 
 
 def find_similar_ball(grey: Grey, x: float, y: float, diameter: float) -> BallSpot:

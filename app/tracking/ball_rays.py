@@ -61,7 +61,7 @@ class BallRays:
             sigma=self.sigma[rows],
         )
 
-    def turned(self) -> BallRays:
+    def rotate_half_turn(self) -> BallRays:
         """As cameras see them that are turned by 180 degrees about the centre mark."""
         return replace(
             self, positions=self.positions * _HALF_TURN, directions=self.directions * _HALF_TURN

@@ -51,7 +51,7 @@ class ExpectedPlace:
     end: tuple[float, float]
     sigma_px: float
 
-    def away(self, places: FloatArray) -> FloatArray:
+    def distance_to(self, places: FloatArray) -> FloatArray:
         """How far places (N, 2) are from it, pixels, shape (N,)."""
         start, along = np.array(self.start), np.subtract(self.end, self.start)
         share = ((places - start) @ along) / max(float(along @ along), 1e-9)

@@ -94,7 +94,7 @@ def build_knots(
         shift: Seconds to add to each view's times, by ``measurements.names``.
         said: What is said beside the measurements.
     """
-    names = {name: number for number, name in enumerate(measurements.names)}
+    names = {name: number for number, name in enumerate(measurements.view_names)}
     view = np.array([names[name] for name in measurements.views], dtype=int)
     by_camera: dict[int, list[int]] = {}
     for row, camera in enumerate(measurements.cameras):

@@ -57,7 +57,7 @@ def track_ball(
         explain_too_few_measurements(measurements) if len(frames) else "The stretch has no frames."
     )
     if reason is None:
-        shift = (known or ViewErrors()).time_shifts(measurements.names)
+        shift = (known or ViewErrors()).time_shifts(measurements.view_names)
         for _ in range(_SHIFTS):
             runs = [
                 solve_run(measurements, rows, times, shift, pitch, options, said, known)
@@ -75,12 +75,14 @@ def track_ball(
             if any(state != "gap" for state in track.state):
                 return track
             reason = OPEN
-    return BallTrack.none(frames, times, reason or "No series of measurements is long enough.")
+    return BallTrack.make_empty_track(
+        frames, times, reason or "No series of measurements is long enough."
+    )
 
 
 def _explain_inconsistent_view(measurements: BallMeasurements, runs: list[TrackRun]) -> str | None:
     """Why a view cannot be of this ball: most of it fits no track of the others."""
-    names = measurements.names
+    names = measurements.view_names
     rays, wrong = np.zeros(len(names)), np.zeros(len(names))
     for run in runs:
         if run.knots is not None and run.used is not None:
@@ -101,7 +103,7 @@ def _estimate_time_offsets(measurements: BallMeasurements, runs: list[TrackRun])
 
     The times of most of them are those that count.
     """
-    names = measurements.names
+    names = measurements.view_names
     count = len(names)
     known, pull, rays = np.zeros((count, count)), np.zeros(count), np.zeros(count)
     for run in runs:

@@ -125,16 +125,16 @@ def solve_run(
         known: Of a part of a track: what the whole says of the views. It was judged as a whole.
     """
     part = measurements.part(rows)
-    names = list(measurements.names)
+    names = list(measurements.view_names)
     if (reason := explain_too_few_measurements(part)) is not None:
         return TrackRun(rows, reason)
     first, last = part.times.min() - options.beyond_s, part.times.max() + options.beyond_s
-    own = shift[[names.index(name) for name in part.names]]
+    own = shift[[names.index(name) for name in part.view_names]]
     knots = build_knots(part, times[(times >= first) & (times <= last)], own, said)
     if known is None:
         knots = inflate_ray_noise(knots, _INEXACT)
     else:
-        knots = replace(knots, noise=knots.noise * known.factors(part.names)[knots.view])
+        knots = replace(knots, noise=knots.noise * known.noise_factors(part.view_names)[knots.view])
     if len(np.unique(knots.at)) < FEWEST:
         return TrackRun(rows, "The ball lies where its cameras have no rays.")
     history = (
@@ -169,7 +169,7 @@ def solve_run(
     fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen)
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
-    return TrackRun(rows, None, part.names, rows_of, history, fitted, used, noise)
+    return TrackRun(rows, None, part.view_names, rows_of, history, fitted, used, noise)
 
 
 def format_contradiction(what: str) -> str:
@@ -223,7 +223,7 @@ def _shift_misplaced_events(
         slack = 0.1 * (high - low)
         to = at - 1 if when < low - slack else at + 1 if when > high + slack else at
         free = 1 <= to < len(event) and event[to] == NOTHING
-        if not free or not knots.asked.allows(int(event[at]), int(at), int(to)):
+        if not free or not knots.asked.allows_event(int(event[at]), int(at), int(to)):
             continue
         event[to], event[at] = event[at], NOTHING
         if to < at:

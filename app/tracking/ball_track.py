@@ -58,7 +58,7 @@ class BallMeasurements:
         return len(self.frames)
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
+    def view_names(self) -> tuple[str, ...]:
         """Of the views, each once, sorted."""
         return tuple(sorted(set(self.views)))
 
@@ -89,7 +89,7 @@ class ViewErrors:
     noise: Mapping[str, float] = field(default_factory=dict)
     late: Mapping[str, float] = field(default_factory=dict)
 
-    def factors(self, names: Sequence[str]) -> FloatArray:
+    def noise_factors(self, names: Sequence[str]) -> FloatArray:
         """Times that views are noisier than is said of them, shape (V,)."""
         return np.array([self.noise.get(name, 1.0) for name in names])
 
@@ -260,7 +260,7 @@ class BallTrack:
         return result
 
     @staticmethod
-    def none(frames: IntArray, times: FloatArray, reason: str) -> BallTrack:
+    def make_empty_track(frames: IntArray, times: FloatArray, reason: str) -> BallTrack:
         """No ball in any frame, and why."""
         count = len(frames)
         state: tuple[BallState, ...] = ("gap",)

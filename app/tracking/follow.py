@@ -110,7 +110,7 @@ class TrackedFrame:
     @property
     def score(self) -> float:
         """How well its camera agrees with the paint, and its weakest marking with it, 0 to 1."""
-        return 0.0 if self.seen is None else self.seen.product * min(1.0, 0.5 + self.weakest)
+        return 0.0 if self.seen is None else self.seen.combined_score * min(1.0, 0.5 + self.weakest)
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ class CameraFollower:
                 else found
             )
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
-            again = self.propose(picture)
+            again = self.propose_frame_camera(picture)
             if again is not None:
                 return self._remember_frame(again)
         return self._remember_frame(found)
@@ -225,14 +225,16 @@ class CameraFollower:
         """The frame with the camera that the paint alone says where that agrees clearly better."""
         if self._was_recently_proposed(picture, self.patchy_every):
             return found
-        again = self.propose(picture, self.patchy_every)
+        again = self.propose_frame_camera(picture, self.patchy_every)
         if again is not None and _agreement_product(again) > CLEARLY * _agreement_product(found):
             self.patchy_every = PATCHY_EVERY
             return again
         self.patchy_every = min(2 * self.patchy_every, PATCHY_LEAST_OFTEN)
         return found
 
-    def propose(self, picture: FramePicture, every: int = PROPOSED_EVERY) -> TrackedFrame | None:
+    def propose_frame_camera(
+        self, picture: FramePicture, every: int = PROPOSED_EVERY
+    ) -> TrackedFrame | None:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
         if self._was_recently_proposed(picture, every):
             return None
@@ -250,7 +252,9 @@ class CameraFollower:
                 found.agreement.supported >= LIKELY and (found.weakest or 0) >= LIKELY_WEAKEST
             )
             if is_likely and not self.known and len(self.unsure) < MOST_UNSURE:
-                self.unsure.append(LikelyCamera(picture, found.camera, found.agreement.product))
+                self.unsure.append(
+                    LikelyCamera(picture, found.camera, found.agreement.combined_score)
+                )
             return None
         # One that was found is no reason to wait until the view is another one.
         self.in_vain, self.turned_since = 0, np.inf
@@ -456,7 +460,7 @@ def _measure_median_shift_px(before: SnappedCamera, after: SnappedCamera) -> flo
 
 
 def _agreement_product(frame: TrackedFrame) -> float:
-    return 0.0 if frame.seen is None else frame.seen.product
+    return 0.0 if frame.seen is None else frame.seen.combined_score
 
 
 def predicted_covariance(

@@ -56,7 +56,7 @@ def fit_time_map(
             reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
     fit = LinkFit(live, replay, hints)
-    tried = [fit.refine_map(one) for one in fit.candidates()]
+    tried = [fit.refine_map(one) for one in fit.find_candidate_maps()]
     found = [one for one in tried if one is not None]
     if not found:
         where = " near the instants given" if len(hints) else ""
@@ -71,7 +71,7 @@ def check_half_turn(made: TimeMap, live: BallRays, replay: BallRays, hints: Floa
     """What ``fit_time_map`` made; where it says nothing, and would once the replay's cameras are turned, that is said."""
     if made.reason is None or made.pieces:
         return made
-    other = fit_time_map(live, replay.turned(), hints)
+    other = fit_time_map(live, replay.rotate_half_turn(), hints)
     if other.reason is not None and not other.pieces:
         return made
     return replace(made, reason=TURNED, turned=True)
@@ -88,7 +88,7 @@ def measure_ray_distances(
         part = replay.part(np.flatnonzero(inside))
         if len(part):
             fit = LinkFit(live, part, np.zeros((0, 2)))
-            pairs = fit.pairs(LinearTimeMap(piece.offset, piece.speed, 0.0))
+            pairs = fit.find_ray_pairs(LinearTimeMap(piece.offset, piece.speed, 0.0))
             times.append(part.times[pairs.replay])
             misses.append(np.abs(pairs.miss))
     return np.concatenate(times), np.concatenate(misses)
@@ -100,7 +100,7 @@ def _make_map_from_hints(live: BallRays, replay: BallRays, hints: FloatArray) ->
     if made.reason is not None or min(len(live), len(replay)) < 2:
         return made
     assert made.offset is not None and made.speed is not None
-    pairs = LinkFit(live, replay, hints).pairs(LinearTimeMap(made.offset, made.speed, 0.0))
+    pairs = LinkFit(live, replay, hints).find_ray_pairs(LinearTimeMap(made.offset, made.speed, 0.0))
     count = len(pairs.miss)
     miss = float(np.median(np.abs(pairs.miss))) if count else None
     return replace(made, miss=miss, pairs=count)
@@ -133,7 +133,7 @@ def _split_into_pieces(
     ]
     for rows in left:
         near = LinkFit(live, replay.part(rows), fit.hints[:0])
-        maps += [one for one in map(near.refine_map, near.candidates()) if one is not None]
+        maps += [one for one in map(near.refine_map, near.find_candidate_maps()) if one is not None]
     parts = [replay.part(rows) for rows in _split_by_best_map(fit, maps)]
     pieces: list[TimeMap] = []
     for part in parts if len(parts) > 1 else ():

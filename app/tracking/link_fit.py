@@ -149,12 +149,12 @@ class LinkFit:
         self.run = 1.0
         """Neighbours that say the same, beyond those that share a ray."""
 
-    def apart(self, a: LinearTimeMap, b: LinearTimeMap) -> float:
+    def max_time_difference(self, a: LinearTimeMap, b: LinearTimeMap) -> float:
         """Most seconds between the live times that two maps give the replay."""
         ends = self.replay.times[[0, -1]]
         return float(np.abs(a.live(ends) - b.live(ends)).max())
 
-    def candidates(self) -> list[LinearTimeMap]:
+    def find_candidate_maps(self) -> list[LinearTimeMap]:
         """Maps under which most rays meet, best first: every offset with every speed."""
         live, replay = self.live, self.replay
         some = np.unique(np.linspace(0, len(replay) - 1, _MOST_TRIED).astype(int))
@@ -185,7 +185,7 @@ class LinkFit:
             if len(chosen) == _CANDIDATES or score[row] <= 0:
                 break
             one = LinearTimeMap(float(table[row, 0]), float(table[row, 1]), self.middle)
-            if all(self.apart(one, other) > APART_S for other in chosen):
+            if all(self.max_time_difference(one, other) > APART_S for other in chosen):
                 chosen.append(one)
         return chosen
 
@@ -195,7 +195,7 @@ class LinkFit:
         near: BoolArray = off <= _NEAR_HINT_S
         return near
 
-    def pairs(self, one: LinearTimeMap) -> RayPairs:
+    def find_ray_pairs(self, one: LinearTimeMap) -> RayPairs:
         """The rays that have a partner under a map."""
         live, replay = self.live, self.replay
         times = one.live(replay.times)
@@ -244,7 +244,7 @@ class LinkFit:
         most = np.array([0.1, 0.2 / max(self.span, 1.0)])[free]
         hinted = np.column_stack([np.ones(len(self.hints)), self.hints[:, 1] - self.middle])
         for floor in _FLOORS_M:
-            pairs = self.pairs(replace(one, at=float(at[0]), speed=float(at[1])))
+            pairs = self.find_ray_pairs(replace(one, at=float(at[0]), speed=float(at[1])))
             if len(pairs.miss) < FEWEST_PAIRS:
                 return None
             pulled = self._make_weighting(pairs, floor)(jacobian := self._jacobian(pairs))
@@ -299,7 +299,7 @@ class LinkFit:
 
         0 where a ray has no partner.
         """
-        pairs = self.pairs(one)
+        pairs = self.find_ray_pairs(one)
         sigma = self.compute_miss_sigma(pairs)
         # The density of the t distribution with four degrees of freedom.
         ratio = np.log(0.375 * _BACKGROUND_M / sigma) - 2.5 * np.log1p(
@@ -314,7 +314,7 @@ class LinkFit:
 
     def has_enough_pairs(self, one: LinearTimeMap, rows: IntArray) -> bool:
         """Whether so many of some rays have partners under a map that they could be linked."""
-        times = self.replay.times[np.intersect1d(rows, self.pairs(one).replay)]
+        times = self.replay.times[np.intersect1d(rows, self.find_ray_pairs(one).replay)]
         if len(times) < FEWEST_PAIRS:
             return False
         return one.speed * float(np.ptp(times)) >= LEAST_OVERLAP_S / 2
@@ -337,7 +337,7 @@ class LinkFit:
 
     def set_noise(self, one: LinearTimeMap) -> None:
         """Take the noise from the misses under a map."""
-        pairs = self.pairs(one)
+        pairs = self.find_ray_pairs(one)
         if pairs.inside.sum() >= FEWEST_PAIRS // 2:
             ratio = np.abs(pairs.miss / self.compute_miss_sigma(pairs))[pairs.inside]
             self.noise = max(self.noise * float(np.median(ratio)) / 0.6745, 1.0)

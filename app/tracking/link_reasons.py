@@ -37,7 +37,7 @@ def judge_map(fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap])
     for _ in range(3):
         fit.set_noise(best)
         best = fit.refine_map(best) or best
-    pairs = fit.pairs(best)
+    pairs = fit.find_ray_pairs(best)
     made = fit.described(best, pairs)
     reason = _explain_mismatch(fit, made, pairs) or _explain_ambiguity(fit, best, found, pairs)
     return replace(made, reason=reason or _explain_uncertainty(fit, made, pairs))
@@ -83,7 +83,7 @@ def _explain_ambiguity(
     stretched = [(replace(best, speed=best.speed * factor), 1) for factor in _STRETCHES]
     for start, hold in [*((one, None) for one in found), *shifted, *stretched]:
         other = fit.refine_map(start, hold)
-        if other is None or fit.apart(best, other) < APART_S / 2:
+        if other is None or fit.max_time_difference(best, other) < APART_S / 2:
             continue
         if not fit.is_as_good(other, best):
             continue

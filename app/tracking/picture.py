@@ -85,7 +85,7 @@ class FramePicture:
         """What looks like painted lines, shape (H, W)."""
         return np.asarray(self.strength > 0)
 
-    def read(self) -> FramePicture:
+    def compute_all(self) -> FramePicture:
         """The same with all parts computed."""
         _ = self.grey, self.strength, self.reading
         return self
@@ -108,7 +108,7 @@ def make_frame_pictures(
     waiting: deque[Future[FramePicture]] = deque()
     for frame in frames:
         picture = make_frame_picture(frame)
-        work = FramePicture.read if is_followed() else _compute_grey
+        work = FramePicture.compute_all if is_followed() else _compute_grey
         waiting.append(get_kernel_executor().submit(work, picture))
         if len(waiting) > AHEAD:
             yield waiting.popleft().result()

@@ -280,7 +280,7 @@ class _ShotProblem:
         return replace(seen, offsets=shift_offsets(seen.offsets, seen.jacobian, shift))
 
     def _compute_paint_weights(self, seen: PaintOffsets) -> FloatArray:
-        robust = self._problem.robust(seen.offsets, seen.sigmas)
+        robust = self._problem.robust_weights(seen.offsets, seen.sigmas)
         weigh = cautious_weights if self._shifts else marking_weights
         weights: FloatArray = robust * weigh(seen.marking, seen.sigmas) / seen.sigmas**2
         return weights / self._noise

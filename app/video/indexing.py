@@ -133,7 +133,7 @@ def _build_index(
         facts,
         pts,
         _find_key_frames(shown, _read_key_frame_times(path), np.array(intra)),
-        rows.all(),
+        rows.get_measured_rows(),
     )
 
 

@@ -228,6 +228,6 @@ class GrowingMeasures:
         before = self._rows[self._count - 2] if self._count > 1 else None
         return self._rows[self._count - 1], before
 
-    def all(self) -> Measured:
+    def get_measured_rows(self) -> Measured:
         """All of them."""
         return self._rows[: self._count]

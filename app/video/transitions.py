@@ -84,14 +84,14 @@ def find_soft_transitions(
     found: list[Transition] = []
     for lag, numbers in scene.candidates():
         for number in numbers:
-            one = scene.explain(number, lag)
+            one = scene.find_transition_between(number, lag)
             if one is not None:
                 found.append(one)
     chosen: list[Transition] = []
     for one in sorted(found, key=lambda each: each.score):
         if all(one.first > other.last + 2 or one.last < other.first - 2 for other in chosen):
             chosen.append(one)
-    return scene.merged(sorted(chosen, key=lambda each: each.first))
+    return scene.merge_wipes(sorted(chosen, key=lambda each: each.first))
 
 
 class _TransitionSearch:
@@ -126,7 +126,7 @@ class _TransitionSearch:
             found.append((lag, numbers))
         return found
 
-    def merged(self, found: list[Transition]) -> list[Transition]:
+    def merge_wipes(self, found: list[Transition]) -> list[Transition]:
         """Wipes close to each other made one: a logo flew in, stood, and flew out."""
         merged: list[Transition] = []
         for one in found:
@@ -142,7 +142,7 @@ class _TransitionSearch:
                 merged.append(one)
         return merged
 
-    def explain(self, number: int, lag: int) -> Transition | None:
+    def find_transition_between(self, number: int, lag: int) -> Transition | None:
         """What lies between a frame and the one so many frames before; None: no transition."""
         at = int(np.searchsorted(self._bounds, number, "right"))
         low, high = int(self._bounds[at - 1]), int(self._bounds[at])

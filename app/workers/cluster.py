@@ -71,7 +71,7 @@ class SchedulerPlace:
         """Its port."""
         return urlsplit(self.address).port or 0
 
-    def security(self) -> Any:
+    def make_dask_security(self) -> Any:
         """The same for Dask: nobody is talked to whose certificate the authority did not sign."""
         from distributed import Security
 
@@ -359,7 +359,10 @@ def _connect_client(place: SchedulerPlace) -> Any:
     silence_dask()
     try:
         return Client(
-            place.address, security=place.security(), timeout=_CONNECT_S, set_as_default=False
+            place.address,
+            security=place.make_dask_security(),
+            timeout=_CONNECT_S,
+            set_as_default=False,
         )
     except Exception as error:
         # A scheduler that goes while it is greeted may leave any error, and who watches must go on.

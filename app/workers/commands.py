@@ -77,7 +77,7 @@ async def _run_scheduler(place: SchedulerPlace, say: Say) -> None:
             host=place.host,
             port=place.port,
             protocol="tcp" if place.keys is None else "tls",
-            security=place.security(),
+            security=place.make_dask_security(),
             dashboard=False,
             dashboard_address=_NOWHERE,
         )
@@ -115,7 +115,7 @@ async def _keep_worker_running(place: SchedulerPlace, limit: float, folder: str)
                 memory_limit=limit,
                 local_directory=folder,
                 silence_logs=logging.ERROR,
-                security=place.security(),
+                security=place.make_dask_security(),
                 dashboard=False,
                 dashboard_address=_NOWHERE,
             ) as nanny:

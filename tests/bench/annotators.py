@@ -79,7 +79,7 @@ def _factors(placed: Placed, policy: Policy) -> SourceFactors:
 
 def _with_own(made: Made, people: tuple[str, ...], factors: SourceFactors) -> Made:
     views = tuple(
-        replace(view, noise=factors.factor([BallSource("person", of)]))
+        replace(view, noise=factors.noise_factor([BallSource("person", of)]))
         for view, of in zip(made.group.views, people, strict=False)
     )
     return replace(made, group=replace(made.group, views=views))

@@ -98,9 +98,9 @@ def _statistics(store: Store) -> dict[str, float]:
     for what in ("statistics counted anew", "first statistics after a start"):
         kept = StatisticsCache(store)
         start = time.perf_counter()
-        kept.statistics(1)
+        kept.get_statistics(1)
         found[what] = 1000 * (time.perf_counter() - start)
-    found["statistics"] = _spent(lambda: kept.statistics(1))
+    found["statistics"] = _spent(lambda: kept.get_statistics(1))
     found["statistics of sigma<0.3"] = _spent(lambda: read_statistics(store, 1, "sigma<0.3"))
     return found
 

@@ -286,17 +286,17 @@ def _print_detector(shots: list[Shot]) -> None:
         began = time.thread_time()
         paint = find_line_like_pixels(shot.image, shot.field)
         middle = time.thread_time()
-        right.append(measure_agreement(shot.truth, shot.field, paint).product)
+        right.append(measure_agreement(shot.truth, shot.field, paint).combined_score)
         times.append([1000 * (middle - began), 1000 * (time.thread_time() - middle)])
         for px in SHIFTS_PX:
             camera = _turned(shot.truth, px, rng)
             wrong[f"turned by {px:g} px"].append(
-                measure_agreement(camera, shot.field, paint).product
+                measure_agreement(camera, shot.field, paint).combined_score
             )
         planted = _mislabelled(shot, rng)
         if planted is not None and planted.camera is not None:
             name = "a label exchanged, labels trusted"
-            wrong[name].append(measure_agreement(planted.camera, shot.field, paint).product)
+            wrong[name].append(measure_agreement(planted.camera, shot.field, paint).combined_score)
             read = read_paint_of_image(shot.image, shot.size, planted, PITCH, PAPER.calibration)
             if read.supported is not None:
                 kept_wrong.append(read.supported * (read.explained or 0.0))

@@ -100,7 +100,7 @@ def with_cameras(group: Group, cameras: Mapping[str, tuple[Camera, tuple[float, 
 def with_factors(group: Group, factors: SourceFactors) -> Group:
     """The group with each camera's own noise."""
     views = tuple(
-        replace(view, noise=factors.factor([BallSource("camera", view.station.key)]))
+        replace(view, noise=factors.noise_factor([BallSource("camera", view.station.key)]))
         for view in group.views
     )
     return replace(group, views=views)

@@ -117,7 +117,7 @@ def _agreement(tracked: Sequence[FrameCamera]) -> list[float | None]:
 
 def said(shown: TripodPitch) -> str:
     """Length, width and crown with their standard deviations."""
-    length, width = shown.sizes_sigma
+    length, width = shown.size_sigmas
     crown, sigma = shown.crown
     return (
         f"{shown.pitch.length:.1f} ±{length:.1f} x {shown.pitch.width:.1f} ±{width:.1f},"
@@ -142,7 +142,7 @@ def clicked_hits(frame: FrameCamera, lines: Lines, pitch: TripodPitch | None = N
         return [False] * len(names)
     shown = project_markings(frame.camera, Pitch(), frame.size)
     if pitch is not None:
-        lines_of = ((name, frame.camera.project(pitch.line(name))) for name in names)
+        lines_of = ((name, frame.camera.project(pitch.sample_marking(name))) for name in names)
         shown = {name: line[np.isfinite(line).all(axis=1)] for name, line in lines_of}
     hits = []
     for name in names:

@@ -201,7 +201,7 @@ def noise_used(noise: DatasetNoise, policy: Policy) -> Policy:
 
 def misses_in(made: Made, policy: Policy) -> tuple[RayResidual, ...]:
     """What the rays to the ball of a group leave unexplained."""
-    return NoiseGroup.of(made.group, solve_group(made.group, policy), policy).misses(policy)
+    return NoiseGroup.of(made.group, solve_group(made.group, policy), policy).ray_residuals(policy)
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

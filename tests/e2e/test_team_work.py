@@ -246,7 +246,7 @@ class TestWork:
         def submitted(store: Store) -> tuple[int, int]:
             batch = make_batch(store, "sample", new, actor="local").id
             leases, sina = LeaseService(store), BatchMember("sina")
-            copy = leases.next(batch, sina).group
+            copy = leases.lease_next_group(batch, sina).group
             leases.submit(batch, copy, sina, actor="sina")
             return batch, copy
 

@@ -168,7 +168,7 @@ class TestPasskeys:
                 assert way_in is not None
                 request = Request({"type": "http", "headers": [(b"host", b"localhost")]})
                 if site is not None:
-                    assert way_in.site(request) == site
+                    assert way_in.make_passkey_site(request) == site
                     continue
                 with pytest.raises(ConflictError):
-                    way_in.site(request)
+                    way_in.make_passkey_site(request)

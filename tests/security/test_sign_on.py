@@ -266,7 +266,7 @@ class TestSecondFactor:
         assert_refused(visitor.finish(told, cookie, factor="000000"), word="/factor")
         assert_refused(visitor.finish({**told, "code": "x"}, cookie, factor="1"), word="/factor")
         assert name_in(visitor.finish(told, cookie, factor=codes[0])) == "fay"
-        assert attempts.hit("code/fay", 1, 3600.0) is not None
+        assert attempts.count_attempt("code/fay", 1, 3600.0) is not None
         assert_refused(visitor.finish(told, cookie, factor=codes[1]), word="another browser")
         ruled(trusted=frozenset({"hwk"}))
         assert_refused(visitor.enter(), word="/factor")

@@ -82,7 +82,7 @@ class Members:
 
     def wait_for_workers(self) -> None:
         """Wait until all workers are at the scheduler."""
-        security = SchedulerPlace(self.address, self._keys).security()
+        security = SchedulerPlace(self.address, self._keys).make_dask_security()
         with Client(
             self.address, security=security, timeout=SECONDS, set_as_default=False
         ) as client:

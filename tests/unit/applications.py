@@ -93,7 +93,7 @@ def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClie
     site = BrowserSite(static_folder)
     install_error_handlers(plain_app)
     install_pages(plain_app, site)
-    plain_app.add_middleware(SecurityHeaders, policy=site.policy)
+    plain_app.add_middleware(SecurityHeaders, policy=site.get_security_policy)
     return client_of(plain_app)
 
 

@@ -224,7 +224,7 @@ class TestSecrets:
         assert identity["credentials"] == [{"accessKey": key, "secretKey": secret}]
         assert {right.partition(":")[2] for right in identity["actions"]} == {store.bucket}
         assert settings.cluster is not None
-        assert parse_scheduler_address(settings.cluster, settings.cluster_keys).security()
+        assert parse_scheduler_address(settings.cluster, settings.cluster_keys).make_dask_security()
         password = (secrets / "database_password").read_text()
         assert f":{password}@" in settings.database
 

@@ -34,7 +34,9 @@ def home(tmp_path: Path) -> Path:
 @pytest.fixture
 def run(touchline: Run, monkeypatch: pytest.MonkeyPatch) -> Run:
     # A home that is served all the same shall fail the test, and not hold it.
-    monkeypatch.setattr("app.http.server.serve_application", lambda app, _: app.state.services.close())
+    monkeypatch.setattr(
+        "app.http.server.serve_application", lambda app, _: app.state.services.close()
+    )
     return touchline
 
 

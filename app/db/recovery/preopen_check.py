@@ -343,7 +343,7 @@ class OpenDatabaseFile:
         self._database, self._log = database, find_write_ahead_log_file(database)
         self._opened = _read_file_identity(database)
 
-    def require_there(self) -> None:
+    def require_same_file(self) -> None:
         """Raise DamagedError where another file lies in the database's place, or none."""
         found = _read_file_identity(self._database)
         if found is None:

@@ -108,7 +108,9 @@ class LeaseService:
     def __init__(self, store: Store, clock: Callable[[], datetime] = lambda: datetime.now(UTC)):
         self._store, self._clock = store, clock
 
-    def next(self, batch_id: int, worker: BatchMember, *, after: int | None = None) -> Lease:
+    def lease_next_group(
+        self, batch_id: int, worker: BatchMember, *, after: int | None = None
+    ) -> Lease:
         """Take a lease on the next group that waits for somebody, and that nobody has open.
 
         Args:
@@ -146,7 +148,7 @@ class LeaseService:
         row, part = found
         return self._renew_lease(session, batch, row, part, worker)
 
-    def take(
+    def lease_group(
         self, batch_id: int, group: int, worker: BatchMember, *, take_over: bool = False
     ) -> Lease:
         """Take a lease on a group, or let the one last on that they have.
@@ -176,7 +178,7 @@ class LeaseService:
             end_leases(session, [row.id for row in others])
             return self._renew_lease(session, batch, row, _choose_part(parts, row), worker)
 
-    def give_back(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
+    def release_group(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """End a lease; it does not matter whether there is one.
 
         Raises:

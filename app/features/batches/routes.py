@@ -250,7 +250,7 @@ class BatchMemberResolver:
 
     login: Login | None
 
-    def here(self, dataset_id: int) -> BatchMember:
+    def member_in_dataset(self, dataset_id: int) -> BatchMember:
         """Them, in a dataset."""
         if self.login is None:
             return BatchMember(LOCAL_USER, alone=True)
@@ -260,7 +260,7 @@ class BatchMemberResolver:
 
     def member_of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""
-        return self.here(batches.find_dataset_of_batch(store, batch))
+        return self.member_in_dataset(batches.find_dataset_of_batch(store, batch))
 
 
 async def _get_batch_members(request: Request) -> BatchMemberResolver:
@@ -282,7 +282,7 @@ def _announce_lease(services: Services, lease: Lease) -> Lease:
 def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
     return MyWork.model_validate(
-        {"items": progress.list_own_batches(store, members.here, visibility)}
+        {"items": progress.list_own_batches(store, members.member_in_dataset, visibility)}
     )
 
 
@@ -393,7 +393,7 @@ def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members
     """
     worker = members.member_of_batch(services.store, batch)
     return _announce_lease(
-        services, LeaseService(services.store).next(batch, worker, after=origin.after)
+        services, LeaseService(services.store).lease_next_group(batch, worker, after=origin.after)
     )
 
 
@@ -409,7 +409,7 @@ def open_group(
 ) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = members.member_of_batch(services.store, batch)
-    taken = LeaseService(services.store).take(batch, group, worker, take_over=how.take_over)
+    taken = LeaseService(services.store).lease_group(batch, group, worker, take_over=how.take_over)
     return _announce_lease(services, taken)
 
 
@@ -423,7 +423,7 @@ def open_group(
 def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
     worker = members.member_of_batch(services.store, batch)
-    _announce_lease(services, LeaseService(services.store).give_back(batch, group, worker))
+    _announce_lease(services, LeaseService(services.store).release_group(batch, group, worker))
 
 
 @router.put(

@@ -190,5 +190,5 @@ def delete_dataset(
             services.store, contents.id, confirm=request.confirm, actor=actor
         )
         for export in exports:
-            services.exports.forget(str(export))
+            services.exports.delete_export(str(export))
     return contents

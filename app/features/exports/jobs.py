@@ -60,7 +60,7 @@ class ExportEntry:
     expired: bool = False
     """The zip was deleted because it was old; what it held is still known."""
 
-    def expires(self, days: int) -> datetime | None:
+    def find_expiry_time(self, days: int) -> datetime | None:
         """When the zip is deleted where zips are kept for so many days (0: for good); None: never,
         or it is gone."""
         if not days or self.expired or self.stored is not None:
@@ -80,7 +80,7 @@ class ExportFolder:
         self.folder = folder
 
     @contextmanager
-    def writing(self, name: str) -> Iterator[Path]:
+    def reserve_partial_path(self, name: str) -> Iterator[Path]:
         """A path beside the zip of an export, for this run to call its half written files after.
 
         What a server or a process that was killed at an export has left of it goes before, also
@@ -95,7 +95,9 @@ class ExportFolder:
         finally:
             self._delete_partial_files(beside.name)
 
-    def keep(self, name: str, request: Mapping[str, Any], report: ExportReport) -> ExportEntry:
+    def save_entry(
+        self, name: str, request: Mapping[str, Any], report: ExportReport
+    ) -> ExportEntry:
         """Record an export whose zip is written; only then it can be found.
 
         Args:
@@ -113,7 +115,7 @@ class ExportFolder:
             counts=dict(report.counts),
             left_out=dict(report.left_out),
             missing_images=list(report.missing_images),
-            bytes=self.content(name).stat().st_size if stored is None else stored.size,
+            bytes=self.get_zip_path(name).stat().st_size if stored is None else stored.size,
             stored=None if stored is None else stored.make_sealed_address(),
         )
         self._write_record(entry)
@@ -136,18 +138,18 @@ class ExportFolder:
             raise NotFoundError("there is no such export")
         return entry
 
-    def content(self, name: str) -> Path:
+    def get_zip_path(self, name: str) -> Path:
         """Path of the zip of an export."""
         return self.folder / f"{name}.zip"
 
-    def forget(self, name: str) -> None:
+    def delete_export(self, name: str) -> None:
         """Delete an export, its record first: what is listed has a file.
 
         One that lies in an object store was delivered there, and stays.
         """
         if _ID.fullmatch(name):
             self._record_path(name).unlink(missing_ok=True)
-            self.content(name).unlink(missing_ok=True)
+            self.get_zip_path(name).unlink(missing_ok=True)
 
     def delete_expired_zips(self, days: int) -> int:
         """Delete zips that were finished so many days ago (0: none), and say how many.
@@ -163,14 +165,14 @@ class ExportFolder:
                 entry = None
             if entry is None:
                 continue
-            expires = entry.expires(days)
+            expires = entry.find_expiry_time(days)
             if expires is not None and expires < at:
                 # The record first: what is listed as ready has a file.
                 entry = replace(entry, expired=True)
                 self._write_record(entry)
                 gone += 1
             if entry.expired:
-                self.content(name).unlink(missing_ok=True)
+                self.get_zip_path(name).unlink(missing_ok=True)
         return gone
 
     def delete_unfinished_zips(self) -> int:
@@ -260,8 +262,8 @@ def run_export_job(
     request, name = progress.job.request, str(progress.job_id)
     to = request.get("to")
     progress(0, None, f"Writing {request['format']}.")
-    content = folder.content(name)
-    with folder.writing(name) as beside:
+    content = folder.get_zip_path(name)
+    with folder.reserve_partial_path(name) as beside:
         report = run_job_in_worker(
             store,
             "exports",
@@ -278,7 +280,7 @@ def run_export_job(
         )
     # It is done, also where somebody cancels it now.
     progress.place = report.groups, report.groups, f"{plural(report.groups, 'group')} written"
-    entry = folder.keep(name, request, report)
+    entry = folder.save_entry(name, request, report)
     return {
         "export": entry.id,
         "format": request["format"],

@@ -176,7 +176,7 @@ class ExportDocument(BaseModel):
                 "status": "expired" if entry.expired else "ready",
                 "incomplete": entry.incomplete,
                 "content": None if entry.expired else f"/api/v1/exports/{entry.id}/content",
-                "expires": entry.expires(days),
+                "expires": entry.find_expiry_time(days),
                 "error": None,
             }
         )
@@ -316,7 +316,7 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None
         raise NotFoundError("there is no such export")
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
-    services.exports.forget(export)
+    services.exports.delete_export(export)
     record_audit_event(services.store, actor, "export deleted", None, export=export)
 
 
@@ -359,7 +359,7 @@ def get_content(
             if days
             else "Make the export again.",
         )
-    path = services.exports.content(document.id)
+    path = services.exports.get_zip_path(document.id)
     if document.state == "gone" or (document.state == "done" and not path.is_file()):
         raise NotFoundError(
             "the file of this export is no longer on the server", hint="Make the export again."
@@ -431,7 +431,7 @@ def redirect_or_stream_stored_file(
     if stored.etag.strip('"') != etag:
         raise ChangedObjectError(f"{address} has changed since the export was written there")
     if store.settings.delivery == "signed":
-        found = store.signed(key, SIGNED_SECONDS)
+        found = store.make_signed_url(key, SIGNED_SECONDS)
         return RedirectResponse(found, 307, headers={"Cache-Control": "no-store"})
     headers = {
         "ETag": stored.etag,

@@ -109,7 +109,7 @@ class _ExportOptions:
     views: str = "valid"
 
     @property
-    def every_view(self) -> bool:
+    def includes_every_view(self) -> bool:
         """Whether training data hold every view."""
         return self.everything or self.views == "all"
 
@@ -217,7 +217,7 @@ def export_dataset(
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
             if images != "none" and "images_missing" not in counts:
-                counts["pictures"] = frames.present
+                counts["pictures"] = frames.present_count
             write_manifest(root, run.manifest(counts), progress)
     left_out = source.left_out if isinstance(source, LiveSource) else {}
     return ExportReport(out, format, source.count, counts, left_out, tuple(frames.missing))
@@ -230,7 +230,7 @@ def _open_view_files(root: Path, out: Root) -> Iterator[PutText | None]:
         yield None
         return
     with ViewFileBuffer(root) as files:
-        yield files.put
+        yield files.write_file
 
 
 def require_exportable(
@@ -314,7 +314,7 @@ def _require_format(
                 run.tracks = _open_track_source(
                     session, store.settings, source, options, try_only=True
                 )
-                counts = run.write(Path(folder), small.put)
+                counts = run.write(Path(folder), small.write_file)
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
@@ -455,7 +455,7 @@ class _ExportRun:
             options.format,
             options.everything,
             options.boxes,
-            options.every_view,
+            options.includes_every_view,
             provenance,
             self.unassigned,
             None if self.tracks is None else self.tracks.records,
@@ -476,7 +476,7 @@ class _ExportRun:
                 **source.settings(),
                 "images": self._options.images,
                 **describe_box_settings(self._options.format, self._options.boxes),
-                **describe_view_settings(self._options.format, self._options.every_view),
+                **describe_view_settings(self._options.format, self._options.includes_every_view),
                 **describe_missing_frames(self._options.format, counts),
             },
             licence=source.licence or terms,
@@ -492,7 +492,7 @@ class _ExportRun:
 
     def _iterate_records(self) -> Iterator[ExportRecord]:
         # A frame without its label would teach that it shows no ball: it stays out as well.
-        chosen = self._options.format == "yolo" and not self._options.every_view
+        chosen = self._options.format == "yolo" and not self._options.includes_every_view
         for place, (found, facts) in enumerate(self._source.items(), 1):
             record = found.keep_training_views() if chosen else found
             if record.group.views:

@@ -357,7 +357,7 @@ class ExportImages:
             self._note_missing(group, view, error.message)
 
     @property
-    def present(self) -> int:
+    def present_count(self) -> int:
         """How many pictures lie in the export, looked up there."""
         return sum((self._root / item.path).is_file() for item in self._written.values())
 

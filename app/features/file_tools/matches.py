@@ -96,7 +96,7 @@ def collect_shared_match_places(
         all_ = FramePlaces(list(known.values()))
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
-            others = all_.without(row[index]) if index in row else all_
+            others = all_.without_frame(row[index]) if index in row else all_
             shares[index] = SharedMatchPlaces(name, others)
     return shares
 

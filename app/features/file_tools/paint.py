@@ -162,7 +162,7 @@ def snap_cameras_to_paint(
     match = _PictureFileMatcher(values, images, settings)
     rows: list[dict[str, Any]] = []
     drawn: list[SnappedFrame] = []
-    for picture, frame, key in match.pictures(report):
+    for picture, frame, key in match.iterate_matched_pictures(report):
         row, text, snapped = _snap_picture(picture, frame, values[key], report)
         _write_snapped_camera(out, frame, text, snapped)
         rows.append(row)
@@ -200,7 +200,7 @@ def measure_paint_agreement_of_files(
     found = read_cameras(cameras, report)
     match = _PictureFileMatcher(found, images, settings)
     rows: list[dict[str, Any]] = []
-    for picture, frame, key in match.pictures(report):
+    for picture, frame, key in match.iterate_matched_pictures(report):
         rows.append(_measure_picture_agreement(picture, frame, found[key]))
         if progress is not None:
             progress(len(rows))
@@ -224,7 +224,9 @@ class _PictureFileMatcher:
         places = list_picture_stems(images, settings)
         self._stems = Counter(PurePosixPath(stem).name for stem in places)
 
-    def pictures(self, report: ReaderReport) -> Iterator[tuple[PictureFile, str, str]]:
+    def iterate_matched_pictures(
+        self, report: ReaderReport
+    ) -> Iterator[tuple[PictureFile, str, str]]:
         """Each picture that has a file, with the name of its frame and the key of its file."""
         names = UniqueNameGenerator()
         for picture in read_pictures(self._images, self._settings, report):

@@ -166,7 +166,7 @@ def _propose_frame_camera(
     )
     if pitch != Pitch():
         row["pitch"] = {"length": pitch.length, "width": pitch.width}
-    agrees = 0.0 if found.agreement is None else found.agreement.product
+    agrees = 0.0 if found.agreement is None else found.agreement.combined_score
     if least is not None and (found.outcome != "proposed" or agrees < least):
         return row, None
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:

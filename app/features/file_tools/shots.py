@@ -189,13 +189,13 @@ def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
         )
     if len(seen) < len(rows):
         problem = f"{len(rows) - len(seen)} of {len(rows)} frames with a ball have no camera"
-        report.note(str(folder), None, None, problem)
+        report.add_problem_at(str(folder), None, None, problem)
     seen.sort(key=lambda one: one[0])
     times = [one[0] for one in seen]
     new = [True, *(b > a for a, b in pairwise(times))]
     if not all(new):
         problem = f"{new.count(False)} frames have the time of another; the first ones are used"
-        report.note(str(folder / BALL_FILE), None, "time_s", problem)
+        report.add_problem_at(str(folder / BALL_FILE), None, "time_s", problem)
     kept = [one for one, first in zip(seen, new, strict=True) if first]
     if len(kept) > _MOST_RAYS:
         raise InputError(
@@ -242,7 +242,7 @@ def read_ball_rows(
                     str(path), f"line {line}", "frame", f"{frame:.0f} is listed twice"
                 )
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
             continue
         frames.add(frame)
         found.append((int(frame), time, (x, y)))

@@ -206,8 +206,8 @@ def pitch_to_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any]
     """
     if shown is None:
         return None
-    (crown, crown_sigma), (inward, inward_sigma) = shown.crown, shown.inward
-    (knows_length, knows_width), (length, width) = shown.are_sizes_known, shown.sizes_sigma.tolist()
+    (crown, crown_sigma), (inward, inward_sigma) = shown.crown, shown.inward_paint_shift
+    (knows_length, knows_width), (length, width) = shown.are_sizes_known, shown.size_sigmas.tolist()
     spread = np.linalg.eigvalsh(shown.position_covariance)[-1]
     other = shown.clearly_different_pitch()
     return {

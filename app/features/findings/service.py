@@ -168,7 +168,7 @@ def set_dismissal(
     while True:
         record, solution = read_solved_group(store, group_id)
         stored, what = record.stored, f"group {record.stored.group.key}"
-        before = record.state(solution)
+        before = record.make_state(solution)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_unchanged_content(session, group_id, record.content, if_match, what)
@@ -185,7 +185,7 @@ def set_dismissal(
                 )
                 refresh_queue(session, [group_id])
                 dismissals = read_import_findings(session, [group_id])[1][group_id]
-                after = replace(record, dismissals=dismissals).state(solution)
+                after = replace(record, dismissals=dismissals).make_state(solution)
                 session.respond(after)
                 return after
 

@@ -236,7 +236,7 @@ class GroupWithoutSolution:
         return SolutionKey(self.stored.id, self.stored.inputs_hash, self.stored.policy.hash)
 
     @property
-    def noticed(self) -> tuple[Finding, ...]:
+    def noticed_findings(self) -> tuple[Finding, ...]:
         """What was noticed about the group as it is."""
         return tuple(findings_from_rows(self.said, self.stored.inputs_hash))
 
@@ -253,11 +253,11 @@ class GroupWithoutSolution:
         """The verdict that counts, or None."""
         return next(iter(self.verdicts), None)
 
-    def state(self, solution: Solution | None) -> GroupState:
+    def make_state(self, solution: Solution | None) -> GroupState:
         """The group as people see it, with its solution where that is known."""
         stored = self.stored
         passes = None if solution is None else solution.passes
-        noticed = self.noticed
+        noticed = self.noticed_findings
         if solution is not None and noticed:
             solution = replace(solution, findings=solution.findings + noticed)
         edited = stored.edited
@@ -337,7 +337,7 @@ def read_state(session: Session, group_id: int) -> GroupState:
     """
     record = read_record(session, group_id)
     key = record.solution_key
-    return record.state(read_solutions(session, [key]).get(group_id))
+    return record.make_state(read_solutions(session, [key]).get(group_id))
 
 
 def read_states(
@@ -353,7 +353,7 @@ def read_states(
     records = read_records(session, group_ids)
     keys = [record.solution_key for record in records]
     found = read_solutions(session, keys, markings=markings)
-    return [record.state(found.get(record.stored.id)) for record in records]
+    return [record.make_state(found.get(record.stored.id)) for record in records]
 
 
 def station_etag(stored: StoredStation) -> str:

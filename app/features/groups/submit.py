@@ -261,7 +261,7 @@ def load_solved_group_of_view(store: Store, view_id: int) -> GroupState:
 def solve_and_store_group(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
     record, solution = read_solved_group(store, group_id)
-    return record.state(solution)
+    return record.make_state(solution)
 
 
 def read_and_solve_group(session: Session, group_id: int) -> GroupState:
@@ -271,7 +271,7 @@ def read_and_solve_group(session: Session, group_id: int) -> GroupState:
     if solution is None:
         group, policy = record.stored.group, record.stored.policy
         solution = solve_group(group, policy, read_known_calibrations(session, [group], policy))
-    return record.state(solution)
+    return record.make_state(solution)
 
 
 def read_solved_group(
@@ -334,7 +334,7 @@ def submit_change(
             change = plan(session, before, actor)
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])
-                return before.state(found.get(before.stored.id))
+                return before.make_state(found.get(before.stored.id))
             known = read_known_calibrations(session, [change.group], before.stored.policy)
         painted = change.group
         if paint is not None:
@@ -342,7 +342,7 @@ def submit_change(
         outcome = _apply_change(
             before, change, painted, solve(painted, before.stored.policy, known)
         )
-        state = outcome.after.state(outcome.solution)
+        state = outcome.after.make_state(outcome.solution)
         with store.write() as session:
             judge = require_unchanged(session, state.id, if_match, what)
             require_group_open(session, state.dataset_id, state.id)
@@ -363,7 +363,7 @@ def _apply_change(
     stored = make_next_revision(before.stored, change.group, at)
     if painted is not change.group:
         stored = make_next_revision(stored, painted, at)
-    after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
+    after = replace(before, stored=stored, stacks=before.stacks.push_entry(change.kind))
     return _AppliedChange(change, painted, before, after, *result)
 
 
@@ -383,7 +383,7 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     if after.dismissals.last:
         refresh_queue(session, [stored.id])
         return
-    noticed = [item.kind for item in after.noticed]
+    noticed = [item.kind for item in after.noticed_findings]
     update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
 
 

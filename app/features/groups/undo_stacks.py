@@ -61,7 +61,7 @@ class UndoStacks:
         """Whether there is an edit to do again."""
         return bool(self.undone)
 
-    def then(self, kind: str, log_id: int = 0) -> UndoStacks:
+    def push_entry(self, kind: str, log_id: int = 0) -> UndoStacks:
         """The stacks after one more entry: an undo moves the last edit over, a redo moves it
         back, and a fresh edit clears what was undone."""
         if kind == "edit":

@@ -204,7 +204,7 @@ class PaintUpdater:
         end = monotonic() + SECONDS
         try:
             started = [
-                (task, self._frames.ask_to(task.view.media, read_view_paint, task))
+                (task, self._frames.request_work(task.view.media, read_view_paint, task))
                 for task in tasks
             ]
         except ReviewError:

@@ -264,7 +264,7 @@ async def _read_picture(
     if view.media is None:
         raise NotFoundError("this view has no readable frame", hint=NO_FRAME_HINT)
     with add_view_to_errors(view.key):
-        found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
+        found = await to_thread.run_sync(frames.read_cached, view.media, width, view.flipped)
         if found is not None:
             return found
         fetching = await to_thread.run_sync(frames.request_fetch, view.media)
@@ -272,7 +272,7 @@ async def _read_picture(
             request.is_disconnected
         ):
             return None
-        task = frames.ask(view.media, width, view.flipped)
+        task = frames.request_picture(view.media, width, view.flipped)
         made: EncodedPicture | None = await task.result_unless_client_gone(request.is_disconnected)
         return made
 

@@ -143,7 +143,7 @@ def add_picture(
     path = upload_path(store.settings, upload)
     if path.stat().st_size > MAX_PICTURE:
         raise TooLargeError(f"a picture of guidelines has at most {MAX_PICTURE:,} bytes")
-    found = frames.ask(Media(str(path)), None, False).future.result()
+    found = frames.request_picture(Media(str(path)), None, False).future.result()
     picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
     with store.write() as session:
         dataset_id = find_guidelines_dataset(session, require_dataset_id(session, dataset))

@@ -145,7 +145,7 @@ class GroupLimits:
         count = len(group.views)
         if count > MAX_VIEWS:
             problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
-            self._report.note(self._source, group.key, None, problem)
+            self._report.add_problem_at(self._source, group.key, None, problem)
             return None
         return replace(
             group, views=tuple(self._drop_densest_markings(group, view) for view in group.views)
@@ -173,7 +173,7 @@ class GroupLimits:
             f"has {count:,} of {total:,} points, and a view may have {MAX_POINTS:,}; "
             "this marking is left out"
         )
-        self._report.note(self._source, group.key, f"{what}, {marking}", problem)
+        self._report.add_problem_at(self._source, group.key, f"{what}, {marking}", problem)
 
 
 def count_points(lines: Lines) -> int:

@@ -253,7 +253,7 @@ def merge_edits(
             run = _MergeRun(store, dataset, head, source, actor, not dry_run, result, set())
             _merge_tree(run, tree, report, progress)
         except DatasetFormatError as error:
-            report.skip(error)
+            report.add_problem(error)
     return result
 
 
@@ -290,7 +290,7 @@ def _parse_records(
         try:
             item = parse(value)
         except InputError as error:
-            report.note(tree.shown(name), place, None, error.message)
+            report.add_problem_at(tree.shown(name), place, None, error.message)
             continue
         report.imported += 1
         yield item

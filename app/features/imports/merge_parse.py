@@ -114,7 +114,7 @@ def read_lines(tree: FileTree, name: str, report: ReaderReport) -> Iterator[tupl
             try:
                 yield f"line {number}", read_json(line, tree.shown(name), record=f"line {number}")
             except DatasetFormatError as error:
-                report.skip(error)
+                report.add_problem(error)
 
 
 def _read_file_lines(file: IO[bytes], shown: str) -> Iterator[bytes]:

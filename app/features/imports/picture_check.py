@@ -85,7 +85,7 @@ class PictureCheck:
             self._passed += 1
             yield group
 
-    def remarks(self) -> list[str]:
+    def describe_differences(self) -> list[str]:
         """One sentence for each kind of difference."""
         found = []
         if self.shapes:

@@ -88,7 +88,7 @@ def start_import(
         services.jobs,
         services.store,
         services.settings,
-        request.value(dry_run=dry_run),
+        request.to_import_request(dry_run=dry_run),
         actor=actor,
     )
 

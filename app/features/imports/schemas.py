@@ -113,7 +113,7 @@ class ImportBody(BaseModel):
         default=False, description="The same as the parameter: report, and save nothing."
     )
 
-    def value(self, *, dry_run: bool = False) -> ImportRequest:
+    def to_import_request(self, *, dry_run: bool = False) -> ImportRequest:
         """The import as the review floor takes it; options that were not given are left out."""
         options: dict[str, Any] = self.options.model_dump(
             mode="json", exclude_defaults=True, exclude={"lines", "frames"}

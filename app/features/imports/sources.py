@@ -359,7 +359,7 @@ def import_source(
         limit_report=report,
         lines_left=folder is not None and source.calibration == "given",
     )
-    result.problems += check.remarks()
+    result.problems += check.describe_differences()
     if dry_run or not result.new + result.changed + result.unchanged:
         result.findings += len(check.found)
     else:

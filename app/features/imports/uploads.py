@@ -150,7 +150,7 @@ def _list_store_folder(found: StoredPath) -> FolderListing:
     """What is in a folder of a store; one request, so that the format is guessed of this level."""
     if not found.is_dir():
         return FolderListing(str(found), guess_format_from_names([found.name]), (), False)
-    folders, objects = found.store.folder(found.key)
+    folders, objects = found.store.list_folder(found.key)
     at = str(found).rstrip("/")
     items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
     names = [stored.key.rpartition("/")[2] for stored in objects]

@@ -239,7 +239,7 @@ def _check_store(settings: Settings, name: str) -> CheckResult:
     title, done = f"store {name}", list[str]()
     try:
         store = open_store(settings, name)
-        found = next(islice(store.below(""), 1), None)
+        found = next(islice(store.iterate_objects_below(""), 1), None)
         done.append("lists")
         if found is not None and found.size:
             store.read(found.key, 0, 1, found.etag)

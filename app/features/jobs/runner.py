@@ -191,12 +191,12 @@ class RunQueue:
     running: tuple[JobRun, ...] = ()
 
     @property
-    def runs(self) -> tuple[JobRun, ...]:
+    def all_runs(self) -> tuple[JobRun, ...]:
         """Those that wait and those that run."""
         return (*self.waiting, *self.running)
 
     @property
-    def ready(self) -> list[JobRun]:
+    def ready_runs(self) -> list[JobRun]:
         """Those that wait, and for nothing of their own dataset that runs."""
         taken = {run.job.dataset_id for run in self.running} - {None}
         return [run for run in self.waiting if run.job.dataset_id not in taken]
@@ -208,7 +208,7 @@ class RunQueue:
             first[run.job.dataset_id] = min(run.job.id, first.get(run.job.dataset_id, run.job.id))
         return [
             run
-            for run in self.ready
+            for run in self.ready_runs
             if run.job.kind in kinds
             and (run.job.dataset_id is None or run.job.id == first[run.job.dataset_id])
         ]
@@ -221,7 +221,7 @@ class RunQueue:
         """With more that wait."""
         return replace(self, waiting=(*self.waiting, *runs))
 
-    def begun(self, run: JobRun) -> RunQueue:
+    def with_started_run(self, run: JobRun) -> RunQueue:
         """With one running that waited."""
         left = self.without_run(run)
         return replace(left, running=(*left.running, run))

@@ -217,7 +217,7 @@ class Jobs(JobRecords):
         """
         return [
             run.job.id
-            for run in self._queue.runs
+            for run in self._queue.all_runs
             if run.job.dataset_id == dataset_id and (not kinds or run.job.kind in kinds)
         ]
 
@@ -228,7 +228,7 @@ class Jobs(JobRecords):
     def signal_cancel(self, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin: without asking the database, so that it can be
         called when a transaction is kept (``Session.call_after_commit``)."""
-        for run in self._queue.runs:
+        for run in self._queue.all_runs:
             if run.job.id in ids:
                 run.progress.cancelled.set()
 
@@ -261,18 +261,18 @@ class Jobs(JobRecords):
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """A job once it is over, or as it stands after some seconds."""
-        run = next((item for item in self._queue.runs if item.job.id == job_id), None)
+        run = next((item for item in self._queue.all_runs if item.job.id == job_id), None)
         if run is not None:
             run.over.wait(seconds)
         return self.get(job_id)
 
     def is_open(self, job_id: int, kind: str) -> bool:
         """Whether a job of a kind waits or runs here; waits for nothing."""
-        return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.runs)
+        return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.all_runs)
 
     def is_idle(self) -> bool:
         """Whether none waits or runs."""
-        return not self._queue.runs
+        return not self._queue.all_runs
 
     def stop(self) -> None:
         """Tell the jobs that run to stop after their next step; none begins any more."""
@@ -369,7 +369,7 @@ class Jobs(JobRecords):
     def _start_workers(self) -> None:
         if not self._workers and self._queue.waiting:
             for ready in (
-                lambda: self._queue.ready,
+                lambda: self._queue.ready_runs,
                 lambda: self._queue.list_independent_ready_runs(BESIDE),
             ):
                 # Daemons: a job that does not come to its next step must not hold the process.
@@ -403,7 +403,7 @@ class Jobs(JobRecords):
                 return None
             run = min(ready(), key=self._priority)
             self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
-            self._queue = self._queue.begun(run)
+            self._queue = self._queue.with_started_run(run)
             return run
 
     def _priority(self, run: JobRun) -> tuple[bool, int, int]:

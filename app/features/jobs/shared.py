@@ -269,7 +269,7 @@ class SharedJobs(Jobs):
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._apply_cancellation(job)
-            if job.state == WAITING and all(run.job.id != job.id for run in self._queue.runs):
+            if job.state == WAITING and all(run.job.id != job.id for run in self._queue.all_runs):
                 self._enqueue_job(job)
 
     def _apply_cancellation(self, job: Job) -> None:

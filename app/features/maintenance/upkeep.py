@@ -151,10 +151,10 @@ class UpkeepScheduler:
         while not self._closing.wait(wait):
             wait = BUSY_SECONDS
             if self._jobs.is_leader() and self._jobs.is_idle():
-                self.round()
+                self.run_once()
                 wait = BETWEEN_SECONDS
 
-    def round(self) -> None:
+    def run_once(self) -> None:
         """Tidy once, and look at the whole database once in a while."""
         self._rounds += 1
         tidied = clean_up(self._store, self._may_continue)

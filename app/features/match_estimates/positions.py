@@ -351,9 +351,9 @@ def _run_position_task(
     every, row = FramePlaces(places), iter(range(len(places)))
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
-        others = every if place is None else every.without(next(row))
+        others = every if place is None else every.without_frame(next(row))
         pan = None if calibration is None else find_pan(calibration)
-        near = None if pan is None else others.prior(pan)
+        near = None if pan is None else others.position_prior(pan)
         at = {}
         if near is not None:
             at[picture.view] = SharedPosition(

@@ -157,7 +157,7 @@ def propose_views(
         for start in range(0, len(pending), _PER_WORKER * count):
             tasks = _make_tasks(store, found, dict(pending[start : start + _PER_WORKER * count]))
             views = [task.media for task in tasks]
-            videos.make_ready(views, run.views, total, progress)
+            videos.index_videos(views, run.views, total, progress)
             answers = _run_tasks(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
@@ -207,7 +207,7 @@ def _make_task(
         return None
     station, pitch = view.station, stored.group.pitch
     # Which line of the paint is sought, where that is another than it always was.
-    lines = [policy.goal] if policy.painted(pitch) != pitch else []
+    lines = [policy.goal] if policy.with_painted_goal(pitch) != pitch else []
     inputs = [
         SEARCH_VERSION,
         [camera_to_json(camera) for camera in known],

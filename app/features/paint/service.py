@@ -161,7 +161,7 @@ def read_paint(
             some = ids[start : start + _PER_WORKER * count]
             tasks = _make_tasks(store, some, found)
             views = [task.view.media for of_group in tasks.values() for task in of_group]
-            videos.make_ready(views, done, len(ids), progress)
+            videos.index_videos(views, done, len(ids), progress)
             readings = _read_paint_of_pictures(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:

@@ -48,7 +48,7 @@ log = structlog.get_logger("touchline.access")
 def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     """One's own passkeys, and whether there can be any at this address."""
     try:
-        team.site(request)
+        team.make_passkey_site(request)
         team.require_passwords()
         unavailable = None
     except ConflictError as error:
@@ -67,7 +67,9 @@ def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
     team.count_login_attempt(request, me.name)
-    return CreationOptions(options=team.passkeys.begin(me, body.password, team.site(request)))
+    return CreationOptions(
+        options=team.passkeys.begin(me, body.password, team.make_passkey_site(request))
+    )
 
 
 @passkeys_router.post(
@@ -80,7 +82,7 @@ def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -
 def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
     credential = new.credential.model_dump()
-    made, codes = team.passkeys.make(me, new.name, credential, team.site(request))
+    made, codes = team.passkeys.make(me, new.name, credential, team.make_passkey_site(request))
     return PasskeyMade(passkey=made, codes=codes)
 
 
@@ -110,7 +112,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
     team.require_passwords()
     team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
-    options = team.passkeys.ask(asker, team.site(request))
+    options = team.passkeys.ask(asker, team.make_passkey_site(request))
     response.set_cookie(**team.cookies.make_passkey_cookie(asker))
     return RequestOptions(options=options)
 
@@ -132,7 +134,7 @@ def log_in(
         token = team.passkeys.log_in(
             team.cookies.read_passkey_secret(request.scope),
             body.credential.model_dump(),
-            team.site(request),
+            team.make_passkey_site(request),
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.token(request),

@@ -181,7 +181,7 @@ class Provider:
         self._description: _CachedResponse | None = None
         self._keys: _CachedResponse | None = None
 
-    def address(self, request: LoginRequest) -> str:
+    def make_login_url(self, request: LoginRequest) -> str:
         """Where a browser goes to log in.
 
         Raises:
@@ -196,7 +196,7 @@ class Provider:
         )
         return str(address)
 
-    def claims(self, request: LoginRequest, code: str) -> Mapping[str, Any]:
+    def fetch_claims(self, request: LoginRequest, code: str) -> Mapping[str, Any]:
         """What the provider says of who has logged in; ``code`` is what their browser brought back.
 
         Raises:

@@ -119,7 +119,7 @@ def invite_users(
 
 
 def _make_mailer(team: TeamLogin, request: Request) -> LinkMailer:
-    return LinkMailer(team.mail, team.url, team.base(request))
+    return LinkMailer(team.mail, team.url, team.get_base_url(request))
 
 
 @users_router.patch(

@@ -101,7 +101,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             team=False,
             name=LOCAL_USER,
             role=Role.ADMIN,
-            moment=services.events.moment(),
+            moment=services.events.read_resume_token(),
             maintenance=read_banner(services.store),
             may=every,
             allows=ALLOWS,
@@ -111,7 +111,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     found = make_session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
-    moment = None if login is None or login.roles.blind else services.events.moment()
+    moment = None if login is None or login.roles.blind else services.events.read_resume_token()
     more = {"ways": ways, "moment": moment, "maintenance": read_banner(services.store)}
     return found.model_copy(update=more)
 

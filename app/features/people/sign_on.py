@@ -237,14 +237,14 @@ class SignOn:
         request = LoginRequest(
             redirect, make_random_token(), make_random_token(), secrets.token_urlsafe(48)
         )
-        address = self._provider.address(request)
+        address = self._provider.make_login_url(request)
         self._begun.put(
             hash_token(request.state), _PendingLogin(hash_token(asker), request, to, **more).text()
         )
         return address
 
     def _fetch_admitted_claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
-        claims = self._provider.claims(begun.asked, code)
+        claims = self._provider.fetch_claims(begun.asked, code)
         self.rules.require_admitted(claims)
         return claims
 

@@ -41,7 +41,7 @@ class RestrictedReader:
     batches: Mapping[int, frozenset[int]]
     judges: Callable[[int], bool]
 
-    def hides(self, dataset_id: int, group: Any) -> ColumnElement[bool]:
+    def hidden_group_condition(self, dataset_id: int, group: Any) -> ColumnElement[bool]:
         """Whether a group of a dataset is hidden from them, by the column of its id."""
         ids = sorted(self.batches[dataset_id])
         own = (
@@ -92,7 +92,7 @@ def visible_groups_condition(dataset_id: int, group: Any) -> list[ColumnElement[
     reader = READER.get()
     if reader is None or dataset_id not in reader.batches:
         return []
-    return [not_(reader.hides(dataset_id, group))]
+    return [not_(reader.hidden_group_condition(dataset_id, group))]
 
 
 def visible_in_all_datasets_condition(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
@@ -101,7 +101,12 @@ def visible_in_all_datasets_condition(dataset: Any, group: Any) -> list[ColumnEl
     if reader is None:
         return []
     return [
-        or_(dataset.is_(None), dataset != one, group.is_(None), not_(reader.hides(one, group)))
+        or_(
+            dataset.is_(None),
+            dataset != one,
+            group.is_(None),
+            not_(reader.hidden_group_condition(one, group)),
+        )
         for one in sorted(reader.batches)
     ]
 
@@ -126,7 +131,7 @@ def is_hidden_group(
         ),
     }[kind]
     groups = select(GroupModel.id).where(which).limit(1)
-    hides = reader.hides(dataset_id, GroupModel.id)
+    hides = reader.hidden_group_condition(dataset_id, GroupModel.id)
     hidden = session.scalar(groups.where(hides)) is not None
     if kind != "station":
         return hidden

@@ -300,7 +300,7 @@ def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
     for camera in cameras:
         for person in people:
             sources = (BallSource("camera", camera), BallSource("person", person))
-            factors.append(NoiseFactor(camera or None, person or None, found.factor(sources)))
+            factors.append(NoiseFactor(camera or None, person or None, found.noise_factor(sources)))
     return tuple(factors) if any(item.ratio != 1 for item in factors) else ()
 
 

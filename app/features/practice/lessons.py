@@ -255,7 +255,9 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
     if verdict.state == "unreviewed" or verdict.stale:
         return _judge_unreviewed(truth, group, words)
     if verdict.state == "deferred":
-        return words.say(ALMOST, "You deferred this group. That is fine when you are not sure.")
+        return words.make_feedback(
+            ALMOST, "You deferred this group. That is fine when you are not sure."
+        )
     if verdict.state == "accepted":
         return _judge_accepted(truth, group, words)
     return _judge_rejected(truth, verdict.reason, words)
@@ -266,7 +268,7 @@ def _judge_unreviewed(truth: SceneTruth, group: Group, words: _LessonTexts) -> F
     if kind == CLEAN:
         return Feedback(OPEN)
     if _is_fault_corrected(truth, group):
-        return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
+        return Feedback(MENDED, f"Right: {words.fixed_sentence} Press A to accept the group.")
     if _list_mislabelled_views(truth, group):
         letter = make_view_letter(_view_index(group, _list_mislabelled_views(truth, group)[0]))
         return Feedback(
@@ -281,28 +283,30 @@ def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
     kind = find_lesson_kind(truth)
     if kind == CLEAN:
         if _is_annotation_correct(truth, group):
-            return words.say(RIGHT, "")
-        return words.say(WRONG, "The group was correct before your edit.")
+            return words.make_feedback(RIGHT, "")
+        return words.make_feedback(WRONG, "The group was correct before your edit.")
     if kind not in _REASONS and _is_fault_corrected(truth, group):
-        return words.say(RIGHT, "You fixed it.")
+        return words.make_feedback(RIGHT, "You fixed it.")
     if kind != "tiny_baseline" and _is_faulty_view_excluded(truth, group):
         if kind == "not_synchronous":
-            return words.say(RIGHT, "You left that view out, and the others agree.")
-        return words.say(
+            return words.make_feedback(RIGHT, "You left that view out, and the others agree.")
+        return words.make_feedback(
             ALMOST, "Leaving the view out works, but the view could be fixed and is lost now."
         )
-    return words.say(WRONG, "You accepted the group with its fault.")
+    return words.make_feedback(WRONG, "You accepted the group with its fault.")
 
 
 def _judge_rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
     kind = find_lesson_kind(truth)
     if kind == CLEAN:
-        return words.say(WRONG, "You rejected a good group.")
+        return words.make_feedback(WRONG, "You rejected a good group.")
     if kind not in _REASONS:
-        return words.say(WRONG, "The group could have been fixed, and you rejected it.")
+        return words.make_feedback(WRONG, "The group could have been fixed, and you rejected it.")
     if reason == _REASONS[kind]:
-        return words.say(RIGHT, "Your reason is right, too.")
-    return words.say(ALMOST, "It is right to reject this group, but another reason fits better.")
+        return words.make_feedback(RIGHT, "Your reason is right, too.")
+    return words.make_feedback(
+        ALMOST, "It is right to reject this group, but another reason fits better."
+    )
 
 
 class _LessonTexts:
@@ -313,19 +317,19 @@ class _LessonTexts:
         self._values = _fault_values(truth.faults, group)
 
     @property
-    def done(self) -> str:
+    def fixed_sentence(self) -> str:
         """What was wrong, and that it no longer is."""
-        return f"the fault is fixed. {self.fault}"
+        return f"the fault is fixed. {self.fault_sentence}"
 
     @property
-    def fault(self) -> str:
+    def fault_sentence(self) -> str:
         """What was planted."""
         return self._words.fault.format(**self._values)
 
-    def say(self, state: str, remark: str) -> Feedback:
+    def make_feedback(self, state: str, remark: str) -> Feedback:
         """The feedback on a verdict."""
         begins = {RIGHT: "Right:", ALMOST: "Nearly:", WRONG: "Look again:"}[state]
-        parts = [part for part in (remark, self.fault) if part]
+        parts = [part for part in (remark, self.fault_sentence) if part]
         first = parts[0][0].lower() + parts[0][1:] if parts[0].startswith(_PLAIN) else parts[0]
         sentence = " ".join([begins, first, *parts[1:]])
         return Feedback(state, sentence, self._words.best.format(**self._values))

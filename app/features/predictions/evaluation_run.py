@@ -99,7 +99,7 @@ class AcceptedTruth:
             len(judged),
         )
 
-    def warn(self, tables: Sequence[Table]) -> list[Table]:
+    def add_warnings(self, tables: Sequence[Table]) -> list[Table]:
         """The tables, those that are flattered with a warning in their note."""
         if not self.frames:
             return list(tables)
@@ -225,7 +225,7 @@ def run_evaluation(
         result = evaluate(truth.frames, inputs, options, progress)
         own = sets["predictions"].name if "predictions" in sets else None
         accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
-        result = replace(result, tables=tuple(accepted.warn(result.tables)))
+        result = replace(result, tables=tuple(accepted.add_warnings(result.tables)))
         more = {
             "gone": truth.gone,
             "accepted_predictions": accepted.frames,

@@ -295,7 +295,7 @@ def _unknown_frames_error(
     return InputError(
         f"none of the {len(unknown)} frames belongs to the dataset: {quote_text(first[0], 80)} "
         f"{reasons[first[0]]}{others}",
-        hint=f"Frames of the dataset are called {', '.join(map(quote_text, names.examples()))}, with their match "
+        hint=f"Frames of the dataset are called {', '.join(map(quote_text, names.list_example_names()))}, with their match "
         "before them where several have one of that name, or as an export calls them.",
     )
 

@@ -177,7 +177,7 @@ class _SortKey:
     descending: bool
     present: bool
 
-    def sorted(self, *, backwards: bool) -> ColumnElement[Any]:
+    def sort_expression(self, *, backwards: bool) -> ColumnElement[Any]:
         """The ORDER BY of it. NULLS LAST lets an index of the plain column serve both ways."""
         sort = self.column.desc() if self.descending != backwards else self.column.asc()
         if self.present:
@@ -188,7 +188,7 @@ class _SortKey:
         """Whether a row has this value."""
         return self.column.element.is_(None) if value is None else self.column.element == value
 
-    def beyond(self, value: Key, *, forward: bool) -> ColumnElement[bool]:
+    def beyond_condition(self, value: Key, *, forward: bool) -> ColumnElement[bool]:
         """Whether a row's value comes after this one, or before it."""
         column = self.column.element
         if value is None:
@@ -234,12 +234,12 @@ class RowOrder:
     @property
     def ascending(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the order."""
-        return [key.sorted(backwards=False) for key in self._keys]
+        return [key.sort_expression(backwards=False) for key in self._keys]
 
     @property
     def backwards(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the reverse."""
-        return [key.sorted(backwards=True) for key in self._keys]
+        return [key.sort_expression(backwards=True) for key in self._keys]
 
     def keys_of(self, row: Any) -> list[Key]:
         """The keys of a row that was read with them."""
@@ -258,7 +258,7 @@ class RowOrder:
         for place, (key, value) in enumerate(zip(self._keys, values, strict=True)):
             pairs = zip(self._keys[:place], values, strict=False)
             equal = [before.equals(other) for before, other in pairs]
-            alternatives.append(and_(*equal, key.beyond(value, forward=forward)))
+            alternatives.append(and_(*equal, key.beyond_condition(value, forward=forward)))
         return or_(*alternatives)
 
 

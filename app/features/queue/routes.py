@@ -435,7 +435,7 @@ def get_statistics(
     found = dataset_id(services.store, dataset)
     if query.strip() or has_hidden_groups(found):
         return read_statistics(services.store, found, query)
-    return services.statistics.statistics(found)
+    return services.statistics.get_statistics(found)
 
 
 @timeline_router.get("", operation_id="getTimeline", responses=responses(404))

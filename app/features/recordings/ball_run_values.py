@@ -50,7 +50,7 @@ class StoredRun:
         return f"ball run {self.id}"
 
     @property
-    def trusted(self) -> dict[int, FollowedBall]:
+    def trusted_balls(self) -> dict[int, FollowedBall]:
         """The balls that accepting it stands for, by frame: all but uncertain ones that nobody confirmed."""
         sure = {*self.confirmed, *(click.frame for click in self.run.clicks)}
         return {

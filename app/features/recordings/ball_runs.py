@@ -261,7 +261,7 @@ def _apply_run_to_views(
 ) -> dict[str, int]:
     """Give the views of a run's frames its balls, or take those away that come from it."""
     recording = get_recording(store, run.recording)
-    trusted, items, counts = run.trusted, list[ViewEdits](), {"placed": 0, "kept": 0}
+    trusted, items, counts = run.trusted_balls, list[ViewEdits](), {"placed": 0, "kept": 0}
     with store.read() as session:
         shown = list_views_of_video(session, recording.dataset_id, str(recording.sha256))
         shown = [view for view in shown if view.number in trusted]

@@ -232,7 +232,7 @@ class SolveReport:
     failing: Counter[str] = field(default_factory=Counter)
     advice: str = ""
 
-    def after(self, other: SolveReport) -> SolveReport:
+    def merge_with_earlier(self, other: SolveReport) -> SolveReport:
         """Both together; the other was made before, and what failed there was tried again."""
         return replace(
             self,

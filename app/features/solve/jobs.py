@@ -70,7 +70,7 @@ def solve_fully(
         ahead = solve_dataset(store, dataset, executor, progress, stop, choose_noise_sample)
         if not stop() and update_estimated_noise(store, dataset, actor):
             ahead = SolveReport()
-    report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
+    report = solve_dataset(store, dataset, executor, progress, stop).merge_with_earlier(ahead)
     total = report.total
     if not stop():
 

@@ -177,4 +177,6 @@ def _make_empty_track(rate: float, first: int, last: int) -> tuple[BallTrack, Tr
     times, empty = frames / rate, np.zeros(0)
     measured = BallMeasurements(np.zeros(0, dtype=np.int64), empty, (), np.zeros((0, 2)), empty, ())
     reason = "No group near this frame is part of the track."
-    return BallTrack.none(frames, times, reason), TrackInputs(frames, times, Pitch(), measured)
+    return BallTrack.make_empty_track(frames, times, reason), TrackInputs(
+        frames, times, Pitch(), measured
+    )

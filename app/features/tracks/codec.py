@@ -141,7 +141,7 @@ def inputs_to_json(inputs: TrackInputs) -> Json:
                 texts.append(value)
             cameras[id(camera)] = number
         which.append(cameras[id(camera)])
-    names = measured.names
+    names = measured.view_names
     return {
         "version": TRACK_VERSION,
         "first": int(inputs.frames[0]),

@@ -271,7 +271,7 @@ def read_ball_positions(
         except NotFoundError:
             # Deleted since it was listed.
             continue
-        if any(view.endswith(f" link {link_id}") for view in detail.inputs.measurements.names):
+        if any(view.endswith(f" link {link_id}") for view in detail.inputs.measurements.view_names):
             continue
         known = np.isfinite(detail.ball.position).all(axis=1)
         known &= detail.ball.sigma <= SURE_M

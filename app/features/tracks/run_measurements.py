@@ -146,7 +146,7 @@ def collect_followed_observations(
                 shown = list_views_of_video(session, int(run.row.dataset_id), video)
                 grouped[video] = {view.number for view in shown}
             with suppress(ConflictError):
-                balls = build_run_from_row(find_ball_run(session, run.row.id), video).trusted
+                balls = build_run_from_row(find_ball_run(session, run.row.id), video).trusted_balls
                 for number, one in _iterate_observations(
                     settings, run, balls, grouped[video], policy
                 ):

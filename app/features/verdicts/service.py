@@ -75,7 +75,7 @@ def set_verdict(
                 insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
                 passes = None if solution is None else solution.passes
                 update_verdict(session, stored, given, passes)
-                after = replace(record, verdicts=(given, *record.verdicts)).state(solution)
+                after = replace(record, verdicts=(given, *record.verdicts)).make_state(solution)
                 session.respond(after)
                 return after
 

@@ -136,7 +136,7 @@ def plan_freeze(
     splitter = Splitter.of(request.split, {item.match for item in candidates})
     members = [item for item in candidates if item.why is None]
     sides = Counter(
-        splitter.group(item.match, item.split, item.views) or NO_SPLIT for item in members
+        splitter.split_of_group(item.match, item.split, item.views) or NO_SPLIT for item in members
     )
     return FreezePlan(
         groups=len(members),
@@ -280,7 +280,7 @@ class _FreezeRun:
     ) -> dict[str, Any]:
         views = [view.key for view in group.views]
         splits = self._splitter.views(views)
-        split = self._splitter.group(group.match, group.split, views)
+        split = self._splitter.split_of_group(group.match, group.split, views)
         self._cameras.update(views)
         for view in solved["views"]:
             side = (splits or {}).get(view["view"], split) or NO_SPLIT

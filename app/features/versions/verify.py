@@ -398,7 +398,7 @@ def _find_split_differences(
     row: VersionGroup, group: Group, splitter: Splitter
 ) -> Iterator[VersionDifference]:
     views = [view.key for view in group.views]
-    split = splitter.group(group.match, group.split, views)
+    split = splitter.split_of_group(group.match, group.split, views)
     for place, frozen, now in (
         ("split", row.split, split),
         ("splits", row.splits, splitter.views(views)),

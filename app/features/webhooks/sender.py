@@ -204,7 +204,7 @@ class WebhookSender:
         if self._thread is not None:
             self._thread.join(seconds)
 
-    def look(self) -> int:
+    def queue_new_messages(self) -> int:
         """Write down what webhooks have not been told yet; returns how many messages that makes."""
         with self._store.read() as session:
             rows = list_active_webhooks(session)
@@ -229,7 +229,7 @@ class WebhookSender:
         self._stalls_at = at
         return notify_of_stalled_batches(self._store, at)
 
-    def send(self) -> int:
+    def send_due_messages(self) -> int:
         """Send what is due, as much as goes at a time; returns how many tries came to an end.
 
         What is still under way when the server stops is sent again by the next one.
@@ -273,9 +273,9 @@ class WebhookSender:
 
     def _run_once(self) -> float:
         """Tell and send all that can be; seconds until the next look."""
-        self.look()
+        self.queue_new_messages()
         self.queue_stall_messages()
-        while not self._closing.is_set() and self.send():
+        while not self._closing.is_set() and self.send_due_messages():
             pass
         return self._seconds_until_next_due()
 

@@ -66,7 +66,7 @@ class BlockResults:
     lock: Lock = field(default_factory=Lock, repr=False)
 
     @staticmethod
-    def by(facts: GroupFacts, jac: FloatArray, policy: Policy) -> BlockResults:
+    def judge_facts(facts: GroupFacts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
         uncertainty = MeanCovariance(facts)
         judgement = judge_groups(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
@@ -75,7 +75,7 @@ class BlockResults:
             found.sigma = _mean_sigmas(facts, policy, judgement, uncertainty)
         return found
 
-    def complete(self) -> None:
+    def compute_missing(self) -> None:
         """Compute what somebody may ask for, so that nobody waits for it."""
         with self.lock:
             if self.sigma is None:
@@ -101,16 +101,16 @@ class BlockResults:
             return judge_groups(self.facts, policy, self._get_uncertainty(), jac)
         return self._rejudge_changed_groups(policy)[0]
 
-    def judged_by(self, policy: Policy) -> BlockResults:
+    def rejudge(self, policy: Policy) -> BlockResults:
         """The groups judged by another policy from now on."""
         if get_click_noise(policy) != get_click_noise(self.policy):
-            return BlockResults.by(self.facts, self.jac, policy)
+            return BlockResults.judge_facts(self.facts, self.jac, policy)
         judgement, new, part = self._rejudge_changed_groups(policy)
         found = BlockResults(self.facts, self.jac, policy, judgement)
         if self.sigma is not None and self.p_value is not None:
             found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
             if part is not None:
-                part.complete()
+                part.compute_missing()
                 found.sigma[new], found.p_value[new] = part.sigma, part.p_value
         return found
 
@@ -278,14 +278,14 @@ def count_table_groups(
     if counted is None:
         curves = np.stack([_make_threshold_curve(steps[live]) for steps in table.steps])
         counted = GroupCounts(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
-    passes, before = judgement.passes[live], present.passes[live]
+    passes, before = judgement.passing_groups[live], present.passing_groups[live]
     split = np.bincount(table.split[live][passes], minlength=len(table.splits))
     return GroupCounts(
         passing=int(passes.sum()),
         gained=int((passes & ~before).sum()),
         lost=int((before & ~passes).sum()),
         unmeasured=counted.unmeasured,
-        dropped=np.bincount(judgement.first[live], minlength=len(GATES) + 1),
+        dropped=np.bincount(judgement.first_failed_gate[live], minlength=len(GATES) + 1),
         curves=counted.curves,
         distances=_count_by_distance(judgement, live),
         findings=_count_findings(table, live, policy, judgement),
@@ -301,7 +301,7 @@ def _make_threshold_curve(steps: IntArray) -> IntArray:
 
 
 def _count_by_distance(judgement: Judgement, live: BoolArray | slice) -> IntArray:
-    distance, passes = judgement.distance[live], judgement.passes[live]
+    distance, passes = judgement.distance[live], judgement.passing_groups[live]
     place = np.searchsorted(DISTANCES, distance, "right") - 1
     place[np.isnan(distance)] = len(DISTANCES)
     bins = len(DISTANCES) + 1
@@ -322,7 +322,7 @@ def _count_findings(
     low = judgement.parallax < policy.low_parallax_degrees
     return np.array(
         [
-            (found[live].sum(), (found & judgement.passes)[live].sum())
+            (found[live].sum(), (found & judgement.passing_groups)[live].sum())
             for found in (implausible, low)
         ],
         np.int64,

@@ -123,7 +123,9 @@ class DatasetBlocks:
     whole: int | None = None
 
     @staticmethod
-    def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> DatasetBlocks:
+    def create_empty(
+        session: Session, folder: Path, dataset_id: int, calibration: str
+    ) -> DatasetBlocks:
         """No group yet, as the database stands."""
         return DatasetBlocks(folder, dataset_id, calibration, find_newest_change_id(session))
 

@@ -102,7 +102,7 @@ def get_yield(
     Raises:
         NotFoundError: There is no such dataset.
     """
-    snapshot = yields.snapshot(dataset_id)
+    snapshot = yields.get_snapshot(dataset_id)
     policy = _apply_threshold_values(snapshot.policy, values or {})
     unanswered = list_thresholds_that_need_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)

@@ -151,7 +151,7 @@ class YieldStore:
         self._lock = threading.Lock()
         self._kept: OrderedDict[int, _YieldEntry] = OrderedDict()
 
-    def snapshot(self, dataset_id: int) -> TableSnapshot:
+    def get_snapshot(self, dataset_id: int) -> TableSnapshot:
         """The table of a dataset as it is now; what has changed since the last look is read.
 
         Raises:
@@ -239,7 +239,9 @@ class YieldStore:
                 if not blocks.has_all_groups(session):
                     # Groups went without a mark, as when the log is replayed.
                     folder, calibration = blocks.folder, blocks.calibration
-                    kept.gathered = DatasetBlocks.begin(session, folder, dataset_id, calibration)
+                    kept.gathered = DatasetBlocks.create_empty(
+                        session, folder, dataset_id, calibration
+                    )
                     kept.snapshot = None
                     continue
             break
@@ -265,7 +267,7 @@ class YieldStore:
             if found is not None and (known is None or found.mark > known.mark):
                 known = found
         if known is None:
-            known = DatasetBlocks.begin(session, folder, dataset_id, calibration)
+            known = DatasetBlocks.create_empty(session, folder, dataset_id, calibration)
         if known is not kept.gathered:
             kept.gathered, kept.snapshot = known, None
         return known
@@ -286,11 +288,11 @@ class YieldStore:
                     return TableBlock(block, judged)
             table = block.table
             if known is not None:
-                judged = known.judged.judged_by(policy)
+                judged = known.judged.rejudge(policy)
             else:
-                judged = BlockResults.by(table.facts, table.jac, policy)
+                judged = BlockResults.judge_facts(table.facts, table.jac, policy)
             if block.name:
-                judged.complete()
+                judged.compute_missing()
                 write_cached_results(blocks.folder, block, judged)
             return TableBlock(block, judged)
 

@@ -81,7 +81,7 @@ class StatisticsCache:
         self._locks: dict[int, threading.Lock] = {}
         self._kept: dict[int, _DatasetColumns] = {}
 
-    def statistics(self, dataset_id: int) -> Statistics:
+    def get_statistics(self, dataset_id: int) -> Statistics:
         """The statistics of all groups of a dataset as it is now.
 
         Raises:
@@ -105,7 +105,7 @@ class StatisticsCache:
             large = [number for number in names if count_groups(session, number) > AT_ONCE]
         for dataset_id in large:
             try:
-                self.statistics(dataset_id)
+                self.get_statistics(dataset_id)
             except Exception:
                 log.exception("statistics stay behind")
 

@@ -99,9 +99,9 @@ class TestExports:
         export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
         written = [line.rsplit("/", 1)[-1] for line in proxy.asked if line.startswith("PUT")]
         assert written[-1] == "manifest.json"
-        first = {item.key for item in out.store.below(out.key)}
+        first = {item.key for item in out.store.iterate_objects_below(out.key)}
         export_dataset(imported, "league", "soccernet-v3", out, everything=True)
-        second = {item.key for item in out.store.below(out.key)}
+        second = {item.key for item in out.store.iterate_objects_below(out.key)}
         assert second < first and f"{out.key}/manifest.json" in second
         proxy.reset()
         proxy.writes_fail_after = 1

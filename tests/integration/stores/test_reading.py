@@ -74,7 +74,9 @@ class TestAddresses:
             stores={"frames": store_settings(proxy, url="s3://soccer-data/framesets")},
         )
         open_store(beside, "frames").put("secret.json", b"{}")
-        assert not [s for s in open_store(settings, "frames").below("") if "secret" in s.key]
+        assert not [
+            s for s in open_store(settings, "frames").iterate_objects_below("") if "secret" in s.key
+        ]
         with pytest.raises(NotFoundError):
             find_path(settings, "s3://frames/secret.json")
 

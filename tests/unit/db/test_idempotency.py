@@ -121,7 +121,7 @@ class TestPendingResponse:
     def test_is_stored_with_its_work_and_sent_as_it_is_stored(self, store: Store) -> None:
         request, made = KeyedRequest(IdempotencyKey("key", "ann", "digest")), list[object]()
         pending = self.pending(request, made)
-        with pending.open():
+        with pending.activate():
             outcome = work(store, "outcome")
         assert request.stored
         assert pending.make_or_get_response(outcome) == "response to outcome"
@@ -133,7 +133,7 @@ class TestPendingResponse:
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         statements: list[str] = []
-        with keyed_request().open(), store.write() as session:
+        with keyed_request().activate(), store.write() as session:
             session.respond("outcome")
             run = session.execute
 
@@ -156,7 +156,7 @@ class TestPendingResponse:
     ) -> None:
         made = list[object]()
         pending = self.pending(None, made)
-        with pending.open():
+        with pending.activate():
             outcome = work(store, "outcome")
             assert made == []
         assert pending.make_or_get_response(outcome) == "response to outcome"
@@ -165,7 +165,7 @@ class TestPendingResponse:
     def test_is_not_stored_where_the_work_is_rolled_back(self, store: Store) -> None:
         request = KeyedRequest(IdempotencyKey("key", "ann", "digest"))
         pending = self.pending(request, [])
-        with pending.open():
+        with pending.activate():
             with pytest.raises(KeyError), store.write() as session:
                 session.respond("first")
                 raise KeyError
@@ -179,7 +179,7 @@ class TestPendingResponse:
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         request, before = KeyedRequest(IdempotencyKey("key", "ann", "digest")), entries(store)
-        with self.pending(request, []).open():
+        with self.pending(request, []).activate():
             with pytest.raises(OSError, match="full"), store.write() as session:
                 session.respond("outcome")
                 monkeypatch.setattr(
@@ -189,19 +189,19 @@ class TestPendingResponse:
             assert find_stored_response(store, "key", "ann") is None
 
     def test_of_two_that_do_the_same_work_the_second_does_nothing(self, store: Store) -> None:
-        with keyed_request().open():
+        with keyed_request().activate():
             work(store, "outcome")
         done = entries(store)
         with (
             pytest.raises(ConflictError, match="was carried out first"),
-            keyed_request().open(),
+            keyed_request().activate(),
         ):
             work(store, "outcome")
         assert entries(store) == done
 
     def test_the_last_outcome_of_a_transaction_counts(self, store: Store) -> None:
         pending = self.pending(KeyedRequest(IdempotencyKey("key", "ann", "digest")), [])
-        with pending.open(), store.write() as session:
+        with pending.activate(), store.write() as session:
             session.respond("inner")
             session.respond("outer")
         assert pending.make_or_get_response("outer") == "response to outer"
@@ -211,7 +211,7 @@ class TestPendingResponse:
         self, store: Store, has_a_key: bool
     ) -> None:
         request = KeyedRequest(IdempotencyKey("key", "ann", "digest")) if has_a_key else None
-        with self.pending(request, []).open():
+        with self.pending(request, []).activate():
             work(store, "first")
             with pytest.raises(RuntimeError, match="stored already"):
                 work(store, "second")
@@ -222,7 +222,7 @@ class TestPendingResponse:
     ) -> None:
         request = KeyedRequest(IdempotencyKey("key", "ann", "digest")) if has_a_key else None
         pending = self.pending(request, [])
-        with pending.open():
+        with pending.activate():
             work(store, ["answered"])
         with pytest.raises(RuntimeError, match="must return the same outcome"):
             pending.make_or_get_response(["answered"])
@@ -234,7 +234,7 @@ class TestPendingResponse:
             looked.set()
             return has_idempotency_key()
 
-        with keyed_request().open(), ThreadPoolExecutor(1) as pool:
+        with keyed_request().activate(), ThreadPoolExecutor(1) as pool:
             assert has_idempotency_key()
             assert pool.submit(look).result() is False
             assert looked.is_set()
@@ -244,7 +244,7 @@ class TestPendingResponse:
 class TestWithoutResponse:
     def test_inner_work_leaves_the_response_to_the_outer_one(self, store: Store) -> None:
         pending = keyed_request()
-        with pending.open():
+        with pending.activate():
             with without_pending_response():
                 work(store, "inner")
             assert find_stored_response(store, "key", "ann") is None
@@ -264,16 +264,16 @@ class TestProgress:
             return read_progress(session)
 
     def test_what_was_saved_last_is_read(self, store: Store) -> None:
-        with keyed_request().open():
+        with keyed_request().activate():
             assert self.read(store) is None
             self.save(store, {"next": 7})
             self.save(store, {"next": 9})
             assert self.read(store) == {"next": 9}
-        with keyed_request(actor="ben").open():
+        with keyed_request(actor="ben").activate():
             assert self.read(store) is None
 
     def test_the_response_takes_its_place(self, store: Store) -> None:
-        with keyed_request().open():
+        with keyed_request().activate():
             self.save(store, {"next": 7})
             found = find_stored_response(store, "key", "ann")
             assert found is not None

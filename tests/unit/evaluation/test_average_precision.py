@@ -186,16 +186,16 @@ RESULT = FrameResult(1, 1, "g", "v", "m", ball=True, detections=1)
 
 class TestBins:
     def test_a_value_on_an_edge_belongs_to_the_bin_above(self) -> None:
-        assert [DISTANCE.place(value) for value in (0.0, 19.9, 20.0, 100.0, 900.0)] == [
+        assert [DISTANCE.find_bin_index(value) for value in (0.0, 19.9, 20.0, 100.0, 900.0)] == [
             0,
             0,
             1,
             8,
             8,
         ]
-        assert DISTANCE.place(None) is None
-        assert DISTANCE.name(1) == "20 to 30 m"
-        assert DISTANCE.name(8) == "100 m and more"
+        assert DISTANCE.find_bin_index(None) is None
+        assert DISTANCE.format_bin_name(1) == "20 to 30 m"
+        assert DISTANCE.format_bin_name(8) == "100 m and more"
 
 
 class TestErrorFigure:

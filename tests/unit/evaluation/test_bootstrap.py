@@ -26,28 +26,32 @@ class TestResamples:
         assert (MatchResamples.draw(["a", "b", "c"], 50).counts.sum(axis=1) == 3).all()
 
     def test_one_match_gives_no_interval(self) -> None:
-        cell = MatchResamples.draw(["a", "a"]).mean([1.0, 3.0], ["a", "a"])
+        cell = MatchResamples.draw(["a", "a"]).mean_with_interval([1.0, 3.0], ["a", "a"])
         assert (cell.value, cell.low, cell.high, cell.count, cell.of) == (2, None, None, 2, 2)
 
     def test_of_matches_that_agree_the_interval_is_a_point(self) -> None:
-        cell = MatchResamples.draw(["a", "b"]).mean([1.0, 3.0, 1.0, 3.0], ["a", "a", "b", "b"])
+        cell = MatchResamples.draw(["a", "b"]).mean_with_interval(
+            [1.0, 3.0, 1.0, 3.0], ["a", "a", "b", "b"]
+        )
         assert (cell.value, cell.low, cell.high) == (2, 2, 2)
 
     def test_resamples_matches_and_not_frames(self) -> None:
         # Two matches of a thousand frames each: whole matches are drawn, so the ends are theirs.
         values, matches = [0.0] * 1000 + [1.0] * 1000, ["a"] * 1000 + ["b"] * 1000
-        cell = MatchResamples.draw(matches).mean(values, matches)
+        cell = MatchResamples.draw(matches).mean_with_interval(values, matches)
         assert (cell.low, cell.value, cell.high) == (0, 0.5, 1)
 
     def test_covers_the_mean_of_many_matches(self) -> None:
         rng = np.random.default_rng(3)
         matches = [str(number) for number in range(100)]
-        cell = MatchResamples.draw(matches).mean(rng.normal(5, 1, 100).tolist(), matches)
+        cell = MatchResamples.draw(matches).mean_with_interval(
+            rng.normal(5, 1, 100).tolist(), matches
+        )
         assert cell.low is not None and cell.high is not None
         # Standard error 0.1: the interval is about four of them wide.
         assert cell.high - cell.low == pytest.approx(0.4, abs=0.08)
         assert cell.low < 5 < cell.high
 
     def test_without_values_there_is_no_mean_but_a_denominator(self) -> None:
-        cell = MatchResamples.draw(["a", "b"]).mean([], [], of=7)
+        cell = MatchResamples.draw(["a", "b"]).mean_with_interval([], [], of=7)
         assert (cell.value, cell.count, cell.of) == (None, 0, 7)

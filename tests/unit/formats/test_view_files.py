@@ -40,9 +40,9 @@ class TestViewFiles:
         (tmp_path / "b").mkdir()
         (tmp_path / "b" / "2.csv").write_text("on disk")
         with ViewFileBuffer(tmp_path) as files:
-            files.put("b/3.json", "ü")
-            files.put("b/1.json", "{}")
-            files.put("a.json", "")
+            files.write_file("b/3.json", "ü")
+            files.write_file("b/1.json", "{}")
+            files.write_file("a.json", "")
         assert list(FilesToPack(tmp_path)) == [
             ("a.json", b""),
             ("b/1.json", b"{}"),
@@ -52,8 +52,8 @@ class TestViewFiles:
 
     def test_what_is_put_again_is_the_newer_file(self, tmp_path):
         with ViewFileBuffer(tmp_path) as files:
-            files.put("a", "first")
-            files.put("./a", "then")
+            files.write_file("a", "first")
+            files.write_file("./a", "then")
         assert list(FilesToPack(tmp_path)) == [("a", b"then")]
 
     def test_a_zip_of_them_is_that_of_files_on_the_disk_to_the_byte(self, tmp_path):
@@ -61,7 +61,7 @@ class TestViewFiles:
         (tmp_path / "disk").mkdir()
         (tmp_path / "held").mkdir()
         with ViewFileBuffer(tmp_path / "held") as files:
-            for put in (make_disk_writer(tmp_path / "disk"), files.put):
+            for put in (make_disk_writer(tmp_path / "disk"), files.write_file):
                 for path, text in texts.items():
                     put(path, text)
         made = []
@@ -78,11 +78,11 @@ class TestViewFiles:
         files._connection.execute("PRAGMA max_page_count = 3")
         with pytest.raises(OSError, match="full"), files:
             for number in range(5000):
-                files.put(f"{number}.json", "x" * 100)
+                files.write_file(f"{number}.json", "x" * 100)
 
     @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
     def test_no_path_leaves_the_folder(self, tmp_path, path):
         with ViewFileBuffer(tmp_path) as files:
-            for put in (files.put, make_disk_writer(tmp_path)):
+            for put in (files.write_file, make_disk_writer(tmp_path)):
                 with pytest.raises(UnsafePathError):
                     put(path, "x")

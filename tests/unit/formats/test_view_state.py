@@ -55,8 +55,8 @@ class TestStateReader:
         )
         why = ViewExclusion("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
-        assert read(view_to_json(view)).view(view.size, Extras()) == view
-        head = read(group_head_to_json(group)).head()
+        assert read(view_to_json(view)).read_view(view.size, Extras()) == view
+        head = read(group_head_to_json(group)).read_group_head()
         assert head.group(group.views) == group
         assert head.views == 2
 
@@ -88,14 +88,14 @@ class TestStateReader:
     def test_what_is_wrong_is_named(self, soccer_group: Make, name: str, value: Any) -> None:
         state = {**view_to_json(soccer_group().views[0]), name: value}
         with pytest.raises(DatasetFormatError) as caught:
-            read(state).view(soccer_group().views[0].size, Extras())
+            read(state).read_view(soccer_group().views[0].size, Extras())
         assert (caught.value.path, caught.value.record) == ("file", "record")
         assert caught.value.field == (name if name != "given" else "tilt_degrees")
 
     @pytest.mark.parametrize("pitch", [[1, 2], "x", [105]])
     def test_an_impossible_pitch_is_refused(self, soccer_group: Make, pitch: Any) -> None:
         with pytest.raises(DatasetFormatError, match="pitch"):
-            read({**group_head_to_json(soccer_group()), "pitch": pitch}).head()
+            read({**group_head_to_json(soccer_group()), "pitch": pitch}).read_group_head()
 
 
 class TestExtras:

@@ -39,7 +39,7 @@ class TestRays:
         rays = rays_of()
         kept = np.zeros(len(POINTS), bool)
         kept[[2, 7]] = True
-        some = rays.only(kept)
+        some = rays.select_subset(kept)
         assert some.points == 2
         assert np.array_equal(some.pixels[some.point == 1], rays.pixels[rays.point == 7])
 

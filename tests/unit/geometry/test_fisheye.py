@@ -129,7 +129,7 @@ class TestDomain:
         assert 0.5 < profile.widest < 1.5
         before, at = profile.radius(np.array([profile.widest - step, profile.widest]))
         assert before < at
-        assert abs(profile.growth(np.array([profile.widest]))[0]) < 1e-9
+        assert abs(profile.radius_derivative(np.array([profile.widest]))[0]) < 1e-9
         # cv2 has no such edge and folds far points back into the picture.
         far = np.array([[np.tan(profile.widest + 0.2), 0.0]])
         folded = cv2.fisheye.distortPoints(far[:, None], np.eye(3), np.array(FOLDING))[0, 0, 0]

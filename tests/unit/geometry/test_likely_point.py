@@ -31,7 +31,7 @@ def found_from(cameras, views, start=(10.0, 0.0, -1.0), off=0.0) -> LikelyPoints
 def look(cameras: CameraTable, number, point):
     """Pixel of a point in one of the cameras, NaN where it does not show it, and its derivative."""
     pixel, slope = np.empty(2), np.empty((2, 3))
-    if not _project(*cameras.columns, number, point, pixel, slope):
+    if not _project(*cameras.kernel_arrays, number, point, pixel, slope):
         pixel[:] = np.nan
     return pixel, slope
 

@@ -290,7 +290,9 @@ class TestStreamed:
             async def nothing_is_hidden() -> bool:
                 return False
 
-            return await idempotency.answer(request, digest, "local", nothing_is_hidden, upload)
+            return await idempotency.answer_once(
+                request, digest, "local", nothing_is_hidden, upload
+            )
 
         async def all_told() -> list[Response]:
             return [await call(chunks) for chunks in ([b"ab", b"c"], [b"a", b"bc"], [b"abd"])]

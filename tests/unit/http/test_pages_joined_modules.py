@@ -43,7 +43,7 @@ def join(folder: Path) -> None:
 
 def asked_for(folder: Path) -> list[str]:
     """The modules that the page of a folder asks for."""
-    page = BrowserSite(folder).index()
+    page = BrowserSite(folder).get_index_page()
     assert page is not None
     return re.findall(r'(?:src|href)="/assets/\w+/([^"]+)"', page.html.decode())
 
@@ -51,7 +51,7 @@ def asked_for(folder: Path) -> list[str]:
 class TestJoinedModules:
     def test_the_page_asks_for_the_joined_files_and_for_nothing_else(self, folder) -> None:
         assert asked_for(folder) == ["built/ahead.js", "built/main.js", "built/chunk-1.js"]
-        page = BrowserSite(folder).index()
+        page = BrowserSite(folder).get_index_page()
         assert page is not None
         assert page.modules == ("built/ahead.js", "built/main.js", "built/chunk-1.js")
 
@@ -71,9 +71,9 @@ class TestJoinedModules:
     ) -> None:
         site = BrowserSite(folder)
         change(folder)
-        assert site.index().modules == ("ahead.js", "lib/a.js", "main.js", "lib/b.js")
+        assert site.get_index_page().modules == ("ahead.js", "lib/a.js", "main.js", "lib/b.js")
         join(folder)
-        assert site.index().modules[0] == "built/ahead.js"
+        assert site.get_index_page().modules[0] == "built/ahead.js"
 
     @pytest.mark.parametrize(
         "about", ["", "[]", "{}", '{"of": 3}', '{"of": "OF"}', '{"of": "OF", "needed_first": 3}']

@@ -297,7 +297,7 @@ class TestTeam:
                 service.ask(TRANSFER, "/login")
             service.ask(TRANSFER, "/image", who="ann")
             await service.settle()
-            assert service.work.begun == ["/login"] * TRANSFER.each + ["/image"]
+            assert service.work.begun == ["/login"] * TRANSFER.per_person_limit + ["/image"]
 
         run(test, team=True)
 
@@ -307,7 +307,7 @@ class TestTeam:
         monkeypatch.setattr(request_limits, "PAUSE", 0.0)
 
         async def test(service: Service) -> None:
-            for _ in range(READ.each + MOST_WAITING):
+            for _ in range(READ.per_person_limit + MOST_WAITING):
                 service.ask(READ, who="ann")
             await service.settle()
             assert service.statuses == [503] * (MOST_WAITING // 2)

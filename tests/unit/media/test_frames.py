@@ -77,7 +77,7 @@ class TestFrames:
         settings: Settings,
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        assert frames.cached(media, 40, False) is None
+        assert frames.read_cached(media, 40, False) is None
         made = make_picture(media, 40, False, settings)
         monkeypatch.setattr(frames._pool, "submit", lambda *_, **__: pytest.fail("asked"))
         assert frames.read(media, 40, False) == made
@@ -159,7 +159,7 @@ class TestFrames:
         self, frames: FrameProvider, media: Media, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "make_picture", note_and_run_out_of_time)
-        for task in [frames.ask(media, width, False) for width in (None, 40, 80)]:
+        for task in [frames.request_picture(media, width, False) for width in (None, 40, 80)]:
             with pytest.raises(TooLargeError, match="takes more than 10 seconds"):
                 task.future.result()
         assert Path(f"{media.path}.tries").read_text() == "None\n"

@@ -181,7 +181,7 @@ class TestFramesOfTheServer:
         try:
             assert frames.request_work_on_frame(media, False, is_indexed).future.result(60)
             write_video(tmp_path / "cam1.mp4", "mp4v", 21)
-            assert frames.ask_to(media, is_indexed_here, media).future.result(60)
+            assert frames.request_work(media, is_indexed_here, media).future.result(60)
         finally:
             frames.close()
 

@@ -23,7 +23,7 @@ class TestAgreement:
         right = measure_agreement(rendered.truth, rendered.field, paint)
         wrong = measure_agreement(panned(rendered.truth, 25.0), rendered.field, paint)
         assert right.supported > 0.8 and right.explained > 0.5
-        assert wrong.product < right.product / 3
+        assert wrong.combined_score < right.combined_score / 3
 
     def test_the_picture_itself_may_be_given(self, rendered):
         paint = find_line_like_pixels(rendered.image, rendered.field)
@@ -43,7 +43,7 @@ class TestAgreement:
 
     def test_without_paint_and_without_field_both_are_zero(self, rendered):
         nothing = np.zeros(rendered.field.shape, np.bool_)
-        assert measure_agreement(rendered.truth, rendered.field, nothing).product == 0
+        assert measure_agreement(rendered.truth, rendered.field, nothing).combined_score == 0
         assert measure_agreement(rendered.truth, nothing, nothing).points == 0
 
 

@@ -118,7 +118,7 @@ class TestSeek:
     def test_paint_of_the_true_camera_lies_within_its_sigmas(self, rendered):
         reading = read_picture(rendered.image, rendered.field)
         found = find_paint(reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0)
-        assert found.share > 0.5
+        assert found.painted_fraction > 0.5
         assert 0.5 < np.median(np.abs(found.offsets / found.sigmas)) / 0.6745 < 1.6
 
     def test_nothing_is_believed_in_a_hidden_box(self, rendered):

@@ -161,7 +161,7 @@ class TestSeek:
         noise = read(noisy(picture(GRASS, HEIGHT, WIDTH), 8.0)).noise
         reading = read(noisy(stripe(brighter_by(round(times * noise))), 8.0))
         assert 2 * reading.noise > 6.0
-        share = find_paint(reading, upright([100.0] * 16), 6.0).share
+        share = find_paint(reading, upright([100.0] * 16), 6.0).painted_fraction
         assert share < 0.2 if few else share > 0.8
 
     @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ class TestSeek:
             image[round(row) - 3 : round(row) + 4, 98:103] = WHITE
         traced = upright([100.0] * count)
         traced.pixels[:, 1] = rows
-        share = find_paint(read(image), traced, 6.0).share
+        share = find_paint(read(image), traced, 6.0).painted_fraction
         assert share == pytest.approx(shown, abs=0.15) if kept else share < 0.1
 
     @pytest.mark.parametrize(
@@ -327,7 +327,7 @@ class TestEvidence:
         reading = read(picture(GRASS, 720, 1280))
         up = looking((0.0, 62.0, -9.0), (0.0, 20.0, -60.0), 1500.0)
         evidence = find_paint(reading, trace_visible_markings(reading, up, Pitch()), 3.0)
-        assert (evidence.traced.visible, evidence.share) == (0, 0.0)
+        assert (evidence.traced.visible, evidence.painted_fraction) == (0, 0.0)
 
     @pytest.mark.parametrize("factor", [0.5, 3.0])
     def test_resized_it_is_that_of_the_resized_picture(self, rendered, factor: float) -> None:
@@ -345,7 +345,7 @@ class TestEvidence:
             assert getattr(larger.traced, name) == pytest.approx(expected)
         assert larger.offsets == pytest.approx(factor * evidence.offsets)
         assert larger.sigmas == pytest.approx(factor * evidence.sigmas)
-        assert larger.share == evidence.share
+        assert larger.painted_fraction == evidence.painted_fraction
 
 
 def found_with(rendered, camera: Camera) -> DetectedPaint:

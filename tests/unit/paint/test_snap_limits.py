@@ -143,7 +143,7 @@ class TestEnough:
         found = snapped(image, start)
         assert found.reason == reason
         assert found.points == len(found.evidence.pixels) > 100
-        assert (found.evidence.share < 0.2) == (reason == NO_PAINT)
+        assert (found.evidence.painted_fraction < 0.2) == (reason == NO_PAINT)
 
     def test_eighty_places_in_a_corner_of_the_field_determine_a_camera(self, whole) -> None:
         x, y = np.meshgrid(np.arange(960), np.arange(540))

@@ -38,7 +38,7 @@ def backdrop(cameras: list[Camera]) -> Backdrop:
 
 @pytest.fixture(scope="module")
 def instant() -> Instant:
-    return make_play(8.0, 3, tuple(range(PEOPLE))).at(5.0)
+    return make_play(8.0, 3, tuple(range(PEOPLE))).instant_at(5.0)
 
 
 class TestAimed:

@@ -66,13 +66,15 @@ class TestMakePlay:
         assert np.percentile(paces, 99.9) < SPRINT + 1.0
         held = np.flatnonzero([mode == "held" for mode in play.modes[:5900:100]])
         near = [
-            np.linalg.norm(play.at(float(at)).feet - play.at(float(at)).ball[:2], axis=1).min()
+            np.linalg.norm(
+                play.instant_at(float(at)).feet - play.instant_at(float(at)).ball[:2], axis=1
+            ).min()
             for at in held
         ]
         assert np.median(near) < 1.5
 
     def test_moments_between_steps_lie_between_them(self, play: Play) -> None:
-        one, middle, other = (play.at(seconds) for seconds in (10.0, 10.01, 10.02))
+        one, middle, other = (play.instant_at(seconds) for seconds in (10.0, 10.01, 10.02))
         assert np.allclose(middle.feet, (one.feet + other.feet) / 2)
         assert play.mode_at(10.0) == play.modes[1000]
         assert np.allclose(play.ball_at(np.array([10.0]))[0], one.ball)

@@ -78,14 +78,16 @@ class TestHash:
     def test_the_paper_fits_the_inner_edges_of_goals_and_the_others_their_middle(self):
         goals = {name: policy.calibration.goal for name, policy in POLICIES.items()}
         assert goals == {"paper": "inner", "strict": "middle", "touchline": "middle"}
-        post = CLICKED.fitted(Pitch(100.0, 64.0)).shapes["Goal left post left"]
+        post = CLICKED.with_fitted_goal(Pitch(100.0, 64.0)).shapes["Goal left post left"]
         assert isinstance(post, Segment) and post.start == pytest.approx((-50.0, 3.72, -2.5))
-        assert PAPER.calibration.fitted(Pitch()) == Pitch()
+        assert PAPER.calibration.with_fitted_goal(Pitch()) == Pitch()
 
     def test_lines_by_the_laws_are_asked_for_by_no_shipped_policy(self):
         laws = replace(CLICKED, goal="laws")
-        assert laws.fitted(Pitch()).shapes["Side line left"].start[0] == pytest.approx(-52.44)
-        assert CLICKED.fitted(Pitch()).shapes["Side line left"].start[0] == -52.5
+        assert laws.with_fitted_goal(Pitch()).shapes["Side line left"].start[0] == pytest.approx(
+            -52.44
+        )
+        assert CLICKED.with_fitted_goal(Pitch()).shapes["Side line left"].start[0] == -52.5
         keys = {replace(PAPER, calibration=one).hash for one in (CLICKED, laws, PAPER.calibration)}
         assert len(keys) == 3
 

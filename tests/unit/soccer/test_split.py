@@ -29,11 +29,13 @@ class TestSplit:
 
 class TestSplitter:
     def test_the_given_split_stays(self) -> None:
-        assert Splitter.of(Split(), MATCHES).group("match 1", "valid", ["1.png"]) == "valid"
+        assert (
+            Splitter.of(Split(), MATCHES).split_of_group("match 1", "valid", ["1.png"]) == "valid"
+        )
 
     def test_a_draw_takes_whole_matches_and_as_many_as_asked_for(self) -> None:
         splitter = Splitter.of(Split("match", 1, 0.3), MATCHES)
-        sides = [splitter.group(match, "train", ["1.png"]) for match in MATCHES]
+        sides = [splitter.split_of_group(match, "train", ["1.png"]) for match in MATCHES]
         assert (sides.count("test"), sides.count("train")) == (3, 7)
 
     def test_the_same_seed_draws_the_same_in_any_order_and_another_one_another(self) -> None:
@@ -52,11 +54,11 @@ class TestSplitter:
 
     def test_cameras_split_views_and_a_group_of_both_sides_has_no_split(self) -> None:
         splitter = Splitter.of(Split("camera"), ["issia"])
-        assert splitter.group("issia", "", CAMERAS) == ""
+        assert splitter.split_of_group("issia", "", CAMERAS) == ""
         assert splitter.views(CAMERAS) == {"cam1": "test", "cam3": "train"}
 
     def test_a_group_of_one_side_goes_with_it(self) -> None:
         splitter = Splitter.of(Split("camera"), ["issia"])
-        assert splitter.group("issia", "", ["cam1", "cam2"]) == "test"
-        assert splitter.group("issia", "", ["cam3", "cam4"]) == "train"
+        assert splitter.split_of_group("issia", "", ["cam1", "cam2"]) == "test"
+        assert splitter.split_of_group("issia", "", ["cam3", "cam4"]) == "train"
         assert splitter.views(["cam3", "cam4"]) is None

@@ -54,7 +54,7 @@ def test_balls_are_asked_with_the_cameras_that_the_lines_make(fine: list[Made]) 
     """Believed to be worse than they are, cameras would explain what the clicks are off."""
     seen = [NoiseGroup.of(one.group, solve_group(one.group, PAPER), PAPER) for one in fine]
     found = estimate_noise(seen, PAPER)
-    alone = [miss for group in seen for miss in group.misses(PAPER)]
+    alone = [miss for group in seen for miss in group.ray_residuals(PAPER)]
     asked = [miss for some in found.misses for miss in some]
     assert found.lines is not None and found.lines.sigma.value == pytest.approx(0.2, rel=0.15)
     assert np.mean([miss.known for miss in asked]) < 0.5 * np.mean([miss.known for miss in alone])
@@ -64,8 +64,8 @@ def test_the_covariances_are_those_that_solving_makes(fine: list[Made]) -> None:
     calibration = replace(PAPER.calibration, line_sigma_px=0.3, line_share=0.2)
     policy = replace(PAPER, calibration=calibration)
     group = fine[0].group
-    quick = NoiseGroup.of(group, solve_group(group, PAPER), PAPER).misses(policy)
-    whole = NoiseGroup.of(group, solve_group(group, policy), policy).misses(policy)
+    quick = NoiseGroup.of(group, solve_group(group, PAPER), PAPER).ray_residuals(policy)
+    whole = NoiseGroup.of(group, solve_group(group, policy), policy).ray_residuals(policy)
     for one, other in zip(quick, whole, strict=True):
         assert one.known == pytest.approx(other.known, rel=1e-6)
         assert abs(one.miss) == pytest.approx(abs(other.miss), rel=1e-6)
@@ -239,8 +239,10 @@ class TestFactor:
         """Bea has camera b alone, at which ann works too."""
         placed = {"a": ["ann"], "b": ["ann", "bea"], "c": ["ann"]}
         found = factors(filmed(1, placed, {"b": 3.0}), 1.0)
-        assert found.factor([camera("b")]) > 2.0 and found.factor([person("bea")]) == 1.0
-        assert found.factor([camera("b"), person("bea")]) == pytest.approx(3.0, rel=0.15)
+        assert (
+            found.noise_factor([camera("b")]) > 2.0 and found.noise_factor([person("bea")]) == 1.0
+        )
+        assert found.noise_factor([camera("b"), person("bea")]) == pytest.approx(3.0, rel=0.15)
 
     def test_both_together_are_known_where_nobody_knows_which(self) -> None:
         placed = {"a": ["ann", "cleo"], "b": ["bea"], "c": ["ann", "cleo"]}
@@ -248,15 +250,15 @@ class TestFactor:
         (bea, *_), (b, *_) = found.of("person"), found.of("camera")
         assert (bea.source, b.source) == ("bea", "b")
         assert max(bea.ratio, b.ratio) < 2.2
-        assert found.factor([camera("b"), person("bea")]) == pytest.approx(3.0, rel=0.2)
+        assert found.noise_factor([camera("b"), person("bea")]) == pytest.approx(3.0, rel=0.2)
 
     def test_who_may_be_like_the_dataset_and_who_is_unknown_counts_as_it(self) -> None:
         found = factors(drawn(0, dict.fromkeys(TRUE, 1.2)))
         names = [one.source for one in found.of("person") if not one.differs]
-        assert names and {found.factor([person(name)]) for name in (*names, "eve")} == {1.0}
+        assert names and {found.noise_factor([person(name)]) for name in (*names, "eve")} == {1.0}
 
     def test_it_is_used_where_the_interval_leaves_out_the_dataset(self) -> None:
         found = factors(drawn(0))
         for one in found.of("person"):
-            used = found.factor([person(one.source)])
+            used = found.noise_factor([person(one.source)])
             assert used == (round(one.ratio, 2) if one.differs else 1.0)

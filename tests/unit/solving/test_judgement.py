@@ -125,7 +125,7 @@ class TestJudge:
         jac = compute_view_jac(found, policy.jac_gamma_percent)
         standing, uncertainty = find_first_failed_gates(found, jac, policy), MeanCovariance(found)
         told = judge_known_failures(found, policy, uncertainty, jac, standing, first_alone=True)
-        assert told.first.tolist() == judged(found, policy).first.tolist()
+        assert told.first_failed_gate.tolist() == judged(found, policy).first_failed_gate.tolist()
 
     def test_a_view_that_does_not_count_has_no_part_in_sigma_and_residuals(self):
         policy = replace(PAPER, max_sigma_m=0.1, min_p_value=0.05, given_sigma_px=1.0)
@@ -158,13 +158,15 @@ class TestJudge:
             after = judged(whole, replace(policy, **{threshold: stricter}))
             assert not (after.valid & ~before.valid).any()
             alike = _pairs_of_groups(whole, after) == _pairs_of_groups(whole, before)
-            assert not (alike & after.passes & ~before.passes).any()
-            stopped += int((before.passes & ~after.passes).sum())
+            assert not (alike & after.passing_groups & ~before.passing_groups).any()
+            stopped += int((before.passing_groups & ~after.passing_groups).sum())
         assert stopped
 
     def test_random_groups_and_policies_reach_every_gate(self):
         whole = join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(150)])
-        first = np.concatenate([judged(whole, random_policy(seed)).first for seed in range(12)])
+        first = np.concatenate(
+            [judged(whole, random_policy(seed)).first_failed_gate for seed in range(12)]
+        )
         assert set(first.tolist()) == set(range(PASSES + 1))
 
     @pytest.mark.parametrize(
@@ -180,12 +182,15 @@ class TestJudge:
         right = {"pair_parallax": np.array([90.0]), "pair_point": np.array([[0.0, 0.0, 0.0]])}
         judgement = judged(facts(**right), policy)
         assert failing(judgement)[: len(fails)] == fails
-        assert judgement.passes[0] == (not fails)
+        assert judgement.passing_groups[0] == (not fails)
 
     def test_a_group_in_good_order_passes(self):
         judgement = judged(facts())
         assert failing(judgement) == []
-        assert (judgement.passes.tolist(), judgement.first.tolist()) == ([True], [PASSES])
+        assert (judgement.passing_groups.tolist(), judgement.first_failed_gate.tolist()) == (
+            [True],
+            [PASSES],
+        )
         assert judgement.point.tolist() == [[0.0, 0.0, 0.0]]
         assert (judgement.parallax.tolist(), judgement.distance.tolist()) == ([90.0], [10.0])
 
@@ -287,7 +292,7 @@ class TestJudge:
     @pytest.mark.parametrize(("widest", "passes"), [(1.0, True), (0.999, False)])
     def test_the_baseline_may_be_just_what_is_asked(self, widest, passes):
         judgement = judged(facts(pair_baseline=np.array([widest])))
-        assert judgement.passes.tolist() == [passes]
+        assert judgement.passing_groups.tolist() == [passes]
         assert judgement.pair_failed.tolist() == [PASSES if passes else GATES.index("baseline")]
 
     def test_one_camera_twice_is_no_metre_apart(self):

@@ -72,13 +72,13 @@ class TestPlaceOf:
 
 class TestPrior:
     def test_many_frames_say_together_where_the_camera_stands(self):
-        prior = FramePlaces(around(STAND, 20)).prior(0.5)
+        prior = FramePlaces(around(STAND, 20)).position_prior(0.5)
         assert prior.mean == pytest.approx(STAND, abs=0.3)
         assert (prior.sigma < 0.3).all()
 
     def test_a_bad_frame_carries_nothing_away(self):
-        clean = FramePlaces(around(STAND, 10)).prior(0.5)
-        spoilt = FramePlaces([*around(STAND, 10), place(off(0.0, 9.0, -3.0))]).prior(0.5)
+        clean = FramePlaces(around(STAND, 10)).position_prior(0.5)
+        spoilt = FramePlaces([*around(STAND, 10), place(off(0.0, 9.0, -3.0))]).position_prior(0.5)
         assert spoilt.mean == pytest.approx(clean.mean, abs=0.1)
 
     def test_the_place_moves_with_the_direction_of_view(self):
@@ -87,12 +87,12 @@ class TestPrior:
             for pan in (-0.6, -0.3, 0.3, 0.6)
             for it in around(STAND, 5, seed=int(10 * pan) + 9)
         ]
-        left, right = (FramePlaces(turned).prior(pan).mean for pan in (-0.5, 0.5))
+        left, right = (FramePlaces(turned).position_prior(pan).mean for pan in (-0.5, 0.5))
         assert right - left == pytest.approx([2.0, 0.0, 0.0], abs=0.4)
 
     def test_frames_that_look_elsewhere_say_less(self):
         turned = [FramePlace(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
-        there, elsewhere = (FramePlaces(turned).prior(pan).sigma for pan in (-0.6, 0.5))
+        there, elsewhere = (FramePlaces(turned).position_prior(pan).sigma for pan in (-0.6, 0.5))
         assert (there < 0.2).all()
         assert elsewhere[0] > 1.0
         assert (elsewhere > there).all()
@@ -100,15 +100,17 @@ class TestPrior:
     def test_one_is_left_out_without_a_copy_of_the_others(self):
         odd = place(off(0.0, 9.0, -3.0))
         every = FramePlaces([*around(STAND, 3), odd])
-        rest = every.without(3)
-        assert rest.prior(0.5).mean == pytest.approx(FramePlaces(around(STAND, 3)).prior(0.5).mean)
-        assert FramePlaces(around(STAND, 3)).without(0).prior(0.5) is None
+        rest = every.without_frame(3)
+        assert rest.position_prior(0.5).mean == pytest.approx(
+            FramePlaces(around(STAND, 3)).position_prior(0.5).mean
+        )
+        assert FramePlaces(around(STAND, 3)).without_frame(0).position_prior(0.5) is None
         assert rest._equations is every._equations
 
     def test_what_is_known_with_a_frame_is_not_known_without_it(self):
         every = FramePlaces(around(STAND, 3))
-        assert every.prior(0.5) is not None
-        assert every.without(0).prior(0.5) is None
+        assert every.position_prior(0.5) is not None
+        assert every.without_frame(0).position_prior(0.5) is None
 
     def test_frames_of_several_stadiums_say_nothing(self):
         mixed = [
@@ -116,10 +118,10 @@ class TestPrior:
             for seed, y in enumerate((45.0, 55.0, 65.0, 75.0, 85.0))
             for item in around(np.array([0.0, y, -y / 4]), 3, seed)
         ]
-        assert FramePlaces(mixed).prior(0.5) is None
+        assert FramePlaces(mixed).position_prior(0.5) is None
 
     def test_two_frames_are_too_few(self):
-        assert FramePlaces(around(STAND, 2)).prior(0.5) is None
+        assert FramePlaces(around(STAND, 2)).position_prior(0.5) is None
 
 
 class TestSharePosition:

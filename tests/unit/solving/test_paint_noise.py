@@ -113,7 +113,7 @@ class TestCovariance:
     def test_it_holds_what_a_longer_pitch_does_to_a_camera(self):
         """A camera sees one half and the middle of a pitch that is 1.5 m longer."""
         seen, places = seen_by(MAIN, Pitch(105 + PAINT_SIZE_SIGMA_M[0], 68))
-        moved = PROBLEM.step(TRUE, seen, strict=False)
+        moved = PROBLEM.compute_step(TRUE, seen, strict=False)
         sized = PROBLEM.noise(
             TRUE, replace(seen, offsets=np.zeros(len(seen.offsets))), places, PITCH
         )

@@ -109,8 +109,10 @@ def gaps_of(seed: int) -> np.ndarray:
         ]
     )
     rays, _ = rig.rays.select_common_points(0, 1)
-    _, signed, free = ray_pair_distances_px(rig.start, rays)
-    at = linearize(rig.start, optimize_points(rig.start, rays, np.inf), rays)
+    _, signed, free = ray_pair_distances_px(rig.initial_parameters, rays)
+    at = linearize(
+        rig.initial_parameters, optimize_points(rig.initial_parameters, rays, np.inf), rays
+    )
     order = np.argsort(rays.point, kind="stable").reshape(-1, 2)
     slopes = np.einsum("nsi,nsia->nsa", free.reshape(-1, 2, 2), at.by_camera[order])
     carried = np.einsum("nsa,nsab,nsb->n", slopes, covariances[rays.camera[order]], slopes)

@@ -74,7 +74,9 @@ def painted(
     parameters = truth
     for at in range(ROUNDS):
         offsets = measure_offsets(problem, parameters, curves, sigmas, PLAN)
-        parameters = parameters + problem.step(parameters, offsets, strict=at >= ROUNDS - STRICT)
+        parameters = parameters + problem.compute_step(
+            parameters, offsets, strict=at >= ROUNDS - STRICT
+        )
     return PaintSightings(parameters, curves, sigmas)
 
 
@@ -96,8 +98,8 @@ def test_a_shorter_pitch_with_a_crown_is_found_within_its_sigma():
     truths, frames = film(Pitch(101, 67.5), laid(crown=0.15, inward=0.06))
     found = shown_by(frames)
     sizes = np.array([found.pitch.length - 101, found.pitch.width - 67.5])
-    assert (np.abs(sizes) < WITHIN * found.sizes_sigma).all() and found.sizes_sigma.max() < 0.5
-    for (value, sigma), truth in ((found.crown, 0.15), (found.inward, 0.06)):
+    assert (np.abs(sizes) < WITHIN * found.size_sigmas).all() and found.size_sigmas.max() < 0.5
+    for (value, sigma), truth in ((found.crown, 0.15), (found.inward_paint_shift, 0.06)):
         assert abs(value - truth) < WITHIN * sigma and sigma < 0.05
     away = found.position - truths[0][X : Z + 1]
     assert away @ np.linalg.solve(found.position_covariance, away) < WITHIN**2
@@ -118,7 +120,7 @@ def test_cameras_on_the_plan_know_how_far_off_they_are():
     found = shown_by(frames)
     position, off_plan, off_shown = slice(X, Z + 1), [], []
     for truth, frame in zip(truths, frames, strict=True):
-        parameters, covariance = found.camera(frame)
+        parameters, covariance = found.fit_camera(frame)
         off = (frame.parameters - truth)[position]
         about = second_moment_about_plan(frame.parameters, parameters, covariance)
         assert off @ np.linalg.solve(about[position, position], off) < WITHIN**2
@@ -131,7 +133,7 @@ def test_cameras_on_the_plan_know_how_far_off_they_are():
 def test_lines_are_drawn_where_the_pitch_has_them():
     truths, frames = film(Pitch(101, 68), laid(crown=0.15))
     found = shown_by(frames)
-    (parameters, _), pitch = found.camera(frames[-1]), Pitch(101, 68)
+    (parameters, _), pitch = found.fit_camera(frames[-1]), Pitch(101, 68)
     camera, truth = (
         camera_from_parameters(each, MAIN.principal_point, HALF)
         for each in (parameters, truths[-1])
@@ -141,7 +143,7 @@ def test_lines_are_drawn_where_the_pitch_has_them():
     which = np.full(len(line), MARKINGS.index(name))
     there = truth.project(line + compute_paint_shift(line[:, :2], which, laid(crown=0.15), pitch))
     there = there[((there > 0) & (there < (SIZE.width, SIZE.height))).all(axis=1)]
-    drawn = camera.project(found.line(name))
+    drawn = camera.project(found.sample_marking(name))
     apart = np.hypot(*(there[:, None] - drawn[None]).T)
     # Points of a line are 0.2 m apart.
     assert np.median(apart.min(axis=1)) < 2.5

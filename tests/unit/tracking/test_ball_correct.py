@@ -217,7 +217,7 @@ class TestNonsense:
 
     def test_no_measurement_at_all(self) -> None:
         nothing = GIVEN.part(np.zeros(0, dtype=int))
-        base = BallTrack.none(FRAMES, FRAMES / 25.0, "nothing")
+        base = BallTrack.make_empty_track(FRAMES, FRAMES / 25.0, "nothing")
         said = [EventCorrection(int(FRAMES[3]), "kick", True)]
         assert correct_track(base, nothing, Pitch(), said) == ()
         assert replace(apply_patches(base, nothing, (), said), events=()).reason == "nothing"

@@ -25,17 +25,17 @@ class TestBallMeasurements:
 
     def test_sizes_are_unknown_unless_given(self) -> None:
         assert np.isnan(measured().sizes).all()
-        assert measured().names == ("a", "b")
+        assert measured().view_names == ("a", "b")
 
 
 class TestBallTrack:
     def test_no_track_says_why_in_every_frame(self) -> None:
-        track = BallTrack.none(np.arange(3), np.arange(3) / 25, "Nothing was measured.")
+        track = BallTrack.make_empty_track(np.arange(3), np.arange(3) / 25, "Nothing was measured.")
         assert track.state == ("gap",) * 3 and track.reason == "Nothing was measured."
         assert np.isnan(track.sigma).all() and np.isnan(track.position).all()
 
     def test_sigma_is_the_largest_of_the_position(self) -> None:
-        track = BallTrack.none(np.arange(1), np.zeros(1), "")
+        track = BallTrack.make_empty_track(np.arange(1), np.zeros(1), "")
         covariance = np.diag([0.01, 0.09, 0.04, 9.0, 9.0, 9.0])[None]
         known = replace(track, position=np.zeros((1, 3)), covariance=covariance)
         assert np.isclose(known.sigma, 0.3).all()

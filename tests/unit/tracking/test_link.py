@@ -127,7 +127,7 @@ class TestUnobservable:
 
     def test_cameras_that_were_tracked_turned_are_told(self) -> None:
         planted = plant(BALL, 1, speed=0.5, noise_px=0.5, stand=OPPOSITE)
-        made = find_time_map(planted.live.rays(), planted.replay.rays().turned())
+        made = find_time_map(planted.live.rays(), planted.replay.rays().rotate_half_turn())
         assert made.turned and made.pieces == ()
         assert "turned to the other side of the pitch" in (made.reason or "")
         assert not linked(planted).turned

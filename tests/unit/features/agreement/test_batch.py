@@ -35,7 +35,7 @@ def batch(store, fill, make_group) -> Batch:
 
 def annotate(store: Store, leases: LeaseService, batch: Batch, person: str, moved: float) -> int:
     """The copy that somebody gets next, its ball moved and the group accepted."""
-    copy = leases.next(batch.id, BatchMember(person)).group
+    copy = leases.lease_next_group(batch.id, BatchMember(person)).group
     assert copy is not None
     state = load_group_state(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)
@@ -58,15 +58,15 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     for moved in (1.0, 1.0):
         copy = annotate(store, leases, batch, "ada", moved)
         assert compare_or_adopt_submission(store, copy) is None
-    assert leases.next(batch.id, BatchMember("ada")).group is None
+    assert leases.lease_next_group(batch.id, BatchMember("ada")).group is None
     assert (left(store, "ada"), left(store, "bo")) == (0, 2)
     assert get_batch(store, batch.id).settled == 0
 
     assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
     assert get_batch(store, batch.id).settled == 1
     assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
-    assert leases.next(batch.id, BatchMember("bo")).group is None
-    assert leases.next(batch.id, BatchMember("cy")).group is None
+    assert leases.lease_next_group(batch.id, BatchMember("bo")).group is None
+    assert leases.lease_next_group(batch.id, BatchMember("cy")).group is None
 
     waiting = list_open_cases(store, batch.dataset_id)
     assert len(waiting) == 1

@@ -193,7 +193,9 @@ class TestLeases:
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
         people = [BatchMember(f"person{number}") for number in range(8)]
         with ThreadPoolExecutor(8) as pool:
-            given = list(pool.map(lambda one: LeaseService(store).next(batch, one).group, people))
+            given = list(
+                pool.map(lambda one: LeaseService(store).lease_next_group(batch, one).group, people)
+            )
         assert sorted(one for one in given if one) == sorted(groups)
         assert given.count(None) == 2
 
@@ -430,8 +432,8 @@ class TestOwnPlace:
         batch = make_batch(store, dataset, new, actor="lead").id
         told = []
         for _ in range(3):
-            lease = LeaseService(store).next(batch, ADA)
-            again = LeaseService(store).take(batch, lease.group, ADA)
+            lease = LeaseService(store).lease_next_group(batch, ADA)
+            again = LeaseService(store).lease_group(batch, lease.group, ADA)
             assert (again.place, again.of) == (lease.place, lease.of)
             told.append((lease.place, lease.of))
             judge(store, lease.group, "ada")
@@ -441,12 +443,12 @@ class TestOwnPlace:
         make_gold(store, groups[5])
         new = NewBatch("a", size=3, annotators=["ada"], gold_every=2)
         batch = make_batch(store, dataset, new, actor="lead").id
-        lease = LeaseService(store).next(batch, ADA)
+        lease = LeaseService(store).lease_next_group(batch, ADA)
         assert (lease.place, lease.of) == (1, None)
 
     def test_who_works_on_the_groups_themselves_is_told_none(self, store, dataset, groups):
         batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
-        lease = LeaseService(store).next(batch, ADA)
+        lease = LeaseService(store).lease_next_group(batch, ADA)
         assert (lease.place, lease.of) == (None, None)
 
 
@@ -489,7 +491,7 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         copies = {}
         for minutes, who in ((1, ADA), (5, ADA), (20, BO)):
-            copies[minutes] = LeaseService(store).next(batch, who).group
+            copies[minutes] = LeaseService(store).lease_next_group(batch, who).group
             at = (clock.at + timedelta(minutes=minutes)).isoformat(timespec="microseconds")
             monkeypatch.setattr("app.features.verdicts.service.now", lambda at=at: at)
             judge(store, copies[minutes], who.name)

@@ -190,7 +190,7 @@ class TestDeleteDataset:
 
     def test_its_yield_is_not_found_any_more(self, two: Store) -> None:
         yields = YieldStore(two)
-        yields.snapshot(1)
+        yields.get_snapshot(1)
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         with pytest.raises(NotFoundError):
-            yields.snapshot(1)
+            yields.get_snapshot(1)

@@ -26,10 +26,10 @@ def folder(tmp_path: Path) -> ExportFolder:
 
 def keep(folder: ExportFolder, name: str) -> ExportEntry:
     """Stands for an export: the smallest zip there is."""
-    path = folder.content(name)
+    path = folder.get_zip_path(name)
     path.write_bytes(b"PK\x05\x06" + b"\0" * 18)
     report = ExportReport(path, "cameras", 2, {"cameras": 2}, {"stale": 1}, ("7.png: gone",))
-    return folder.keep(name, REQUEST, report)
+    return folder.save_entry(name, REQUEST, report)
 
 
 def age(folder: ExportFolder, entry: ExportEntry, days: int) -> None:
@@ -47,7 +47,7 @@ class TestKeep:
         assert entry.missing_images == ["7.png: gone"]
 
     def test_a_zip_without_its_record_is_not_found(self, folder: ExportFolder) -> None:
-        folder.content("12").write_bytes(b"PK")
+        folder.get_zip_path("12").write_bytes(b"PK")
         assert folder.find("12") is None
 
 
@@ -61,21 +61,21 @@ class TestExpire:
         old, young = folder.get("12"), folder.get("13")
         assert (old.expired, young.expired) == (True, False)
         assert (old.counts, old.bytes) == ({"cameras": 2}, 22)
-        assert [folder.content(name).exists() for name in ("12", "13")] == [False, True]
+        assert [folder.get_zip_path(name).exists() for name in ("12", "13")] == [False, True]
         assert folder.delete_expired_zips(30) == 0
 
     def test_none_expires_where_exports_are_kept_for_good(self, folder: ExportFolder) -> None:
         age(folder, keep(folder, "12"), 4000)
         assert folder.delete_expired_zips(0) == 0
-        assert folder.content("12").exists()
-        assert folder.get("12").expires(0) is None
+        assert folder.get_zip_path("12").exists()
+        assert folder.get("12").find_expiry_time(0) is None
 
     def test_a_zip_whose_deletion_was_interrupted_goes_the_next_time(
         self, folder: ExportFolder
     ) -> None:
         age(folder, replace(keep(folder, "12"), expired=True), 31)
         folder.delete_expired_zips(30)
-        assert not folder.content("12").exists()
+        assert not folder.get_zip_path("12").exists()
 
     def test_what_was_delivered_to_an_object_store_never_expires(
         self, folder: ExportFolder
@@ -125,9 +125,9 @@ class TestForget:
         keep(folder, "12")
         kept = keep(folder, "13")
         for name in ("12", "../exports/13", "99"):
-            folder.forget(name)
+            folder.delete_export(name)
         assert folder.find("12") is None
-        assert not folder.content("12").exists()
+        assert not folder.get_zip_path("12").exists()
         assert folder.get("13") == kept
 
 
@@ -139,7 +139,7 @@ class TestWriting:
         half = folder.folder / ".13.zip.abc.partial"
         half.mkdir()
         (half / "x.csv").write_text("x")
-        with folder.writing("13") as beside:
+        with folder.reserve_partial_path("13") as beside:
             assert not half.exists()
             beside.with_name(f".{beside.name}.abc.partial").write_text("half of the zip")
         assert sorted(path.name for path in folder.folder.iterdir()) == ["12.json", "12.zip"]
@@ -147,7 +147,7 @@ class TestWriting:
     def test_what_others_are_writing_stays(self, folder: ExportFolder) -> None:
         others = folder.folder / ".12.zip.abc.partial"
         others.mkdir()
-        with folder.writing("2"), folder.writing("13"):
+        with folder.reserve_partial_path("2"), folder.reserve_partial_path("13"):
             assert others.is_dir()
         assert others.is_dir()
 
@@ -155,13 +155,13 @@ class TestWriting:
         self, folder: ExportFolder
     ) -> None:
         with ExitStack() as other:
-            with folder.writing("13"):
-                beside = other.enter_context(folder.writing("13"))
+            with folder.reserve_partial_path("13"):
+                beside = other.enter_context(folder.reserve_partial_path("13"))
                 half = beside.with_name(f".{beside.name}.abc.partial")
                 half.mkdir()
             assert half.is_dir()
 
     def test_a_folder_that_is_missing_is_made_for_its_owner_alone(self, tmp_path: Path) -> None:
         folder = ExportFolder(tmp_path / "home" / "exports")
-        with folder.writing("1"):
+        with folder.reserve_partial_path("1"):
             assert folder.folder.stat().st_mode & 0o777 == 0o700

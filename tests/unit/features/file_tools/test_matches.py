@@ -42,7 +42,7 @@ class TestSharesOf:
         named = dict.fromkeys("1234", "cup")
         (first, *_) = collect_shared_match_places(four, places(90.0, 60.0, 60.0, 60.0), named)
         assert first.match == "cup"
-        assert first.others.prior(0.0).mean[1] == pytest.approx(60.0, abs=0.01)
+        assert first.others.position_prior(0.0).mean[1] == pytest.approx(60.0, abs=0.01)
 
     def test_the_places_of_a_match_are_held_once(self):
         four, named = files("1", "2", "3", "4"), dict.fromkeys("1234", "cup")
@@ -60,4 +60,4 @@ class TestSharesOf:
         *_, last = collect_shared_match_places(
             four, places(*[60.0] * 5), dict.fromkeys("1234", "cup")
         )
-        assert last.others.prior(0.0) is None
+        assert last.others.position_prior(0.0) is None

@@ -20,7 +20,7 @@ def possible(kinds: list[str]) -> list[tuple[str, int]]:
     for number, kind in enumerate(kinds, start=1):
         if (kind == "undo" and not stacks.can_undo) or (kind == "redo" and not stacks.can_redo):
             continue
-        stacks = stacks.then(kind, number)
+        stacks = stacks.push_entry(kind, number)
         steps.append((kind, number))
     return steps
 
@@ -29,7 +29,7 @@ class TestStacksOf:
     @settings(deadline=None, derandomize=True)
     @given(st.lists(st.sampled_from(["edit", "undo", "redo"])).map(possible))
     def test_is_one_step_after_the_other(self, steps: list[tuple[str, int]]) -> None:
-        one_by_one = reduce(lambda stacks, step: stacks.then(*step), steps, UndoStacks())
+        one_by_one = reduce(lambda stacks, step: stacks.push_entry(*step), steps, UndoStacks())
         assert _build_stacks(steps) == one_by_one
 
     def test_a_fresh_edit_clears_what_was_undone(self) -> None:

@@ -50,7 +50,7 @@ def check(tmp_path: Path) -> PictureCheck:
 def remarks_of(check: PictureCheck) -> Callable[..., list[str]]:
     def remarks(*groups: Group) -> list[str]:
         assert list(check.watch(groups)) == list(groups)
-        return check.remarks()
+        return check.describe_differences()
 
     return remarks
 
@@ -73,7 +73,7 @@ class TestShapes:
     def test_the_size_that_people_see_counts(self, check: PictureCheck, tmp_path: Path) -> None:
         upright = group_of(write(tmp_path / "7.jpg", 72, 128, orientation=6))
         list(check.watch([upright]))
-        assert check.remarks() == []
+        assert check.describe_differences() == []
         assert check.report.counts["pictures turned by EXIF"] == 1
 
     def test_a_declared_size_of_the_stored_pixels_names_the_orientation(

@@ -75,7 +75,7 @@ class TestGoldInAFilm:
         new = NewBatch("film", f"id:{frames}", annotators=["ann"], gold_every=2)
         batch = make_batch(store, "film", new, actor="lea").id
         leases, kinds, shapes = LeaseService(store), [], set()
-        while (copy := leases.next(batch, ANN).group) is not None:
+        while (copy := leases.lease_next_group(batch, ANN).group) is not None:
             take, state = get_annotation_of_copy(store, copy), load_group_state(store, copy)
             kinds.append(take.kind)
             assert all(view.media is not None for view in state.group.views)
@@ -107,7 +107,7 @@ class TestGoldInAFilm:
         mark_gold_group(store, film[GOLD], start, actor="lea")
         new = NewBatch("film", f"id:{film[FIRST]}", annotators=["ann"], gold_every=1)
         batch = make_batch(store, "film", new, actor="lea").id
-        copy = LeaseService(store).next(batch, ANN).group
+        copy = LeaseService(store).lease_next_group(batch, ANN).group
         assert get_annotation_of_copy(store, copy).kind == "gold"
         views = load_group_state(store, copy).group.views
         assert [view.balls for view in views] == [()] * 6

@@ -184,15 +184,21 @@ class TestRunningBatch:
         new = NewBatch("a", query="number>=2", annotators=["ada"])
         batch = make_batch(store, "demo", new, actor="lea")
         leases, ada = LeaseService(store), BatchMember("ada")
-        first = leases.next(batch.id, ada).group
+        first = leases.lease_next_group(batch.id, ada).group
         leases.submit(batch.id, first, ada, actor="ada")
         mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
         change_batch(store, batch.id, actor="lea", gold_every=1)
-        copy = leases.next(batch.id, ada).group
+        copy = leases.lease_next_group(batch.id, ada).group
         assert load_group_state(store, copy).group.label == "Group 1"
         judge(store, copy, "ada")
         assert [one.person for one in read_gold_report(store, "demo").people] == ["ada"]
         assert list_own_batches(store, lambda _: ada)[0].left == 2
-        second = get_annotation_of_copy(store, leases.next(batch.id, ada).group).group_id
+        second = get_annotation_of_copy(
+            store, leases.lease_next_group(batch.id, ada).group
+        ).group_id
         change_batch(store, batch.id, actor="lea", no_gold=True)
-        assert {first, second, leases.next(batch.id, ada).group} <= {2, 3, 4} and first != second
+        assert {first, second, leases.lease_next_group(batch.id, ada).group} <= {
+            2,
+            3,
+            4,
+        } and first != second

@@ -159,7 +159,7 @@ class TestSharedJobs:
         second.start()
         assert work.begun.acquire(timeout=SECONDS)
         # Both are at it; what the first comes to is not kept.
-        (run,) = first._queue.runs
+        (run,) = first._queue.all_runs
         unaware.go_on.release()
         assert run.over.wait(SECONDS)
         assert second.get(job.id).state == "running"
@@ -173,7 +173,7 @@ class TestSharedJobs:
         jobs.start()
         job = ask(jobs)
         assert work.begun.acquire(timeout=SECONDS)
-        (run,) = jobs._queue.runs
+        (run,) = jobs._queue.all_runs
         claims.free = False
         jobs._try_to_lead()
         work.go_on.release()

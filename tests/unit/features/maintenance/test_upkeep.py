@@ -168,7 +168,7 @@ class TestUpkeep:
         upkeep = UpkeepScheduler(store, Jobs(store))
         monkeypatch.setattr(store, "require_whole", damaged)
         with capture_logs() as logs:
-            upkeep.round()
+            upkeep.run_once()
         assert logs[-1]["error"] == "the disk is gone"
 
     @pytest.mark.parametrize("error", [OSError("gone"), ZeroDivisionError("a bug")])

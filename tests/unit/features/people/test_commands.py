@@ -41,7 +41,9 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
-    monkeypatch.setattr("app.http.server.serve_application", lambda app, _: app.state.services.close())
+    monkeypatch.setattr(
+        "app.http.server.serve_application", lambda app, _: app.state.services.close()
+    )
     cheap = Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1)
     monkeypatch.setattr(passwords, "HASHER", PasswordHash((cheap,)))
     return tmp_path / "home"

@@ -140,11 +140,11 @@ class TestLogin:
         attempts = AttemptWindow(desk.store)
 
         def count() -> None:
-            assert attempts.hit("code/anna", 1, 3600.0) is None
+            assert attempts.count_attempt("code/anna", 1, 3600.0) is None
 
         code = desk.code()
         assert desk.logins.log_in("anna", SECRET, code=code, on_code=count)
-        assert attempts.hit("code/anna", 1, 3600.0) is not None
+        assert attempts.count_attempt("code/anna", 1, 3600.0) is not None
 
     def test_a_recovery_code_takes_its_place_once(self, desk: Desk) -> None:
         desk.enrol()

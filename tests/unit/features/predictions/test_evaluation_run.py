@@ -33,8 +33,8 @@ class TestAcceptedTruth:
 
     def test_warns_in_the_tables_that_it_flatters_alone(self) -> None:
         tables = [Table(name, name, (), (), "Note.") for name in ("detection", "cameras")]
-        assert AcceptedTruth(0, 0, 3).warn(tables) == tables
-        first, second = AcceptedTruth(2, 1, 3).warn(tables)
+        assert AcceptedTruth(0, 0, 3).add_warnings(tables) == tables
+        first, second = AcceptedTruth(2, 1, 3).add_warnings(tables)
         assert first.note.startswith("Note. Warning: the ball of 2 of 3 frames")
         assert "1 of them from the evaluated set itself" in first.note
         assert second == tables[1]

@@ -110,7 +110,7 @@ class TestTrackJson:
         assert track_to_json(whole)["position"][4] is None
 
     def test_no_track_has_a_reason(self, inputs) -> None:
-        nothing = BallTrack.none(inputs.frames, inputs.times, "one measurement")
+        nothing = BallTrack.make_empty_track(inputs.frames, inputs.times, "one measurement")
         assert track_from_json(track_to_json(nothing)).reason == "one measurement"
 
 

@@ -61,7 +61,7 @@ class TestFollowedRuns:
         assert not detail.track.stale and detail.ball.reason is None
         measured = detail.inputs.measurements
         assert (detail.track.first, detail.track.last) == (0, LIVE - 1)
-        assert measured.names == ("final", "final link 1")
+        assert measured.view_names == ("final", "final link 1")
         is_live = np.array([name == "final" for name in measured.views])
         # Not what is uncertain, and not what groups show: people say there where the ball is.
         assert set(measured.frames[is_live]) == set(range(LIVE)) - {*UNSURE, *GROUPS}
@@ -86,7 +86,7 @@ class TestFollowedRuns:
         self, store: Store, recording: LinkedRecording
     ) -> None:
         recording.accept(0)
-        assert made(store).inputs.measurements.names == ("final",)
+        assert made(store).inputs.measurements.view_names == ("final",)
         recording.accept(0, False)
         (track,) = list_tracks(store, "cup")
         assert track.stale

@@ -147,7 +147,7 @@ class TestGatherStretches:
                 views.append(View(f"{number}.png", station, (point,), extras=extras))
             groups.append(Group(f"final/{frame}.png", tuple(views), match="final"))
         stretch = only(gather_stretches(map(record, groups), PAPER, {"final": [(0, 99)]}))
-        assert stretch.measurements.names == ("final", "final link 3")
+        assert stretch.measurements.view_names == ("final", "final link 3")
         track = make_track(TrackInputs.of(stretch))
         assert track.reason is None
         off = np.linalg.norm(track.position - at_times(ball, times), axis=1)
@@ -166,7 +166,7 @@ class TestGatherStretches:
         assert [item.key for item in stretches] == ["final 0-20", "final 400-410"]
         assert len(stretches[0].frames) == 21
         assert np.allclose(stretches[0].times, 10 + np.arange(21) / 50)
-        assert stretches[0].measurements.names == ("final",)
+        assert stretches[0].measurements.view_names == ("final",)
 
     def test_groups_that_say_no_time_are_in_none(self, make_group) -> None:
         found = gather_stretches([record(make_group())], PAPER)

@@ -245,7 +245,7 @@ class TestGiveVerdicts:
     def test_a_request_that_is_being_carried_out_is_not_carried_out_twice(self, store, ids) -> None:
         verdict = check_verdict("deferred", None, None)
         first, second = (BatchRun(1, "", verdict, "ann") for _ in range(2))
-        with keyed_request().open():
+        with keyed_request().activate():
             with store.write() as session:
                 assert (first.resume(session), second.resume(session)) == (None, None)
             with store.write() as session:

@@ -42,10 +42,10 @@ class Told:
 
     def new(self) -> list[tuple[str, dict]]:
         self.at = max(self.at, datetime.now(UTC))
-        self.sender.look()
+        self.sender.queue_new_messages()
         self.sender.queue_stall_messages()
         self.at = max(self.at, datetime.now(UTC))
-        while self.sender.send():
+        while self.sender.send_due_messages():
             pass
         got, self._seen = self.receiver.got[self._seen :], len(self.receiver.got)
         # Messages are under way together: when it happened says in which order.
@@ -81,7 +81,7 @@ def judge(store: Store, group: int, state: str, actor: str) -> None:
 
 
 def annotate(store: Store, batch: int, person: str, moved: float) -> int:
-    copy = LeaseService(store).next(batch, BatchMember(person)).group
+    copy = LeaseService(store).lease_next_group(batch, BatchMember(person)).group
     assert copy is not None
     state = load_group_state(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)

@@ -144,7 +144,7 @@ class TestTelling:
         judge(allowed, state)
         sender.look()
         later = WebhookSender(allowed, clock)
-        assert (later.look(), later.send()) == (0, 1)
+        assert (later.queue_new_messages(), later.send_due_messages()) == (0, 1)
         assert receiver.kinds == [MessageKind.JUDGED]
 
     def test_a_server_sends_by_itself(self, allowed, receiver, hook, state) -> None:

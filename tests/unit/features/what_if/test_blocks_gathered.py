@@ -127,7 +127,7 @@ class TestInStep:
         """As when the log is replayed, which says everything anew: at the next change of any."""
         (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
         yields = YieldStore(store)
-        yields.snapshot(1).blocks[0].block.__dict__["groups"] = 2
+        yields.get_snapshot(1).blocks[0].block.__dict__["groups"] = 2
         submit_edit(
             store,
             group,
@@ -194,7 +194,7 @@ class TestAfterARestart:
             )
             get_yield(yields, 1)
         blocks = {path.stem for path in folder(store).glob("*.facts")}
-        named = {block.block.name for block in yields.snapshot(1).blocks}
+        named = {block.block.name for block in yields.get_snapshot(1).blocks}
         assert blocks == named - {""}
 
 
@@ -209,7 +209,7 @@ class TestHowFarItIs:
             OverloadedError,
             match="the yield is being counted: 0 groups are read, about 5 are left",
         ):
-            yields.snapshot(1)
+            yields.get_snapshot(1)
         for _ in range(int(SECONDS / 0.02)):
             try:
                 found = get_yield(yields, 1)

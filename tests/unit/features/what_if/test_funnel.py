@@ -121,13 +121,17 @@ class TestJudgeTable:
     @pytest.mark.parametrize("seed", range(SEEDS))
     def test_judges_as_solve_does(self, filled, solutions, seed: int) -> None:
         policy = random_policy(seed)
-        table = YieldStore(filled).snapshot(1).table
+        table = YieldStore(filled).get_snapshot(1).table
         judged = judge_table(table, policy)
         assert table.groups == len(solutions)
         for place, (group, old) in enumerate(solutions):
             solution = solved_again(group, old, policy)
             failing = solution.first_failing
-            name = None if judged.first[place] == PASSES else GATES[judged.first[place]]
+            name = (
+                None
+                if judged.first_failed_gate[place] == PASSES
+                else GATES[judged.first_failed_gate[place]]
+            )
             assert name == (failing.name if failing else None), (group.key, failing)
             if solution.ball is not None:
                 assert judged.point[place] == pytest.approx(solution.ball.point, abs=1e-9)
@@ -139,8 +143,10 @@ class TestJudgeTable:
     def test_the_policies_of_this_test_let_something_through_and_stop_something(
         self, filled
     ) -> None:
-        table = YieldStore(filled).snapshot(1).table
-        found = np.concatenate([judge_table(table, random_policy(n)).first for n in range(SEEDS)])
+        table = YieldStore(filled).get_snapshot(1).table
+        found = np.concatenate(
+            [judge_table(table, random_policy(n)).first_failed_gate for n in range(SEEDS)]
+        )
         # No picture of these was read.
         assert set(found.tolist()) == {*range(PASSES + 1)} - {GATES.index("agreement")}
 
@@ -155,10 +161,14 @@ class TestJudgeTable:
         )
         policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
         judged = judge_groups(table, policy, MeanCovariance(table))
-        assert GATES.index("agreement") in judged.first and judged.passes.any()
+        assert GATES.index("agreement") in judged.first_failed_gate and judged.passing_groups.any()
         for place, (group, old) in enumerate(painted):
             failing = solved_again(group, old, policy).first_failing
-            name = None if judged.first[place] == PASSES else GATES[judged.first[place]]
+            name = (
+                None
+                if judged.first_failed_gate[place] == PASSES
+                else GATES[judged.first_failed_gate[place]]
+            )
             assert name == (failing.name if failing else None), (group.key, failing)
 
     def test_without_a_threshold_agreement_changes_no_bit_of_what_is_solved(
@@ -175,7 +185,7 @@ class TestJudgeTable:
 
     def test_sigma_is_that_of_the_solution(self, filled, solutions) -> None:
         """The gate at the very value, a billionth to either side."""
-        table = YieldStore(filled).snapshot(1).table
+        table = YieldStore(filled).get_snapshot(1).table
         policy = replace(PAPER, click_sigma_px=2.0, box_sigma_share=0.1)
         for place, (group, old) in enumerate(solutions):
             ball = solved_again(group, old, policy).ball
@@ -183,11 +193,11 @@ class TestJudgeTable:
                 continue
             for factor, passes in ((1 + 1e-9, True), (1 - 1e-9, False)):
                 at = replace(policy, max_sigma_m=ball.sigma_m * factor)
-                assert judge_table(table, at).passes[place] == passes, group.key
+                assert judge_table(table, at).passing_groups[place] == passes, group.key
 
     def test_the_p_value_is_that_of_the_solution(self, filled, solutions) -> None:
         """The gate at the very value, a billionth to either side."""
-        table = YieldStore(filled).snapshot(1).table
+        table = YieldStore(filled).get_snapshot(1).table
         policy = replace(PAPER, click_sigma_px=0.5)
         tested = 0
         for place, (group, old) in enumerate(solutions):
@@ -197,11 +207,11 @@ class TestJudgeTable:
             tested += 1
             for factor, passes in ((1 - 1e-9, True), (1 + 1e-9, False)):
                 at = replace(policy, min_p_value=found.p_value * factor)
-                assert judge_table(table, at).passes[place] == passes, group.key
+                assert judge_table(table, at).passing_groups[place] == passes, group.key
         assert tested > 3
 
     def test_jac_is_that_of_the_calibrations(self, filled, solutions) -> None:
-        table = YieldStore(filled).snapshot(1).table
+        table = YieldStore(filled).get_snapshot(1).table
         for place, gamma in enumerate((0.5, 1.0, 2.0)):
             stored = [
                 view.calibration.jac[place] if view.calibration.jac else np.nan
@@ -359,19 +369,19 @@ class TestYieldStore:
     def test_a_new_policy_needs_no_solution_to_be_answered(self, store, fill, make_group) -> None:
         fill(make_group(7), make_group(8))
         yields = YieldStore(store)
-        before = yields.snapshot(1)
+        before = yields.get_snapshot(1)
         narrow = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=1e-6)
         change_policy(store, "demo", narrow, if_match=None, actor="ann")
         found = get_yield(yields, 1)
         assert (found.unsolved, found.passing) == (0, 0)
-        assert yields.snapshot(1).blocks[0].table is before.blocks[0].table
+        assert yields.get_snapshot(1).blocks[0].table is before.blocks[0].table
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
         change_policy(store, "demo", other, if_match=None, actor="ann")
         assert get_yield(yields, 1).unsolved == 2
 
     def test_nothing_is_read_again_while_nothing_changes(self, filled) -> None:
         yields = YieldStore(filled)
-        assert yields.snapshot(1) is yields.snapshot(1)
+        assert yields.get_snapshot(1) is yields.get_snapshot(1)
 
     def test_the_oldest_table_goes_when_memory_is_short(
         self, store, fill, make_group, monkeypatch
@@ -380,10 +390,10 @@ class TestYieldStore:
         import_groups(store, "other", [make_group(8)], source="test", actor="ann")
         solve_dataset(store, "other")
         yields = YieldStore(store)
-        first = yields.snapshot(get_dataset(store, "demo").id)
+        first = yields.get_snapshot(get_dataset(store, "demo").id)
         monkeypatch.setattr("app.features.what_if.service.MAX_BYTES", first.nbytes)
-        yields.snapshot(get_dataset(store, "other").id)
-        assert yields.snapshot(1) is not first
+        yields.get_snapshot(get_dataset(store, "other").id)
+        assert yields.get_snapshot(1) is not first
         assert np.array_equal(
-            yields.snapshot(1).table.facts.pair_moved, first.table.facts.pair_moved
+            yields.get_snapshot(1).table.facts.pair_moved, first.table.facts.pair_moved
         )

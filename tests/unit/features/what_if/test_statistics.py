@@ -88,29 +88,29 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
         step()
         if rng.random() < 0.3:
             held = StatisticsCache(store)
-        assert held.statistics(1) == read_statistics(store, 1), step.__name__
+        assert held.get_statistics(1) == read_statistics(store, 1), step.__name__
     # Another policy, and a group that came: nothing else is worth reading all.
     assert 1 <= len(looked) <= 1 + sum(step is move for step in steps) + 6
 
 
 def test_one_change_reads_one_group_also_after_a_restart(store, fill, make_group, looked) -> None:
     (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
-    StatisticsCache(store).statistics(1)
+    StatisticsCache(store).get_statistics(1)
     assert len(looked) == 1
     etag = load_group_state(store, group).etag
     submit_edit(store, group, set_ball("7.png", None), if_match=etag, actor="ann")
     give_verdicts(store, 1, "passes:no", "rejected", "other", "no ball", actor="ben")
-    assert StatisticsCache(store).statistics(1) == read_statistics(store, 1)
+    assert StatisticsCache(store).get_statistics(1) == read_statistics(store, 1)
     assert len(looked) == 1
 
 
 def test_what_the_cache_lost_or_got_wrong_is_read_anew(store, fill, make_group, looked) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
-    whole = StatisticsCache(store).statistics(1)
+    whole = StatisticsCache(store).get_statistics(1)
     good = file(store).read_bytes()
     for bad in (b"", good[:-70], good[:-40] + bytes([good[-40] ^ 1]) + good[-39:]):
         file(store).write_bytes(bad)
-        assert StatisticsCache(store).statistics(1) == whole
+        assert StatisticsCache(store).get_statistics(1) == whole
     assert len(looked) == 4
 
 
@@ -118,21 +118,21 @@ def test_a_file_of_another_database_is_not_used(
     store, fill, make_group, looked, monkeypatch
 ) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
-    StatisticsCache(store).statistics(1)
+    StatisticsCache(store).get_statistics(1)
     monkeypatch.setattr(kept, "read_entry_hash", lambda *_: "another")
-    StatisticsCache(store).statistics(1)
+    StatisticsCache(store).get_statistics(1)
     assert len(looked) == 2
 
 
 def test_there_is_nothing_of_a_dataset_that_is_not_there(store) -> None:
     with pytest.raises(NotFoundError):
-        StatisticsCache(store).statistics(99)
+        StatisticsCache(store).get_statistics(99)
 
 
 def test_groups_take_29_bytes_each(store, fill, make_group) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
     held = StatisticsCache(store)
-    held.statistics(1)
+    held.get_statistics(1)
     counted = held._kept[1].counted
     size = 8 + sum(getattr(counted, name)[..., :1].nbytes for name in kept._ARRAYS)
     assert size == 8 + 4 + 4 + 1 + 1 + 2 + 9
