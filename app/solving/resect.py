@@ -304,7 +304,7 @@ class ResectionProblem:
     def compute_noise_rows(
         self, parameters: FloatArray, observations: Observations
     ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-        """Residuals, Jacobian, marking and prior at a minimum as ``estimate_click_noise`` takes them.
+        """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
 
         Args:
             parameters: At the minimum, shape (8,).

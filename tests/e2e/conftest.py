@@ -17,11 +17,11 @@ from playwright.sync_api import (
     expect,
     sync_playwright,
 )
-from tests.e2e.lateness import make_late
 
 from tests.e2e.crew import CREW, Crew
 from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
+from tests.e2e.lateness import make_late
 from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
 from tests.e2e.team import join

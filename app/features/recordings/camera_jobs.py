@@ -35,7 +35,7 @@ def request_camera_tracking(
         actor: Who wants it.
 
     Raises:
-        NotFoundError, ConflictError, InputError: As ``camera_tracking.require_stretch``.
+        NotFoundError, ConflictError, InputError: As ``camera_tracking.require_trackable_stretch``.
     """
     recording = get_recording(store, recording_id)
     require_trackable_stretch(recording, first, last)
