@@ -25,7 +25,7 @@ from app.features.guidelines import routes as guidelines
 from app.features.imports import routes as imports
 from app.features.independent_annotations import routes as independent_annotations
 from app.features.jobs import routes as jobs
-from app.features.jobs.service import Pool
+from app.features.jobs.runner import Pool
 from app.features.maintenance import routes as maintenance
 from app.features.match_estimates import routes as match_estimates
 from app.features.notifications import routes as notifications

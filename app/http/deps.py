@@ -24,7 +24,8 @@ from app.features.exports.jobs import ExportFolder, resume_exports
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.groups.view_paint import PaintUpdater
 from app.features.imports.jobs import resume_imports
-from app.features.jobs.service import Jobs, Pool
+from app.features.jobs.runner import Pool
+from app.features.jobs.service import Jobs
 from app.features.jobs.shared import SharedJobs
 from app.features.maintenance.upkeep import UpkeepScheduler
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG
@@ -51,7 +52,7 @@ from app.http.access import (
     get_current_visibility_without_hidden,
 )
 from app.http.errors import PreconditionRequiredError
-from app.http.events import EventPublisher
+from app.http.event_stream import EventPublisher
 from app.json_text import MAX_ID
 from app.media.frames import FrameProvider
 from app.soccer.actors import LOCAL_USER, parse_script_name

@@ -12,7 +12,7 @@ from fastapi.responses import StreamingResponse
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import hides_groups_from_reader
 from app.http.deps import AppServices, SeesWhole, Services
-from app.http.events import EVENTS, EventListener, make_first_event
+from app.http.event_stream import EVENTS, EventListener, make_first_event
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.requests import is_head

@@ -22,7 +22,7 @@ from app.db.store import Store
 from app.errors import StorageError
 from app.features.maintenance.upkeep import HomeReport, read_home_report
 from app.http.deps import Services
-from app.http.events import ListenerCounts
+from app.http.event_stream import ListenerCounts
 from app.http.pages import ELSEWHERE
 from app.http.request_limits import RequestLimits
 from app.worker_process import COUNTS

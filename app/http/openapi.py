@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from starlette.responses import JSONResponse
 
 from app.http.cookies import SESSION
-from app.http.events import EVENTS
+from app.http.event_stream import EVENTS
 from app.http.permissions import Action, RoleScope, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES

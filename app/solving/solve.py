@@ -48,7 +48,7 @@ from app.solving.findings import (
     make_misses_ball_finding,
     make_view_disagrees_finding,
 )
-from app.solving.gates import JudgedView, describe_gates, make_reprojection_gate
+from app.solving.gate_sentences import JudgedView, describe_gates, make_reprojection_gate
 from app.solving.judgement import (
     PASSES,
     Judgement,

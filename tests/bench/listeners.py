@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 import httpx
 import numpy as np
 
-from app.http.events import PAUSE
+from app.http.event_stream import PAUSE
 from tests.bench.requests import Group, Served, sample_served
 from tests.bench.table import print_table
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from pydantic_core import PydanticUndefined
 
 from app.config import Settings
-from app.soccer.policy import STRICT, THRESHOLDS, Threshold
+from app.soccer.policy import STRICT
+from app.soccer.thresholds import THRESHOLDS, Threshold
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS_PAGE = ROOT / "docs" / "settings.md"

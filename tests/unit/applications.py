@@ -17,7 +17,7 @@ from starlette.types import ASGIApp
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
-from app.features.jobs import runner as job_run
+from app.features.jobs import job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
 from app.http.deps import Services

@@ -193,7 +193,7 @@ def import_(
 
 def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
-    from app.features.jobs.runner import describe_result
+    from app.features.jobs.result_sentences import describe_result
     from app.features.paint.proposals import propose_views
 
     with open_store(settings) as store, show_progress("Proposing cameras") as progress:

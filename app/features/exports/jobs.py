@@ -23,8 +23,8 @@ from app.durable import PARTIAL, replace_file
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import get_dataset_head
 from app.features.exports.service import ExportReport, export_dataset, require_exportable
+from app.features.jobs.job_run import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.jobs.queries import EXPORT, Job
-from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.export_formats import describe_missing_content
 from app.formats.file_tree import Root

@@ -17,8 +17,8 @@ from app.features.datasets.service import get_dataset_head, require_valid_name
 from app.features.imports.sources import FORMATS, ImportSource, import_source
 from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
 from app.features.imports.uploads import resolve_folder
+from app.features.jobs.job_run import FailedWithReportError, JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import FailedWithReportError, JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS

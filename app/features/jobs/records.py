@@ -11,6 +11,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
 from app.features.audit.service import add_audit_event
+from app.features.jobs.job_run import JobRun
 from app.features.jobs.queries import DONE as DONE
 from app.features.jobs.queries import (
     FAILED,
@@ -22,7 +23,6 @@ from app.features.jobs.queries import (
     update_job,
 )
 from app.features.jobs.queries import Job as Job
-from app.features.jobs.runner import JobRun
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify_person
 from app.features.people.visibility_queries import EVERYTHING, Visibility

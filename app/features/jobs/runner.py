@@ -1,467 +1,276 @@
-"""The work of one job, in this process or one of its own, and the sentence with which it ends.
+"""Job runner: runs jobs beside the requests, one after the other, each with progress and a record.
 
-It tells how far it is, how it ended and what it says then.
+One runs at a time, and beside it one that only reads (``BESIDE``) where no earlier job of its dataset
+is left. Those who wait have their turns person by person.
+
+The record of a job is a row of the database; the work itself is a function of this process. A
+server that stops leaves its jobs where they are, and the next one takes up again those whose kind
+knows how (``JobRunner.register_resume``) and marks the others failed.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from time import monotonic
+from typing import Any
 
 import structlog
 
-from app.db.database_worker import (
-    ignore_question,
-    make_stop_with_grace_period,
-    run_in_this_thread,
-    run_in_worker,
-)
-from app.db.json_columns import Json
+from app.db.session import now
 from app.db.store import Store
-from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
-from app.features.datasets.queries import has_more_groups
-from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
-from app.formats.export_formats import describe_missing_content
-from app.progress import ReportProgress
-from app.wording import format_named_count, plural
-from app.worker_process import EndReason, WorkerEnded
+from app.errors import StorageError
+from app.features.jobs.job_run import JobProgress, JobRun, RunQueue, Work
+from app.features.jobs.queries import (
+    FAILED,
+    OPEN,
+    RUNNING,
+    WAITING,
+    Job,
+    delete_oldest_jobs,
+    read_jobs,
+    update_job,
+)
+from app.features.jobs.records import JobRecords
 
 log = structlog.get_logger("touchline.jobs")
 
-Work = Callable[["JobProgress"], Json]
-"""What a job does; returns its result. It must be safe to start again from the beginning."""
-Result = TypeVar("Result")
+CLOSE_SECONDS = 10.0
+"""How long a server that stops waits for the running job's next step."""
+BESIDE = frozenset({"export"})
+"""Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
+PROMPT = frozenset({"solve"})
+"""Kinds that go before the others: somebody looks at the numbers and waits."""
+KEPT = {"solve": 200, "bulk": 200, "verify": 200}
+"""How many finished jobs of a kind are remembered; kinds that are not named keep all."""
 
-SMALL = 100
-"""Work on a dataset of at most so many groups is done here: to start a process takes longer."""
-STOP_SECONDS = 2.0
-"""A server may be told to stop so long after its worker processes."""
-_AGAIN = "Start it again."
-_MEMORY = f"{_AGAIN} Where it happens often, give more memory."
-_ENDS: dict[EndReason, tuple[str, str]] = {
-    "memory": ("needs more memory than the machine has free", _MEMORY),
-    "killed": ("was killed, most likely because the machine ran out of memory", _MEMORY),
-    "terminated": ("was stopped", _AGAIN),
-    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
-    "processor": ("took too much processor time", _AGAIN),
-    "silence": ("made no progress for too long", f"{_AGAIN} The disk or a store may not answer."),
-}
-"""How a process ended, and what to do about it."""
+MOST_TRIES = 2
+"""So many times a server may die at a job before it is left alone."""
+
+Pool = Callable[[], AbstractContextManager[Executor | None]]
+"""Makes an executor for the length of one large job, so that requests keep their processor;
+``nullcontext`` makes none, and the work stays in this process."""
 
 
-class FailedWithReportError(ReviewError):
-    """A job that failed, and what it has to tell all the same.
-
-    Args:
-        message: One sentence that says what is wrong.
-        hint: What to do about it.
-        result: The job's result.
-    """
-
-    def __init__(self, message: str, hint: str | None, result: Json):
-        super().__init__(message, hint=hint)
-        self.result = result
-
-
-def report_counts_in_words(progress: JobProgress, what: str) -> ReportProgress:
-    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
-
-    Where the work says a sentence, it is that one.
-    """
-
-    def report_counts(done: int, total: int | None = None, sentence: str = "") -> None:
-        of = "" if total is None else f" of {total:,}"
-        progress(done, total, sentence or f"{done:,}{of} {what}")
-
-    return report_counts
-
-
-class JobProgress:
-    """How far a job is; its work calls it often, and it costs next to nothing.
+class JobRunner(JobRecords):
+    """Runs the jobs of one server on threads beside the requests.
 
     Attributes:
-        job: The job as it was when it was asked for, or taken up: its ``request`` above all, which is
-            all that its work needs to know.
+        pool: For work that is worth processes of its own; without one it stays in this process.
     """
 
-    def __init__(self, job: Job, closing: threading.Event):
-        self.job = job
-        self.place: tuple[int, int | None, str] = (0, None, "")
-        self.cancelled = threading.Event()
-        self._closing = closing
+    def __init__(self, store: Store, pool: Pool = nullcontext):
+        super().__init__(store)
+        self.pool = pool
+        # Replaced as a whole and only under ``_changed``, so that it is read without.
+        self._queue = RunQueue()
+        self._entering = 0
+        # Never held while the database is asked: requests and the event loop wait for it.
+        self._changed = threading.Condition()
+        self._closing = threading.Event()
+        self._workers: list[threading.Thread] = []
+        self._turns: dict[str, int] = {}
+        """When each person had a turn last, by the number of the turn."""
+        self._resumers: dict[str, Work] = {}
+        self._beginners: list[Callable[[], None]] = []
 
-    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
-        """Note how much is done; what is not said stays as it was.
+    def register_resume(self, kind: str, work: Work) -> None:
+        """Start jobs of a kind again after a restart; to be told before ``start``.
 
-        Raises:
-            JobCancelled: The work shall end here.
+        Args:
+            kind: The kind.
+            work: Finds what it is asked for in the job's record (``progress.job.request``).
         """
-        _, last_total, last_sentence = self.place
-        self.place = (done, last_total if total is None else total, sentence or last_sentence)
-        self.check()
+        self._resumers[kind] = work
 
-    @property
-    def job_id(self) -> int:
-        """The job's id, for what its work writes under that name."""
-        return self.job.id
+    def register_work(self, kind: str, work: Work) -> None:
+        """How the work of a kind is done where a process carries out what another one was asked for;
+        it is not begun again after a death."""
 
-    @property
-    def dataset_id(self) -> int:
-        """The job's dataset; 0, which none is, where it has none."""
-        return self.job.dataset_id or 0
+    def is_leader(self) -> bool:
+        """Whether this process carries out jobs and what else is one process's."""
+        return True
 
-    def require_not_cancelled(self) -> None:
-        """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
-        if self.cancelled.is_set():
-            raise JobCancelled
+    def call_on_leadership(self, begin: Callable[[], None]) -> None:
+        """Call a function once this process leads, on whichever thread finds that out."""
+        self._beginners.append(begin)
 
-    def wait_and_check(self, seconds: float) -> None:
-        """``check``, once the server stops or this time is over."""
-        self._closing.wait(seconds)
-        self.check()
+    def start(self) -> None:
+        """Take up what an earlier server left behind, or say that it is lost; then lead."""
+        self._take_over_open_jobs()
+        for begin in self._beginners:
+            begin()
 
-    def check(self) -> None:
-        """Raise ``JobCancelled`` where the work shall end here."""
-        if self.cancelled.is_set() or self._closing.is_set():
-            raise JobCancelled
+    def _take_over_open_jobs(self) -> None:
+        with self._store.write() as session:
+            for kind, keep in KEPT.items():
+                delete_oldest_jobs(session, kind, keep)
+            left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
+            for job in left:
+                update_job(session, job.id, **self._build_recovered_columns(job))
+        with self._changed:
+            resumed = [self._make_resumed_run(job) for job in left if self._is_resumable(job)]
+            self._queue = self._queue.with_waiting_runs(*resumed)
+            self._start_workers()
 
+    def is_idle(self) -> bool:
+        """Whether none waits or runs."""
+        return not self._queue.all_runs
 
-@dataclass(eq=False)
-class JobRun:
-    """A job of this process that waits or runs."""
+    def stop(self) -> None:
+        """Tell the jobs that run to stop after their next step; none begins any more."""
+        with self._changed:
+            self._closing.set()
+            self._changed.notify_all()
 
-    work: Work
-    progress: JobProgress
-    over: threading.Event = field(default_factory=threading.Event)
-    counted: bool = False
-    """Whether its record says that it was begun here."""
+    def close(self, seconds: float = CLOSE_SECONDS) -> None:
+        """Stop, and wait so long for it; the records of the jobs say where they were.
 
-    @property
-    def job(self) -> Job:
-        """The job."""
-        return self.progress.job
+        A job that takes no step for long is left to itself.
+        """
+        self.stop()
+        until = monotonic() + seconds
+        for worker in self._workers:
+            worker.join(max(until - monotonic(), 0.0))
+        if any(worker.is_alive() for worker in self._workers):
+            for run in self._queue.running:
+                log.warning("a job did not end in time", job=run.job.id)
+                self._undo_start_count(run)
 
-    @property
-    def columns(self) -> dict[str, Any]:
-        """How far it is, as columns of its record."""
-        return dict(zip(("done", "total", "sentence"), self.progress.place, strict=True))
+    @contextmanager
+    def _hold_start_until_recorded(self) -> Iterator[Callable[[JobRun], None]]:
+        """Lets a job in while its record is written; none begins before that is kept.
 
-    def run_to_end(self) -> dict[str, Any] | None:
-        """Do the work; how it ended, as columns. None where the server stops and the next one
-        decides."""
+        What is let in is out again where the record could not be written.
+        """
+        entered: list[JobRun] = []
+
+        def enqueue_run(run: JobRun) -> None:
+            with self._changed:
+                entered.append(run)
+                self._queue = self._queue.with_waiting_runs(run)
+
+        with self._changed:
+            self._entering += 1
         try:
-            self.progress.require_not_cancelled()
-            with structlog.contextvars.bound_contextvars(job=self.job.id):
-                result = self.work(self.progress)
-            sentence = describe_result(self.job.kind, result)
-            return {
-                "state": DONE,
-                "result": result,
-                **({} if sentence is None else {"sentence": sentence}),
-            }
-        except JobCancelled:
-            if not self.progress.cancelled.is_set():
+            yield enqueue_run
+        except BaseException:
+            with self._changed:
+                for run in entered:
+                    self._queue = self._queue.without_run(run)
+            raise
+        finally:
+            with self._changed:
+                self._entering -= 1
+                self._start_workers()
+
+    def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
+        """What an earlier server's job becomes."""
+        if self._is_resumable(job):
+            return {"state": WAITING, "started": None, "sentence": "Started again."}
+        sentence = "The server stopped before this was done. Start it again."
+        if job.kind in self._resumers:
+            sentence = (
+                f"The server crashed {job.tries} times during this job, so it is not started again."
+            )
+        problem = {"detail": sentence, "hint": None, "pointer": None}
+        return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
+
+    def _is_resumable(self, job: Job) -> bool:
+        return job.kind in self._resumers and job.tries < MOST_TRIES
+
+    def _make_resumed_run(self, job: Job) -> JobRun:
+        return JobRun(self._resumers[job.kind], JobProgress(job, self._closing))
+
+    def _start_workers(self) -> None:
+        if not self._workers and self._queue.waiting:
+            for ready in (
+                lambda: self._queue.ready_runs,
+                lambda: self._queue.list_independent_ready_runs(BESIDE),
+            ):
+                # Daemons: a job that does not come to its next step must not hold the process.
+                worker = threading.Thread(
+                    target=self._run_ready_jobs, args=(ready,), name="jobs", daemon=True
+                )
+                self._workers.append(worker)
+                worker.start()
+        self._changed.notify_all()
+
+    def _run_ready_jobs(self, ready: Callable[[], list[JobRun]]) -> None:
+        while (run := self._wait_for_next_run(ready)) is not None:
+            try:
+                self._execute_run(run)
+            except Exception:
+                log.exception("the record of a job could not be written", job=run.job.id)
+            finally:
+                with self._changed:
+                    self._queue = self._queue.without_run(run)
+                    # What was of its dataset may run beside another now.
+                    self._changed.notify_all()
+                run.over.set()
+
+    def _wait_for_next_run(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
+        """The next job to run, of those that may; None when the server stops."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._closing.is_set() or (not self._entering and ready())
+            )
+            if self._closing.is_set():
                 return None
-            return {"state": CANCELLED, "sentence": "Cancelled."}
-        except FailedWithReportError as error:
-            return {**_failure_columns(error.message, error.hint), "result": error.result}
-        except ReviewError as error:
-            return _failure_columns(error.message, error.hint, error.pointer)
-        except Exception:
-            log.exception("job failed", job=self.job.id, kind=self.job.kind)
-            return _failure_columns(
-                "something went wrong inside the server",
-                f"The server's log names job {self.job.id}.",
-            )
+            run = min(ready(), key=self._priority)
+            self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
+            self._queue = self._queue.with_started_run(run)
+            return run
 
+    def _priority(self, run: JobRun) -> tuple[bool, int, int]:
+        """Its place among those that may run: the smallest is the next."""
+        return run.job.kind not in PROMPT, self._turns.get(run.job.actor, 0), run.job.id
 
-def _failure_columns(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
-    problem = {"detail": detail, "hint": hint, "pointer": pointer}
-    return {"state": FAILED, "sentence": detail, "problem": problem}
-
-
-@dataclass(frozen=True)
-class RunQueue:
-    """Which jobs of this process wait, and which run."""
-
-    waiting: tuple[JobRun, ...] = ()
-    running: tuple[JobRun, ...] = ()
-
-    @property
-    def all_runs(self) -> tuple[JobRun, ...]:
-        """Those that wait and those that run."""
-        return (*self.waiting, *self.running)
-
-    @property
-    def ready_runs(self) -> list[JobRun]:
-        """Those that wait, and for nothing of their own dataset that runs."""
-        taken = {run.job.dataset_id for run in self.running} - {None}
-        return [run for run in self.waiting if run.job.dataset_id not in taken]
-
-    def list_independent_ready_runs(self, kinds: Collection[str]) -> list[JobRun]:
-        """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
-        first: dict[int | None, int] = {}
-        for run in self.waiting:
-            first[run.job.dataset_id] = min(run.job.id, first.get(run.job.dataset_id, run.job.id))
-        return [
-            run
-            for run in self.ready_runs
-            if run.job.kind in kinds
-            and (run.job.dataset_id is None or run.job.id == first[run.job.dataset_id])
-        ]
-
-    def find_running(self, job_id: int) -> JobRun | None:
-        """The run of a job, where it runs."""
-        return next((run for run in self.running if run.job.id == job_id), None)
-
-    def with_waiting_runs(self, *runs: JobRun) -> RunQueue:
-        """With more that wait."""
-        return replace(self, waiting=(*self.waiting, *runs))
-
-    def with_started_run(self, run: JobRun) -> RunQueue:
-        """With one running that waited."""
-        left = self.without_run(run)
-        return replace(left, running=(*left.running, run))
-
-    def without_run(self, run: JobRun) -> RunQueue:
-        """Without one that waits or runs."""
-        waiting, running = (
-            tuple(item for item in items if item is not run)
-            for items in (self.waiting, self.running)
+    def _execute_run(self, run: JobRun) -> None:
+        if not self._record_start(run):
+            return
+        run.counted = True
+        ended = threading.Event()
+        ticker = threading.Thread(
+            target=self._save_progress_until_ended, args=(run, ended), daemon=True
         )
-        return RunQueue(waiting, running)
+        ticker.start()
+        try:
+            values = run.run_to_end()
+        finally:
+            ended.set()
+            ticker.join()
+        if values is not None:
+            self._record_end(run, **values)
+        else:
+            self._undo_start_count(run)
 
+    def _record_start(self, run: JobRun) -> bool:
+        """Write that a job is begun; False where it shall not be."""
+        self._save_columns(run.job.id, state=RUNNING, started=now(), begun=1)
+        return True
 
-def run_job_in_worker(
-    store: Store,
-    kind: str,
-    what: str,
-    work: Callable[..., Result],
-    *arguments: Any,
-    dataset_id: int | None,
-    progress: JobProgress,
-    report: ReportProgress | None = None,
-    answer: Callable[[Any], Any] = ignore_question,
-) -> Result:
-    """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).
+    def _undo_start_count(self, run: JobRun) -> None:
+        """Let a server that stops in good order count for no death: it is none of this job's doing."""
+        with self._changed:
+            counted, run.counted = run.counted, False
+        if counted:
+            with suppress(StorageError):
+                self._save_columns(run.job.id, begun=-1)
 
-    Args:
-        store: The database.
-        kind: What is done; see ``worker_process.KINDS``.
-        what: The same in a sentence.
-        work: A function of a module.
-        arguments: Its arguments between the database and the caller.
-        dataset_id: What it works on; where that is small, it is done here. None: never here.
-        progress: Of the job; the work ends when the job is cancelled.
-        report: Receives the progress of the work; None: the job's progress itself.
-        answer: Answers the work's questions.
-
-    Raises:
-        OverloadedError: The process did not come to its end, or could not be started.
-        ReviewError: As the work raised it.
-    """
-    report = report or progress
-    if dataset_id is not None and _is_small_dataset(store, dataset_id):
-        return run_in_this_thread(store, work, *arguments, progress=report, answer=answer)
-    stop = make_stop_with_grace_period(progress.check)
-    try:
-        with leave_work_to_next_server(progress):
-            return run_in_worker(
-                store, kind, work, *arguments, progress=report, stop=stop, answer=answer
-            )
-    except WorkerEnded as error:
-        ended, hint = _ENDS[error.reason]
-        raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
-
-
-@contextmanager
-def leave_work_to_next_server(progress: JobProgress) -> Iterator[None]:
-    """Let the next server go on where a process ended because this server is about to stop.
-
-    A service manager may end the processes of a service first.
-    """
-    try:
-        yield
-    except (WorkerEnded, OverloadedError, TooLargeError):
-        progress.wait_and_check(STOP_SECONDS)
-        raise
-
-
-def _is_small_dataset(store: Store, dataset_id: int) -> bool:
-    with store.read() as session:
-        return not has_more_groups(session, dataset_id, SMALL)
-
-
-def describe_result(kind: str, result: Json) -> str | None:
-    """The sentence of a job that is done; None where its result says nothing that is known here."""
-    tell = _ENDINGS.get(kind)
-    try:
-        return None if tell is None else tell(result)
-    except (AttributeError, KeyError, TypeError):
-        # The work is done, whatever can be said of it.
-        return None
-
-
-def _describe_solving(result: Json) -> str:
-    pitches = _describe_pitch_estimates(result)
-    if not result["solved"] and not result["failed"]:
-        return pitches or "Nothing was left to solve."
-    passed, rest = result["passed"], result["solved"] - result["passed"]
-    gates = ", ".join(f"{gate} {count:,}" for gate, count in result.get("failing", {}).items())
-    why = f" (first failing gate: {gates})" if gates else ""
-    return (
-        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not{why}; "
-        f"{plural(result['failed'], 'error')}."
-        + (f" {pitches}" if pitches else "")
-        + (f" {advice}" if (advice := result.get("advice")) else "")
-    )
-
-
-def _describe_pitch_estimates(result: Json) -> str:
-    """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
-    if not result.get("estimated"):
-        return ""
-    matches = plural(result["estimated"], "match", "matches")
-    proposed = plural(result["proposed"], "match", "matches")
-    found = (
-        f"another size is proposed for {proposed}"
-        if result["proposed"]
-        else "no other size is proposed"
-    )
-    return f"The pitch of {matches} was estimated: {found}."
-
-
-def _describe_import(result: Json) -> str:
-    counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
-    would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
-    counted_groups = ", ".join(f"{count:,} {name}" for name, count in counts.items())
-    left = len(result.get("skipped", ())) + result.get("more_skipped", 0)
-    more = f"; {plural(left, 'record')} left out" if left else ""
-    return f"{plural(sum(counts.values()), 'group')} read: {counted_groups}{more}{would}."
-
-
-def _describe_export(result: Json) -> str:
-    counts = result["counts"]
-    written = ", ".join(format_named_count(count, name) for name, count in counts.items())
-    missing = describe_missing_content(result.get("format", ""), counts)
-    return f"Written: {written}." + ("" if missing is None else f" {missing}.")
-
-
-def _describe_version(result: Json) -> str:
-    return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
-
-
-def _describe_verification(result: Json) -> str:
-    return str(result["sentence"])
-
-
-def _describe_evaluation(result: Json) -> str:
-    return f"Evaluation {result['name']} is ready."
-
-
-def _describe_acceptance(result: Json) -> str:
-    refused = sum(result["refused"].values())
-    more = f"; {plural(refused, 'view')} refused" if refused else ""
-    groups = plural(result["groups"], "group")
-    return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
-
-
-def _describe_practice(result: Json) -> str:
-    groups = plural(result["groups"], "practice group")
-    return f"{groups} made." if result["made"] else f"The {groups} already exist."
-
-
-def _describe_rig_adjustment(result: Json) -> str:
-    cameras = plural(len(result["cameras"]), "camera")
-    if result["accepted"] is None:
-        return f"An adjustment of {cameras} is proposed."
-    return f"The adjustment of {cameras} was accepted ({result['accepted']})."
-
-
-def _describe_shared_positions(result: Json) -> str:
-    shared, matches = result["shared"], plural(result["matches"], "match", "matches")
-    return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
-
-
-def _describe_paint_reading(result: Json) -> str:
-    return f"The paint of {plural(result['read'], 'picture')} was read."
-
-
-def _describe_line_proposals(result: Json) -> str:
-    looked = result["proposed"] + result["unsure"] + result["nothing"]
-    return (
-        f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
-        f"{result['unsure']:,} unsure, {result['nothing']:,} without a proposal."
-    )
-
-
-def _describe_picture_estimates(result: Json) -> str:
-    items = result["items"]
-    proposed = sum(item["proposed"] is not None for item in items)
-    matches = plural(len(items), "match", "matches")
-    return f"{matches} estimated, {proposed:,} with a proposal."
-
-
-def _describe_recording_index(result: Json) -> str:
-    shots, frames = plural(result["shots"], "shot"), plural(result["frames"], "frame")
-    return f"{result['name']} has {frames} in {shots}."
-
-
-def _describe_instants(result: Json) -> str:
-    there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
-    changed, views, outside = (
-        result.get(name, 0) for name in ("changed", "linked_views", "outside")
-    )
-    if changed:
-        there += f"; {plural(changed, 'group')} got views of replays"
-    if views or outside:
-        there += f"; {plural(views, 'view')} of linked replays added, {outside:,} missing"
-    return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
-
-
-def _describe_ball_search(result: Json) -> str:
-    there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
-    count = len(result["without"])
-    without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
-    stretches = plural(result["made"], "stretch", "stretches")
-    return f"The ball was tracked over {stretches}{there}{without}."
-
-
-def _describe_camera_tracking(result: Json) -> str:
-    counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
-    given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
-    return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
-
-
-def _describe_link(result: Json) -> str:
-    live, replay = result["rays"]
-    seen = f"{live:,} rays of the live shot, {replay:,} of the replay"
-    left = f", {result['left_out']:,} left out" if result["left_out"] else ""
-    told = "The times were found" if result["reason"] is None else result["reason"].rstrip(".")
-    return f"{told} ({seen}{left})."
-
-
-_ENDINGS: Mapping[str, Callable[[Json], str]] = {
-    "solve": _describe_solving,
-    "import": _describe_import,
-    "export": _describe_export,
-    "freeze": _describe_version,
-    "verify": _describe_verification,
-    "evaluate": _describe_evaluation,
-    "bulk": _describe_acceptance,
-    "practice": _describe_practice,
-    "rig": _describe_rig_adjustment,
-    "positions": _describe_shared_positions,
-    "paint": _describe_paint_reading,
-    "proposals": _describe_line_proposals,
-    "pictures": _describe_picture_estimates,
-    "recording": _describe_recording_index,
-    "instants": _describe_instants,
-    "ball": _describe_ball_search,
-    "track": _describe_camera_tracking,
-    "link": _describe_link,
-}
-"""By the kind of the job."""
+    def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
+        place, job = run.columns, None
+        # Where the disk is full for a moment, the record waits for it.
+        for _ in range(5):
+            try:
+                job = self._save_end(run.job.id, by, **{**place, "ended": now(), **values})
+            except StorageError as error:
+                log.warning("the record of a job could not be written", error=str(error))
+                self._closing.wait(1.0)
+            else:
+                break
+        run.over.set()
+        return job

@@ -1,130 +1,41 @@
-"""Jobs: work that outlasts a request, with progress, cancel and a record.
-
-One runs at a time, and beside it one that only reads (``BESIDE``) where no earlier job of its dataset
-is left. Those who wait have their turns person by person.
-
-The record of a job is a row of the database; the work itself is a function of this process. A
-server that stops leaves its jobs where they are, and the next one takes up again those whose kind
-knows how (``Jobs.register_resume``) and marks the others failed.
-"""
+"""Jobs: work that outlasts a request is asked for, waited for and cancelled; ``runner`` runs it."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from collections.abc import Collection, Iterable
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import replace
-from time import monotonic
-from typing import Any
-
-import structlog
 
 from app.db.json_columns import Json
-from app.db.session import Session, now
+from app.db.session import Session
 from app.db.store import Store
-from app.errors import ConflictError, NotFoundError, OverloadedError, StorageError
+from app.errors import ConflictError, NotFoundError, OverloadedError
 from app.features.audit.service import log_job_request
+from app.features.jobs.job_run import JobProgress, JobRun, Work
 from app.features.jobs.queries import (
     CANCELLED,
     DONE,
     FAILED,
-    OPEN,
-    RUNNING,
-    WAITING,
     Job,
     NewJob,
-    delete_oldest_jobs,
     insert_job,
-    read_jobs,
-    update_job,
 )
-from app.features.jobs.records import JobRecords, Then, record_cancellation, require_job
-from app.features.jobs.runner import JobProgress, JobRun, RunQueue, Work
-
-log = structlog.get_logger("touchline.jobs")
+from app.features.jobs.records import Then, record_cancellation, require_job
+from app.features.jobs.runner import CLOSE_SECONDS, JobRunner, Pool
 
 CAPACITY = 32
 """Jobs that may wait; one more is told to come back."""
-CLOSE_SECONDS = 10.0
-WAIT_FOR_JOB = "Wait until it ends (page Jobs), then try again."
-"""How long a server that stops waits for the running job's next step."""
 LEFT_TO_OTHERS = 4
 """One person leaves this part of the waiting places (one of so many) to others."""
-BESIDE = frozenset({"export"})
-"""Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
-PROMPT = frozenset({"solve"})
-"""Kinds that go before the others: somebody looks at the numbers and waits."""
-KEPT = {"solve": 200, "bulk": 200, "verify": 200}
-"""How many finished jobs of a kind are remembered; kinds that are not named keep all."""
-
-MOST_TRIES = 2
-"""So many times a server may die at a job before it is left alone."""
-
-Pool = Callable[[], AbstractContextManager[Executor | None]]
-"""Makes an executor for the length of one large job, so that requests keep their processor;
-``nullcontext`` makes none, and the work stays in this process."""
+WAIT_FOR_JOB = "Wait until it ends (page Jobs), then try again."
 
 
-class Jobs(JobRecords):
-    """The jobs of one server: a worker beside the requests, and who wants to hear of them.
-
-    ``pool`` is for work that is worth processes of its own; without one it stays in this process.
-    """
+class Jobs(JobRunner):
+    """The jobs of one server, as other features ask for them."""
 
     def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool = nullcontext):
-        super().__init__(store)
-        self._capacity, self.pool = capacity, pool
-        # Replaced as a whole and only under ``_changed``, so that it is read without.
-        self._queue = RunQueue()
-        self._entering = 0
-        # Never held while the database is asked: requests and the event loop wait for it.
-        self._changed = threading.Condition()
-        self._closing = threading.Event()
-        self._workers: list[threading.Thread] = []
-        self._turns: dict[str, int] = {}
-        """When each person had a turn last, by the number of the turn."""
-        self._resumers: dict[str, Work] = {}
-        self._beginners: list[Callable[[], None]] = []
-
-    def register_resume(self, kind: str, work: Work) -> None:
-        """Start jobs of a kind again after a restart; to be told before ``start``.
-
-        Args:
-            kind: The kind.
-            work: Finds what it is asked for in the job's record (``progress.job.request``).
-        """
-        self._resumers[kind] = work
-
-    def register_work(self, kind: str, work: Work) -> None:
-        """How the work of a kind is done where a process carries out what another one was asked for;
-        it is not begun again after a death."""
-
-    def is_leader(self) -> bool:
-        """Whether this process carries out jobs and what else is one process's."""
-        return True
-
-    def call_on_leadership(self, begin: Callable[[], None]) -> None:
-        """Call a function once this process leads, on whichever thread finds that out."""
-        self._beginners.append(begin)
-
-    def start(self) -> None:
-        """Take up what an earlier server left behind, or say that it is lost; then lead."""
-        self._take_over_open_jobs()
-        for begin in self._beginners:
-            begin()
-
-    def _take_over_open_jobs(self) -> None:
-        with self._store.write() as session:
-            for kind, keep in KEPT.items():
-                delete_oldest_jobs(session, kind, keep)
-            left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
-            for job in left:
-                update_job(session, job.id, **self._build_recovered_columns(job))
-        with self._changed:
-            resumed = [self._make_resumed_run(job) for job in left if self._is_resumable(job)]
-            self._queue = self._queue.with_waiting_runs(*resumed)
-            self._start_workers()
+        super().__init__(store, pool)
+        self._capacity = capacity
 
     def submit(
         self,
@@ -270,30 +181,6 @@ class Jobs(JobRecords):
         """Whether a job of a kind waits or runs here; waits for nothing."""
         return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.all_runs)
 
-    def is_idle(self) -> bool:
-        """Whether none waits or runs."""
-        return not self._queue.all_runs
-
-    def stop(self) -> None:
-        """Tell the jobs that run to stop after their next step; none begins any more."""
-        with self._changed:
-            self._closing.set()
-            self._changed.notify_all()
-
-    def close(self, seconds: float = CLOSE_SECONDS) -> None:
-        """Stop, and wait so long for it; the records of the jobs say where they were.
-
-        A job that takes no step for long is left to itself.
-        """
-        self.stop()
-        until = monotonic() + seconds
-        for worker in self._workers:
-            worker.join(max(until - monotonic(), 0.0))
-        if any(worker.is_alive() for worker in self._workers):
-            for run in self._queue.running:
-                log.warning("a job did not end in time", job=run.job.id)
-                self._undo_start_count(run)
-
     def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
         place = (new.kind, new.dataset_id)
@@ -320,139 +207,3 @@ class Jobs(JobRecords):
     def _list_actors_of_waiting_jobs(self, _session: Session) -> list[str]:
         """Who asked for each job that waits."""
         return [run.job.actor for run in self._queue.waiting]
-
-    @contextmanager
-    def _hold_start_until_recorded(self) -> Iterator[Callable[[JobRun], None]]:
-        """Lets a job in while its record is written; none begins before that is kept.
-
-        What is let in is out again where the record could not be written.
-        """
-        entered: list[JobRun] = []
-
-        def enqueue_run(run: JobRun) -> None:
-            with self._changed:
-                entered.append(run)
-                self._queue = self._queue.with_waiting_runs(run)
-
-        with self._changed:
-            self._entering += 1
-        try:
-            yield enqueue_run
-        except BaseException:
-            with self._changed:
-                for run in entered:
-                    self._queue = self._queue.without_run(run)
-            raise
-        finally:
-            with self._changed:
-                self._entering -= 1
-                self._start_workers()
-
-    def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
-        """What an earlier server's job becomes."""
-        if self._is_resumable(job):
-            return {"state": WAITING, "started": None, "sentence": "Started again."}
-        sentence = "The server stopped before this was done. Start it again."
-        if job.kind in self._resumers:
-            sentence = (
-                f"The server crashed {job.tries} times during this job, so it is not started again."
-            )
-        problem = {"detail": sentence, "hint": None, "pointer": None}
-        return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
-
-    def _is_resumable(self, job: Job) -> bool:
-        return job.kind in self._resumers and job.tries < MOST_TRIES
-
-    def _make_resumed_run(self, job: Job) -> JobRun:
-        return JobRun(self._resumers[job.kind], JobProgress(job, self._closing))
-
-    def _start_workers(self) -> None:
-        if not self._workers and self._queue.waiting:
-            for ready in (
-                lambda: self._queue.ready_runs,
-                lambda: self._queue.list_independent_ready_runs(BESIDE),
-            ):
-                # Daemons: a job that does not come to its next step must not hold the process.
-                worker = threading.Thread(
-                    target=self._run_ready_jobs, args=(ready,), name="jobs", daemon=True
-                )
-                self._workers.append(worker)
-                worker.start()
-        self._changed.notify_all()
-
-    def _run_ready_jobs(self, ready: Callable[[], list[JobRun]]) -> None:
-        while (run := self._wait_for_next_run(ready)) is not None:
-            try:
-                self._execute_run(run)
-            except Exception:
-                log.exception("the record of a job could not be written", job=run.job.id)
-            finally:
-                with self._changed:
-                    self._queue = self._queue.without_run(run)
-                    # What was of its dataset may run beside another now.
-                    self._changed.notify_all()
-                run.over.set()
-
-    def _wait_for_next_run(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
-        """The next job to run, of those that may; None when the server stops."""
-        with self._changed:
-            self._changed.wait_for(
-                lambda: self._closing.is_set() or (not self._entering and ready())
-            )
-            if self._closing.is_set():
-                return None
-            run = min(ready(), key=self._priority)
-            self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
-            self._queue = self._queue.with_started_run(run)
-            return run
-
-    def _priority(self, run: JobRun) -> tuple[bool, int, int]:
-        """Its place among those that may run: the smallest is the next."""
-        return run.job.kind not in PROMPT, self._turns.get(run.job.actor, 0), run.job.id
-
-    def _execute_run(self, run: JobRun) -> None:
-        if not self._record_start(run):
-            return
-        run.counted = True
-        ended = threading.Event()
-        ticker = threading.Thread(
-            target=self._save_progress_until_ended, args=(run, ended), daemon=True
-        )
-        ticker.start()
-        try:
-            values = run.run_to_end()
-        finally:
-            ended.set()
-            ticker.join()
-        if values is not None:
-            self._record_end(run, **values)
-        else:
-            self._undo_start_count(run)
-
-    def _record_start(self, run: JobRun) -> bool:
-        """Write that a job is begun; False where it shall not be."""
-        self._save_columns(run.job.id, state=RUNNING, started=now(), begun=1)
-        return True
-
-    def _undo_start_count(self, run: JobRun) -> None:
-        """Let a server that stops in good order count for no death: it is none of this job's doing."""
-        with self._changed:
-            counted, run.counted = run.counted, False
-        if counted:
-            with suppress(StorageError):
-                self._save_columns(run.job.id, begun=-1)
-
-    def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
-        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
-        place, job = run.columns, None
-        # Where the disk is full for a moment, the record waits for it.
-        for _ in range(5):
-            try:
-                job = self._save_end(run.job.id, by, **{**place, "ended": now(), **values})
-            except StorageError as error:
-                log.warning("the record of a job could not be written", error=str(error))
-                self._closing.wait(1.0)
-            else:
-                break
-        run.over.set()
-        return job

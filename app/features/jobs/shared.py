@@ -18,6 +18,7 @@ import structlog
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
+from app.features.jobs.job_run import JobProgress, JobRun, Work
 from app.features.jobs.queries import (
     CANCELLED,
     DONE,
@@ -35,8 +36,8 @@ from app.features.jobs.queries import (
     update_job,
 )
 from app.features.jobs.records import record_cancellation, require_job
-from app.features.jobs.runner import JobProgress, JobRun, Work
-from app.features.jobs.service import CLOSE_SECONDS, KEPT, WAIT_FOR_JOB, Jobs, Pool
+from app.features.jobs.runner import CLOSE_SECONDS, KEPT, Pool
+from app.features.jobs.service import WAIT_FOR_JOB, Jobs
 
 log = structlog.get_logger("touchline.jobs")
 

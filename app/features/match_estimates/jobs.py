@@ -21,9 +21,9 @@ from app.features.datasets.service import (
     get_dataset_head,
     require_dataset_with_matches,
 )
+from app.features.jobs.job_run import JobProgress, Work, report_counts_in_words
 from app.features.jobs.queries import Job
 from app.features.jobs.records import require_job
-from app.features.jobs.runner import JobProgress, Work, report_counts_in_words
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.pictures import estimate_picture_geometries
 from app.features.match_estimates.positions import (

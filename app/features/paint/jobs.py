@@ -7,7 +7,7 @@ from dataclasses import asdict
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.runner import JobProgress, report_counts_in_words
+from app.features.jobs.job_run import JobProgress, report_counts_in_words
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import MatchJob, MatchJobContext
 from app.features.paint.proposals import forget_proposals, propose_views

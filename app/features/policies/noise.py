@@ -34,7 +34,8 @@ from app.features.policies.service import (
     replace_thresholds,
 )
 from app.features.solutions.queries import find_newest_solution_id, list_solved_groups
-from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
+from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, Policy
+from app.soccer.thresholds import THRESHOLDS
 from app.solving.ball_noise import BallNoise, RayResidual, SigmaEstimate
 from app.solving.dataset_noise import (
     BallSource,

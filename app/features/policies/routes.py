@@ -27,7 +27,8 @@ from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
-from app.soccer.policy import POLICIES, THRESHOLDS, Policy
+from app.soccer.policy import POLICIES, Policy
+from app.soccer.thresholds import THRESHOLDS
 
 router = APIRouter(tags=["policies"], route_class=Route)
 

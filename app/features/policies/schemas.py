@@ -14,7 +14,8 @@ from app.features.policies.service import (
     policy_to_yaml,
 )
 from app.http.documents import Document, ListDocument
-from app.soccer.policy import Asks, CalibrationPolicy, Policy, list_thresholds
+from app.soccer.policy import CalibrationPolicy, Policy
+from app.soccer.thresholds import Asks, list_thresholds
 
 
 class _PolicyIdentity(Document):

@@ -28,13 +28,12 @@ from app.soccer.policy import (
     PAPER,
     POLICIES,
     SIGMAS,
-    THRESHOLDS,
     TOUCHLINE,
     Policy,
-    Threshold,
     copy_click_sigmas,
     is_builtin_policy,
 )
+from app.soccer.thresholds import THRESHOLDS, Threshold
 
 LEAST_SHARE = 0.5
 """Of the views whose paint could place their camera, so many must have a picture."""

@@ -17,7 +17,7 @@ from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import delete_dataset, insert_dataset
 from app.features.imports.queries import list_known_groups
-from app.features.jobs.runner import JobProgress, leave_work_to_next_server
+from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.people.queries import find_person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility

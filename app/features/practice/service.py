@@ -18,9 +18,10 @@ from app.features.datasets.service import delete_dataset, insert_dataset, list_d
 from app.features.groups.state import GroupState, read_states
 from app.features.imports.queries import list_known_groups
 from app.features.imports.sources import ImportSource, import_source
+from app.features.jobs.job_run import JobProgress, run_job_in_worker
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, run_job_in_worker
-from app.features.jobs.service import Jobs, Pool
+from app.features.jobs.runner import Pool
+from app.features.jobs.service import Jobs
 from app.features.people.queries import find_person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility

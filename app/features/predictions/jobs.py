@@ -10,8 +10,8 @@ from typing import Any
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
+from app.features.jobs.job_run import JobProgress, run_job_in_worker
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.predictions.accept import (
     AcceptReport,

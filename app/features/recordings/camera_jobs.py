@@ -6,8 +6,8 @@ from functools import partial
 
 from app.db.json_columns import Json
 from app.db.store import Store
+from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.camera_tracking import (
     require_cameras_turnable,

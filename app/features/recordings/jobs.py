@@ -15,8 +15,8 @@ from app.db.store import Store
 from app.errors import TooLargeError
 from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
 from app.features.imports.uploads import resolve_folder
+from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
 from app.features.recordings.index import has_index, index_recording_in_worker

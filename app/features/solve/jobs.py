@@ -14,10 +14,11 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.queries import list_group_ids, read_dataset_name
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
+from app.features.jobs.job_run import JobProgress, report_counts_in_words
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
-from app.features.jobs.runner import JobProgress, report_counts_in_words
-from app.features.jobs.service import Jobs, Pool
+from app.features.jobs.runner import Pool
+from app.features.jobs.service import Jobs
 from app.features.pitches.service import (
     DatasetPitches,
     change_pitches,

@@ -9,7 +9,7 @@ from typing import Any
 from app.db.database_worker import ServerProxy
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.features.jobs.runner import JobProgress, report_counts_in_words, run_job_in_worker
+from app.features.jobs.job_run import JobProgress, report_counts_in_words, run_job_in_worker
 from app.features.match_estimates.jobs import MatchJob, MatchJobContext
 from app.features.tracks.service import make_tracks
 

@@ -21,8 +21,8 @@ from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
 from app.features.file_tools.shots import read_ball_rows
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
+from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress, leave_work_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.cameras import read_cameras_of_frames
 from app.features.recordings.link_values import (

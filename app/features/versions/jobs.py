@@ -9,8 +9,8 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import OverloadedError
 from app.features.datasets.service import get_dataset_head
+from app.features.jobs.job_run import JobProgress, run_job_in_worker
 from app.features.jobs.queries import DONE, Job
-from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.service import FREEZE, Version, get_version, list_versions

@@ -20,8 +20,9 @@ from app.features.what_if.block_results import (
 from app.features.what_if.service import TableBlock, TableSnapshot, YieldStore
 from app.features.what_if.table import JAC_STEPS
 from app.geometry.arrays import IntArray
-from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
+from app.soccer.policy import BOXES, CALIBRATION, PITCH, Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
+from app.soccer.thresholds import THRESHOLDS
 
 UNSOLVED = "unsolved"
 """Step of the funnel before the gates: groups that nobody has solved yet."""

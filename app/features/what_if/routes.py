@@ -17,7 +17,8 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
-from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, Threshold, list_thresholds
+from app.soccer.policy import CalibrationPolicy, Policy
+from app.soccer.thresholds import THRESHOLDS, Threshold, list_thresholds
 
 LABELS = {
     UNSOLVED: "Solved",

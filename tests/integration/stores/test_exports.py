@@ -27,8 +27,8 @@ from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import ExportFolder, run_export_job
 from app.features.exports.service import export_dataset
 from app.features.imports.sources import ImportSource, import_source
-from app.features.jobs import runner as job_run
-from app.features.jobs.runner import JobProgress
+from app.features.jobs import job_run
+from app.features.jobs.job_run import JobProgress
 from app.media.frames import EncodedPicture, FrameProvider, make_picture
 from app.object_store.path import find_path, resolve_target_path
 from app.object_store.store import open_store

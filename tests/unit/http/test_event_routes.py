@@ -21,7 +21,7 @@ from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.http import events as module
+from app.http import event_stream as module
 from app.http.server import Server, open_listening_socket
 from app.soccer.policy import PAPER, STRICT
 from tests.waiting import SECONDS

@@ -12,13 +12,12 @@ from app.soccer.policy import (
     POLICIES,
     STRICT,
     SUBJECTS,
-    THRESHOLDS,
     TOUCHLINE,
     CalibrationPolicy,
     Policy,
-    Threshold,
 )
 from app.soccer.solution import GATES
+from app.soccer.thresholds import THRESHOLDS, Threshold
 
 
 def another(threshold: Threshold) -> object:

@@ -16,7 +16,7 @@ import pytest
 from app.features.datasets.service import dataset_id
 from app.features.exports import routes as module
 from app.features.imports.ingest import import_groups
-from app.features.jobs import runner as job_run
+from app.features.jobs import job_run
 from app.features.jobs.service import Jobs
 from app.features.maintenance.upkeep import clean_up
 from app.features.solutions.service import solve_dataset

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from app.db.json_columns import Json
+from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress
 from app.features.jobs.service import Jobs
 from tests.waiting import SECONDS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from app.features.jobs.runner import JobProgress
+from app.features.jobs.job_run import JobProgress
 from tests.waiting import SECONDS
 
 API = "/api/v1/jobs"

@@ -23,9 +23,9 @@ from app.errors import (
     StorageError,
 )
 from app.features.imports.ingest import ensure_dataset
-from app.features.jobs import service as module
+from app.features.jobs import runner as module
+from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job, NewJob, insert_job
-from app.features.jobs.runner import JobProgress
 from app.features.jobs.service import Jobs
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from tests.unit.features.jobs.steps import Gate, submit

@@ -9,8 +9,8 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError, JobCancelled
+from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job, update_job
-from app.features.jobs.runner import JobProgress
 from app.features.jobs.shared import SharedJobs
 from tests.waiting import SECONDS
 

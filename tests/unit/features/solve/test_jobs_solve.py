@@ -12,7 +12,7 @@ import pytest
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import ensure_dataset
-from app.features.jobs.runner import JobProgress
+from app.features.jobs.job_run import JobProgress
 from app.features.jobs.service import Jobs
 from app.features.solutions.service import SolveReport, list_stale_groups
 from app.features.solve import jobs as full_solve

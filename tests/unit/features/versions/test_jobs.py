@@ -10,9 +10,9 @@ import pytest
 
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError
-from app.features.jobs import runner as job_run
+from app.features.jobs import job_run
+from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job
-from app.features.jobs.runner import JobProgress
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.jobs import run_verify_job
 from app.features.versions.service import Version, get_version

@@ -23,8 +23,9 @@ from app.features.what_if.table import YieldTable
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
-from app.soccer.policy import PAPER, THRESHOLDS, CalibrationPolicy, Policy
+from app.soccer.policy import PAPER, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
+from app.soccer.thresholds import THRESHOLDS
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import collect_facts_of_views, join_facts
 from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups

@@ -8,8 +8,8 @@ import pytest
 
 from app.features.what_if.funnel import UNSOLVED
 from app.features.what_if.routes import LABELS, WhatIf
-from app.soccer.policy import THRESHOLDS
 from app.soccer.solution import GATES
+from app.soccer.thresholds import THRESHOLDS
 
 PATH = "/api/v1/datasets/broadcast/yield"
 

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from app.features.jobs.runner import describe_result
+from app.features.jobs.result_sentences import describe_result
 from app.features.jobs.schemas import JobKind
 
 SOLVED = {"groups": 60, "solved": 60, "passed": 52, "failed": 0, "failures": []}

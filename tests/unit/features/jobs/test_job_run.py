@@ -18,8 +18,8 @@ from app.db.store import Store
 from app.errors import InputError, JobCancelled, OverloadedError
 from app.features.datasets.service import dataset_id
 from app.features.imports.ingest import ensure_dataset
-from app.features.jobs import runner as module
-from app.features.jobs.runner import JobProgress, run_job_in_worker
+from app.features.jobs import job_run as module
+from app.features.jobs.job_run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from tests.unit.features.jobs.steps import Gate, a_job, submit
 from tests.waiting import SECONDS

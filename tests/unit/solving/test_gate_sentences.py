@@ -18,7 +18,7 @@ from app.soccer.solution import (
     PaintFit,
     TriangulatedPair,
 )
-from app.solving.gates import JudgedView, describe_gates, describe_odds
+from app.solving.gate_sentences import JudgedView, describe_gates, describe_odds
 from app.solving.judgement import Judgement
 from tests.cameras import looking
 

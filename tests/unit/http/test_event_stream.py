@@ -8,7 +8,7 @@ import pytest
 
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import LoggedChange
-from app.http.events import EventListener, _change_event, make_first_event
+from app.http.event_stream import EventListener, _change_event, make_first_event
 
 
 @pytest.mark.parametrize(
