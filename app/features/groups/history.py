@@ -1,24 +1,20 @@
-"""History of a group: its entries in the log with what each changed, and undo and redo of the last edit."""
+"""History of a group: its entries in the log with what each changed."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Unpack
 
 from app.db.log import LogEntry as LogEntry
 from app.db.log import list_group_entries, list_station_entries
 from app.db.session import Session
 from app.db.store import Store
-from app.errors import ConflictError, NotFoundError
-from app.features.groups.edit_codec import edit_from_json
+from app.errors import NotFoundError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state import GroupState, GroupWithoutSolution, require_group
+from app.features.groups.state import require_group
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
-from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
-from app.features.groups.undo_stacks import make_undo_entry_body
 from app.features.people.visibility_queries import (
     hides_groups_from_reader,
     show_entries_under_aliases,
@@ -146,33 +142,3 @@ def _compare_group_versions(
     )
     pitch = None if before is None else before.pitch
     return EntryChanges(entry, changed, pitch, after.pitch, before is None)
-
-
-def undo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
-    """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return submit_change(
-        store, lambda _session: group_id, _make_undo_or_redo_planner("undo"), **how
-    )
-
-
-def redo_group_edit(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
-    """Do again what undo took back last; raises ConflictError without such an edit."""
-    return submit_change(
-        store, lambda _session: group_id, _make_undo_or_redo_planner("redo"), **how
-    )
-
-
-def _make_undo_or_redo_planner(kind: str) -> Plan:
-    def plan_undo_or_redo(
-        session: Session, record: GroupWithoutSolution, _actor: str
-    ) -> GroupChange:
-        body = make_undo_entry_body(session, record.stacks, kind, "in this group")
-        try:
-            group = edit_from_json(body["edit"]).apply(record.stored.group)
-        except NotFoundError as error:
-            raise ConflictError(
-                f"this can no longer be undone or redone: {error.message}"
-            ) from error
-        return GroupChange(kind, body, group)
-
-    return plan_undo_or_redo

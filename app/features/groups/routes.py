@@ -10,8 +10,13 @@ from pydantic import Field
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.service import dataset_id
-from app.features.groups import history, submit
-from app.features.groups.history import ChangedView, EntryChanges, read_entry_changes
+from app.features.groups import submit
+from app.features.groups.history import (
+    ChangedView,
+    EntryChanges,
+    read_entry_changes,
+    read_history,
+)
 from app.features.groups.preview_routes import PreviewDocument, PreviewRequest
 from app.features.groups.schemas import (
     Ball,
@@ -24,6 +29,7 @@ from app.features.groups.schemas import (
 )
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.people.roles import role_allows
 from app.features.queue import service as queue
 from app.features.queue.routes import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
@@ -235,9 +241,7 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 @paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
-    return History(
-        items=[LogEntryDocument.of(entry) for entry in history.read_history(store, group)]
-    )
+    return History(items=[LogEntryDocument.of(entry) for entry in read_history(store, group)])
 
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
@@ -275,9 +279,7 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Take the last edit back; 409 when there is none."""
     store = services.store
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
-        return history.undo_group_edit(
-            store, group, if_match=if_match, actor=actor, paint=services.paint
-        )
+        return undo_group_edit(store, group, if_match=if_match, actor=actor, paint=services.paint)
 
 
 @router.post(
@@ -292,6 +294,4 @@ def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
-        return history.redo_group_edit(
-            store, group, if_match=if_match, actor=actor, paint=services.paint
-        )
+        return redo_group_edit(store, group, if_match=if_match, actor=actor, paint=services.paint)

@@ -18,8 +18,8 @@ from app.features.findings.queries import (
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
+from app.features.groups.revision_chain import RevisionChains
 from app.features.groups.revision_queries import save_group
-from app.features.groups.undo_stacks import RevisionChains
 from app.features.imports.queries import list_known_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import ReaderReport

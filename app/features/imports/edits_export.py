@@ -20,7 +20,7 @@ from app.features.datasets.service import DatasetHead, join_licences, read_datas
 from app.features.exports.queries import find_newest_entry_time
 from app.features.findings.queries import read_dismissals_to_export
 from app.features.groups.queries import StoredGroup, iterate_sorted_unassigned_frames, read_groups
-from app.features.groups.undo_stacks import (
+from app.features.groups.revision_chain import (
     RevisionChain,
     RevisionChains,
     read_station_revision_chain,

@@ -17,13 +17,13 @@ from app.features.datasets.service import insert_dataset
 from app.features.findings.queries import find_station_finding, replace_station_finding
 from app.features.groups.queries import read_groups
 from app.features.groups.reimport import KIND, SharedStations
-from app.features.groups.revision_queries import refresh_inputs_hashes
-from app.features.groups.undo_stacks import (
+from app.features.groups.revision_chain import (
     RevisionChains,
     StationRevisionChain,
     digest_imported_group,
     read_station_revision_chain,
 )
+from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
 from app.features.imports.ingest import (

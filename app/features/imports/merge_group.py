@@ -15,8 +15,8 @@ from app.features.findings.queries import (
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
+from app.features.groups.revision_chain import RevisionChain, format_pitch_size
 from app.features.groups.revision_queries import save_group
-from app.features.groups.undo_stacks import RevisionChain, format_pitch_size
 from app.features.imports.body import collect_view_and_station_ids, make_import_entry_body
 from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup

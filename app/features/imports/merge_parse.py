@@ -10,7 +10,7 @@ from typing import IO, Any
 from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.features.findings.queries import MERGED_COLUMNS
-from app.features.groups.undo_stacks import format_pitch_size, parse_logged_group
+from app.features.groups.revision_chain import format_pitch_size, parse_logged_group
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT

@@ -27,7 +27,8 @@ from app.features.groups.state import (
     require_etag,
     station_etag,
 )
-from app.features.groups.undo_stacks import make_undo_entry_body, read_station_stacks
+from app.features.groups.undo import make_undo_entry_body
+from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import (
     StoredStation,
     list_groups_of_station,

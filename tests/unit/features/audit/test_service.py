@@ -21,10 +21,11 @@ from app.features.audit.service import (
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
 from app.features.comments.service import begin_thread
 from app.features.groups.edit import IncludeView, SetLines, set_ball
-from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import _STEPS, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit, submit_edits
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
 from app.features.jobs.service import Jobs

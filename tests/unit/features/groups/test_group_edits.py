@@ -6,8 +6,9 @@ from app.features.datasets.service import dataset_id
 from app.features.groups import group_edits
 from app.features.groups.edit import SetPitch
 from app.features.groups.group_edits import edit_groups
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.submit import load_group_state
+from app.features.groups.undo import undo_group_edit
 from app.features.solutions.service import list_stale_groups
 
 WIDE, USUAL = SetPitch(105.0, 70.0), SetPitch(105.0, 68.0)

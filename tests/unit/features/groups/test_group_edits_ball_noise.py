@@ -15,7 +15,7 @@ from app.features.groups.group_edits import (
     apply_noise_factors,
     read_last_ball_actors,
 )
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.submit import (
     load_group_state,
     solve_and_store_group,
@@ -23,6 +23,7 @@ from app.features.groups.submit import (
     submit_edit,
     submit_edits,
 )
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates.queries import (

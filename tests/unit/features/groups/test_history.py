@@ -7,13 +7,9 @@ import pytest
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.groups.edit import SetLines, SetStationLines, set_ball
-from app.features.groups.history import (
-    EntryChanges,
-    read_entry_changes,
-    read_history,
-    undo_group_edit,
-)
+from app.features.groups.history import EntryChanges, read_entry_changes, read_history
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.stations.service import load_station, submit_station_edit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint

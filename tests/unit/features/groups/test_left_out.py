@@ -10,10 +10,10 @@ from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.imports.merge import merge_edits
 from app.features.queue.refresh_queries import refresh_queue

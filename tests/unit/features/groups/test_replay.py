@@ -9,10 +9,10 @@ from app.db.store import Store
 from app.errors import StorageError
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
 from app.features.groups.group_edits import apply_noise_factors
-from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
 from app.features.match_estimates.queries import NoiseFactor

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from app.db.store import Store
 from app.features.groups.edit import IncludeView, SetStationLines
-from app.features.groups.history import undo_group_edit
 from app.features.groups.state import (
     GroupHead,
     GroupState,
@@ -14,6 +13,7 @@ from app.features.groups.state import (
     read_group_head,
 )
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.stations.service import load_station, submit_station_edit, undo_station
 from app.features.verdicts.service import set_verdict

@@ -18,7 +18,7 @@ from app.errors import (
 )
 from app.features.groups import state as state_module
 from app.features.groups.edit import IncludeView, SetBalls, SetLines, SetPicture, set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import (
     load_group_state,
@@ -26,6 +26,7 @@ from app.features.groups.submit import (
     solve_edited_group,
     submit_edit,
 )
+from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import queries as solutions

@@ -10,10 +10,11 @@ import pytest
 
 from app.errors import OverloadedError
 from app.features.groups.edit import SetLines, set_ball
-from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, solve_edited_group, submit_edit
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.groups.view_paint import PaintUpdater
 from app.features.paint.service import undo_paint_reading
 from app.features.policies.service import change_policy

@@ -22,10 +22,11 @@ from app.features.groups.edit import (
     SetStationLines,
     set_ball,
 )
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
 from app.features.imports.ingest import (

@@ -9,9 +9,10 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.cameras import import_given_cameras
 from app.features.imports.ingest import (
     UnassignedFrame,

@@ -11,10 +11,11 @@ from app.features.batches.own_annotations import count_own_groups_left
 from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, solve_and_store_group, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
 from app.features.independent_annotations.gold import mark_gold_group
 from app.features.independent_annotations.known_truth import (

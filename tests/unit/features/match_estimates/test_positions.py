@@ -8,10 +8,11 @@ import pytest
 
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetLines, SetPicture
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates import queries as positions_in_store

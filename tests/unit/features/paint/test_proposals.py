@@ -16,11 +16,12 @@ from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError
 from app.features.groups import pictures as proposal_reading
 from app.features.groups.edit import SetLines
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.pictures import MISSING
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import proposals as editing

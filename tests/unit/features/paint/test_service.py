@@ -15,11 +15,12 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups import pictures as paint_reading
 from app.features.groups.edit import SetLines, set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import service as editing

@@ -10,10 +10,11 @@ from app.errors import InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import iterate_findings_as_json
 from app.features.groups.edit import SetLines
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,

@@ -7,10 +7,11 @@ import pytest
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.frame import Detection
 from app.features.groups.edit import set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.predictions.accept import (
     AcceptRequest,
     accept_box,

@@ -6,8 +6,8 @@ import pytest
 
 from app.errors import NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import redo_group_edit, undo_group_edit
 from app.features.groups.submit import load_group_state, submit_edit, submit_edits
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.predictions.accept import AcceptedBall, accept_box, read_group_predictions
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, delete_predictions

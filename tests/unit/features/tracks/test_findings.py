@@ -15,9 +15,9 @@ from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
 from app.features.findings.service import FindingReference, iterate_findings_as_json, set_dismissal
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.suggested_edits import list_edits_of_finding
+from app.features.groups.undo import undo_group_edit
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset

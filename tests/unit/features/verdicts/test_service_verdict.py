@@ -9,9 +9,10 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import read_history, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.verdicts import service as module

@@ -14,8 +14,8 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.maintenance.upkeep import delete_old_deliveries
 from app.features.verdicts.service import set_verdict

@@ -13,8 +13,8 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import set_ball
-from app.features.groups.history import undo_group_edit
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
 from app.features.queue.statistics import read_statistics
 from app.features.solutions.service import solve_dataset

@@ -7,9 +7,10 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, set_ball
-from app.features.groups.history import read_history, redo_group_edit, undo_group_edit
+from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import submit_edit
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 
