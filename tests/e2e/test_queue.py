@@ -9,7 +9,16 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 import pytest
 from playwright.sync_api import Locator, Page, Request, Route, expect
 
-from tests.e2e.screen import at_rest, hears, holding, judge, until, withdraw_verdict
+from tests.e2e.screen import (
+    at_rest,
+    hears,
+    holding,
+    judge,
+    on_present,
+    undo_edit,
+    until,
+    withdraw_verdict,
+)
 from tests.e2e.season import SEASON
 from tests.e2e.test_access import serious
 
@@ -200,6 +209,23 @@ class TestVerdicts:
             expect(page.locator(".queue-cell__by").first).to_have_text("not the same instant")
         finally:
             withdraw_verdict(page, group)
+
+    def test_the_group_edited_last_comes_first_in_that_order(self, open_page: OpenPage) -> None:
+        page = opened(open_page)
+        found = page.request.get("/api/v1/groups?dataset=sample&q=number=7").json()["items"][0]
+        group = page.request.get(f"/api/v1/groups/{found['id']}").json()
+        view = group["views"][0]["id"]
+        leave_out = {"included": False}
+        on_present(
+            page,
+            group["id"],
+            lambda tag: page.request.patch(f"/api/v1/views/{view}", data=leave_out, headers=tag),
+        )
+        try:
+            page.get_by_label("Order", exact=True).select_option("Newest change first")
+            expect(row(page, 1)).to_contain_text(found["label"])
+        finally:
+            undo_edit(page, group["id"])
 
 
 class TestBulkVerdicts:
