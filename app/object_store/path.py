@@ -43,7 +43,7 @@ def split_address(address: str) -> tuple[str, str]:
     wrong = any(part in ("", ".", "..") or "\\" in part for part in parts)
     if not is_address(address) or wrong or not inside.isprintable() or len(inside) > 1000:
         raise InputError(
-            "an address in a store is s3://NAME/folder/file, without empty parts or '..'"
+            "an address in a store is s3://NAME/folder/file: at most 1,000 printable characters, no backslash, and no part that is empty, '.' or '..'"
         )
     return name, "/".join(parts)
 

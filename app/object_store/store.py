@@ -324,7 +324,10 @@ def _read_key_file(settings: StoreSettings) -> tuple[str, ...]:
         )
     except (OSError, KeyError, UnicodeDecodeError, configparser.Error):
         # The text of the file is in no message.
-        raise StorageError("the file of a store's keys cannot be read", hint=OPERATOR) from None
+        raise StorageError(
+            "the file with the credentials of a store cannot be read, or lacks the profile or a key",
+            hint=OPERATOR,
+        ) from None
 
 
 @contextmanager

@@ -98,8 +98,9 @@ def track_clip(
     for number, drawn in lines.items():
         if not 0 <= number - clip.start < clip.count:
             raise InputError(
-                f"{clip.path.name} has {clip.count} frames, and frame {number} is not one of them",
-                hint="Frames count from 0.",
+                f"frame {number} is not in {clip.path.name}, whose frames are {clip.start} to "
+                f"{clip.start + clip.count - 1}",
+                hint="Frames count from 0, the first of the file.",
             )
         found = calibrate(drawn, pitch, clip.size, clicked)
         if found.camera is None:

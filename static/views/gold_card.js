@@ -93,7 +93,7 @@ export function GoldCard({ dataset }) {
 				<p class="gold__about">Medians of the distance from the truth, with an interval of 95 %; fewer than six groups have none.</p>` : null}
 			${value?.groups.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Gold groups"><table class="table">
-					<thead><tr><th>Group</th><th>Annotators begin with</th><th>Truth</th><th>Marked by</th><th><span class="hidden-text">Change</span></th></tr></thead>
+					<thead><tr><th>Group</th><th>A copy starts with</th><th>Truth</th><th>Marked by</th><th><span class="hidden-text">Change</span></th></tr></thead>
 					<tbody>${value.groups.map((one) => html`<${GoldRow} key=${one.group} one=${one} change=${(/** @type {string} */ start) => told(patchGold(one.group, start))} drop=${() => told(deleteGold(one.group))} />`)}</tbody>
 				</table></div>` : null}
 		</section>

@@ -45,7 +45,7 @@ function Bar({ group }) {
 		<div class="bar take-bar" data-tone=${take.returned ? 'info' : undefined} role="status">
 			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.returned ? html`<${ReturnedNote} back=${take.returned} />` : state}</p>
 			${canReturn.value ? html`<button class="button" type="button" onClick=${askReturn}>Return… <kbd>⇧U</kbd></button>` : null}
-			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Take over… <kbd>⇧R</kbd></button>` : null}
+			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Apply to the group… <kbd>⇧R</kbd></button>` : null}
 			${take.of && take.settled ? html`<a class="button" href=${`/review/${take.of}`}>Open the group</a>` : null}
 			${mine && !take.submitted && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Submit</button>` : null}
 		</div>

@@ -153,7 +153,7 @@ function PolicyOf({ one }) {
 	const { job, error, send, ...saving } = useSavePolicy(() => { loaded.reload(); loadDatasets(); });
 	// What was saved is in force only once it was read: until then the policy that stands here is an old one.
 	const busy = saving.busy || loaded.waiting;
-	if (loaded.error) return html`<${Trouble} title="The policy cannot be read" error=${loaded.error} retry=${loaded.reload} />`;
+	if (loaded.error) return html`<${Trouble} title="The policy could not be loaded" error=${loaded.error} retry=${loaded.reload} />`;
 	if (!loaded.value) return html`<${Loading} what="the policy" />`;
 	const { shipped, fields, policy, etag } = loaded.value;
 	return html`

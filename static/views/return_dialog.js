@@ -23,8 +23,8 @@ export function ReturnDialog() {
 	}
 	return html`
 		<${FormDialog}
-			title=${back ? `Return to ${asked.person}` : `Take over ${asked.person}’s annotation`} onClose=${close} onSubmit=${send}
-			buttons=${html`<button class="button button--primary" type="submit" autofocus=${!back} aria-disabled=${busy}>${back ? 'Return' : 'Take over'} <kbd>Enter</kbd></button>`}
+			title=${back ? `Return to ${asked.person}` : `Apply ${asked.person}’s annotation to the group`} onClose=${close} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" autofocus=${!back} aria-disabled=${busy}>${back ? 'Return' : 'Apply'} <kbd>Enter</kbd></button>`}
 		>
 			<p>${asked.says}</p>
 			${back ? html`

@@ -87,7 +87,7 @@ function YieldOf({ one }) {
 		const [{ items, fields }, { policy, etag }] = await Promise.all([getPolicies(signal), getPolicy(one.id, signal)]);
 		return { policy, etag, shipped: items, fields };
 	}, [one.id]);
-	if (loaded.error) return html`<${Trouble} title="The policy cannot be read" error=${loaded.error} retry=${loaded.reload} />`;
+	if (loaded.error) return html`<${Trouble} title="The policy could not be loaded" error=${loaded.error} retry=${loaded.reload} />`;
 	if (!loaded.value) return html`<${Loading} what="the policy" />`;
 	return html`<${YieldBody} key=${one.id} one=${one} loaded=${loaded.value} reload=${loaded.reload} />`;
 }

@@ -230,7 +230,7 @@ def transfer_database(
 def _null_character_error(found: Sequence[TextWithNullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
-        f"{count} the character U+0000, which databases no longer store:"
+        f"{count} the character U+0000, which this version of Touchline no longer stores:"
         f" {format_null_characters(found)}",
         hint="Run touchline transfer with --replace-null: it replaces the character with U+FFFD.",
     )

@@ -276,7 +276,7 @@ def _check_threshold(
 def _validate_policy_name(name: object) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
-            "the name of a policy may have up to 80 letters, digits, spaces and . _ + -",
+            "the name of a policy begins with a letter or digit and has 1 to 80 characters: A to Z, a to z, digits, spaces and . _ + -",
             pointer="/name",
         )
     return name

@@ -82,7 +82,7 @@ export function LineTable({ picture, influences }) {
 						<tr>
 							<th scope="col"><span class="hidden-text">state</span></th><th scope="col">marking</th>
 							<th scope="col" title="Annotated points">n</th>
-							<th scope="col" title="Worst point; ticks at 0.5 and 1 %, the end is 2 % of the diagonal">worst</th>
+							<th scope="col" title="Largest distance of a point; ticks at 0.5 and 1 % of the image diagonal, a full bar is 2 %">worst</th>
 							<th scope="col" title="Worst point, pixels">px</th>
 							${known ? html`<th scope="col" title=${`Change of JaC 0.5 % when the camera is found without this line${changed.value ? '; for the saved lines' : ''}`}>ΔJaC</th>` : null}
 						</tr>

@@ -16,5 +16,5 @@ function openEditor() {
 
 /** @type {Binding[]} */
 export const EDITOR_DOOR = [
-	{ keys: ['k'], label: 'Calibration editor of the focused view', group: 'View', run: openEditor },
+	{ keys: ['k'], label: 'Open the calibration editor of the focused view', group: 'View', run: openEditor },
 ];

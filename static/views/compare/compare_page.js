@@ -50,7 +50,7 @@ export function ComparePage() {
 				chosen=${null} choose=${null}
 			><${Links} groups=${groups} /><//>` : html`
 				<main class="page__main">${found.error
-					? html`<${Trouble} title="These two cannot be compared" error=${found.error} retry=${found.reload} />`
+					? html`<${Trouble} title="The two annotations cannot be shown side by side" error=${found.error} retry=${found.reload} />`
 					: html`<${Loading} what="both annotations" />`}</main>`}
 		</div>
 	`;

@@ -52,7 +52,7 @@ function RunForm({ sets, versions, why, send }) {
 					<div class="form__row"><label for="run-split">Split</label><input class="field" id="run-split" name="split" maxlength="50" autocomplete="off" placeholder="all" /></div>
 					<div class="form__row"><label for="run-boxes">True box</label><select class="field" id="run-boxes" name="boxes"><option value="optimized">optimised</option><option value="annotated">annotated</option><option value="exact">exact</option></select></div>
 					<div class="form__row"><label for="run-careful">Reference boxes, for table 1</label><select class="field" id="run-careful" name="careful"><option value="">none</option>${choices}</select></div>
-					<div class="form__row"><label for="run-score">Smallest score for localisation</label><input class="field" id="run-score" name="min_score" type="number" min="0" max="1" step="any" defaultValue="0" /></div>
+					<div class="form__row"><label for="run-score">Smallest score that counts for localisation</label><input title="Average precision uses all detections" class="field" id="run-score" name="min_score" type="number" min="0" max="1" step="any" defaultValue="0" /></div>
 				</div>
 			</details>
 			<button data-needs="lead" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Evaluate</button>

@@ -79,7 +79,7 @@ function ThisFrame({ cameras: { frames } }) {
 function Tools({ cameras }) {
 	return html`
 		<div class="camera__tools">
-			<button class="button button--small" type="button" onClick=${cameras.worst}>Worst frame <kbd>W</kbd></button>
+			<button class="button button--small" type="button" title="The frame whose camera lies farthest from the paint" onClick=${cameras.worst}>Worst frame <kbd>W</kbd></button>
 			<button class="button button--small" type="button" onClick=${cameras.untracked}>Next untracked <kbd>N</kbd></button>
 			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Projected lines <kbd>P</kbd></button>
 			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Previous cameras <kbd>B</kbd></button>` : null}

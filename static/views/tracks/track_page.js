@@ -163,7 +163,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 			${around ? html`<${Now} around=${around} at=${at} />` : null}
 			<p class="buttons">
 				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open the group</button>` : html`<a class="button" href=${`/review/${group}`}>Open the group <kbd>Enter</kbd></a>`}
-				${worst === null ? null : html`<button class="button" type="button" onClick=${() => goTo(worst)}>Worst frame <kbd>w</kbd></button>`}
+				${worst === null ? null : html`<button class="button" type="button" title="The frame with the largest left-out error" onClick=${() => goTo(worst)}>Worst frame <kbd>w</kbd></button>`}
 			</p>
 		</section>
 	`;

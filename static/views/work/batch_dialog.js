@@ -43,14 +43,14 @@ function GoldFields({ dataset }) {
 	const [some, setSome] = useState(false);
 	const versions = useResource(async (signal) => (some ? getVersions(dataset.id, signal) : null), [dataset.id, some]);
 	return html`
-		<div class="form__row"><label for="batch-gold">One gold group in N</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
+		<div class="form__row"><label for="batch-gold">One gold group in every N of an annotator</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
 		${some ? html`
 			<div class="form__row"><label for="batch-truth">Gold groups are</label><select class="field" id="batch-truth" name="truth">
 				<option value="">marked by leads</option>
 				<option value="sample">also those of a sample: true cameras and ball</option>
 				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also those of ${name} on which people agreed</option>`)}
 			</select></div>
-			<div class="form__row"><label for="batch-start">Annotators start a gold group with</label><select class="field" id="batch-start" name="start">
+			<div class="form__row"><label for="batch-start">A copy of a gold group starts with</label><select class="field" id="batch-start" name="start">
 				${STARTS.map(([name, words]) => html`<option key=${name} value=${name}>${words}</option>`)}
 			</select></div>` : null}
 	`;
