@@ -185,9 +185,9 @@ class Settings(BaseSettings):
     """Mail server by which invitations are sent, such as smtp.example.org; empty: no mail is sent, and links
     are shown."""
     smtp_port: int | None = Field(default=None, ge=1, le=65535)
-    """Its port; empty: 587 with ``starttls``, 465 with ``tls``, 25 with ``make_empty_track``."""
+    """Its port; empty: 587 with ``starttls``, 465 with ``tls``, 25 with ``none``."""
     smtp_security: Literal["starttls", "tls", "none"] = "starttls"
-    """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``make_empty_track``
+    """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``none``
     only for a mail server on this machine."""
     smtp_user: str | None = None
     """The account at the mail server, if it requires one."""

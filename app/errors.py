@@ -43,7 +43,7 @@ def suggest_similar_name(name: str, known: Iterable[str]) -> str | None:
     """A question that offers the known name nearest to one that is unknown; None where none is near.
 
     Example:
-        >>> did_you_mean("circle centre", ["Circle central", "Middle line"])
+        >>> suggest_similar_name("circle centre", ["Circle central", "Middle line"])
         'Did you mean "Circle central"?'
     """
     by_folded = {each.casefold(): each for each in known}

@@ -55,7 +55,7 @@ class MailServer:
 
     Attributes:
         host: Its name; certificates are checked against it.
-        security: ``starttls``, ``tls`` or ``make_empty_track``.
+        security: ``starttls``, ``tls`` or ``none``.
         user: The account there, with its password; None: it wants none.
         sender: Address that letters are from.
         own_name: What this machine calls itself (EHLO).

@@ -54,7 +54,7 @@ class BallDistance:
     """The ball of one view as two people saw it.
 
     Attributes:
-        a: ``seen``, ``occluded``, ``out_of_view``, ``make_empty_track`` or ``several``; ``b`` likewise.
+        a: ``seen``, ``occluded``, ``out_of_view``, ``none`` or ``several``; ``b`` likewise.
         center_px: Distance of both centres; None unless both have one ball with a place.
         diameter_px: Difference of both diameters, b less a; None unless both drew boxes.
     """

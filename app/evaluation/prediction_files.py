@@ -383,10 +383,10 @@ def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) ->
         if problem := _describe_contradiction(run, own, identity, named, frame):
             raise FieldError("file_name", problem)
     elif named or isinstance(value["image_id"], str):
-        frame = run.frame(named or identity)
+        frame = run.find_frame(named or identity)
     else:
         frame = None
-        run.miss(f"image {identity}", _NUMBER_ALONE)
+        run.count_unknown_frame(f"image {identity}", _NUMBER_ALONE)
     if frame is not None:
         with raise_as_field_error("bbox"):
             run.add_detection(frame, box, score, known.sizes.get(own or named), from_corner=True)

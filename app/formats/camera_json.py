@@ -39,7 +39,7 @@ def camera_to_json(
     """The camera as SoccerNet spells it: angles, matrix and all three distortion arrays.
 
     Every number is a plain float, so that ``repr`` and JSON keep it exactly. ``skew`` is ours
-    and stands there only when it is not zero. A wide lens has ``lens`` and ``read_lens_coefficients``
+    and stands there only when it is not zero. A wide lens has ``lens`` and ``lens_coefficients``
     in place of the three arrays: whoever expects those must not take it for a pinhole.
 
     Args:

@@ -99,7 +99,7 @@ def flat_frame_name(place: str, split: str) -> str:
 
 
 def map_line_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
-    """The names of a view in an export, and whose each would be (``export_names.``).
+    """The names of a view in an export, and whose each would be (``export_names``).
 
     The place of a frame is a name, too: what is read again has it for a key. A static camera has
     one file of lines for all its views.

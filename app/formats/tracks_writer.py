@@ -36,7 +36,7 @@ class TrackedEvent(Protocol):
     Attributes:
         frame: Of the stretch, the nearest.
         time_s: Seconds.
-        kind: ``kick``, ``apply_bounce`` or ``out``.
+        kind: ``kick``, ``bounce`` or ``out``.
         position: Pitch frame, metres, shape (3,).
         sigma_s: Standard deviation of its time, seconds.
     """

@@ -43,7 +43,7 @@ class RadiusProfile:
 
     Attributes:
         terms: Of the polynomial, the constant one first.
-        inner: Angle within which the radius is ``compute_slope`` times the angle instead. A polynomial that
+        inner: Angle within which the radius is ``slope`` times the angle instead. A polynomial that
             was fitted to a lens leaves a constant behind, which would tear the picture
             open at the axis.
         slope: Of the radius there.

@@ -60,7 +60,7 @@ PROPERTIES: Mapping[str, str] = {
     "annotation": "Id of the annotation.",
     "annotators": "Names of the people who annotate the batch.",
     "at": "When it happened.",
-    "Mark.at": "Where on the axis.",
+    "ReferenceLine.at": "Where on the axis.",
     "NewThread.at": "Where in the picture, pixels; null: nowhere.",
     "attempts": "How often it was sent.",
     "attestationObject": "As WebAuthn gives it, base64url.",

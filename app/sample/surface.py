@@ -115,7 +115,7 @@ class ShadingGrass(NamedTuple):
     """The grass: its colour, and how it is mown.
 
     ``across``: in bands across the pitch, or along it; ``band`` is their width, metres. ``edge``
-    and ``compute_slope`` are y at x = 0 and slope of the border of the stand's shadow, ``darkness`` is
+    and ``slope`` are y at x = 0 and slope of the border of the stand's shadow, ``darkness`` is
     how dark it is (0: no shadow).
     """
 

@@ -164,7 +164,7 @@ class FramePlaces:
         """The same but for one of them; what they hold is shared, so a match costs it once."""
         rest = copy(self)
         rest._left_out = index
-        rest.__dict__.pop("_model", None)
+        rest.__dict__.pop("_fitted_model", None)
         return rest
 
     def position_prior(self, pan: float) -> PositionPrior | None:

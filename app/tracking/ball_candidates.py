@@ -30,7 +30,7 @@ class Peak(NamedTuple):
     Attributes:
         x, y: Pixels.
         alike, contrast: As ``ball_picture.match_template`` has them.
-        smear, angle: As of ``ball_picture.disc``.
+        smear, angle: As of ``ball_picture.make_ball_template``.
         added: What a detector says, as a logarithm.
     """
 

@@ -105,7 +105,7 @@ class BallEvent:
     Attributes:
         frame: The nearest one.
         time_s: Seconds.
-        kind: ``kick`` (or whatever else touched it), ``apply_bounce`` on the grass, ``out``: wholly over a
+        kind: ``kick`` (or whatever else touched it), ``bounce`` on the grass, ``out``: wholly over a
             line.
         position: Pitch frame, metres, shape (3,).
         sigma_s: Of the time, seconds.
@@ -142,7 +142,7 @@ class EventCorrection:
 
     Attributes:
         frame: Of the stretch.
-        kind: ``kick``, ``apply_bounce`` or ``out``.
+        kind: ``kick``, ``bounce`` or ``out``.
         added: Whether it is there; else it is not.
     """
 

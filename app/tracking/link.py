@@ -157,7 +157,7 @@ def _split_into_pieces(
 def _split_by_best_map(
     fit: LinkFit, maps: Sequence[LinearTimeMap], none: bool = False
 ) -> list[IntArray]:
-    """Rays of the replay that follow each other and fit one map best; or with ``make_empty_track`` no map."""
+    """Rays of the replay that follow each other and fit one map best; or with ``none`` no map."""
     gains = np.array([np.zeros(len(fit.replay)), *(fit.ray_log_likelihoods(one) for one in maps)])
     ways = _find_best_path(gains, _CHANGE)
     stretches = np.split(np.arange(len(ways)), np.flatnonzero(np.diff(ways)) + 1)

@@ -135,7 +135,7 @@ PAUSE = timedelta(minutes=10)
 @dataclass(frozen=True)
 class MyBatch:
     """A batch of somebody's: ``left`` groups wait for them or for others beside them, and
-    ``invalidate_stale_connection`` are those that they had submitted and have back."""
+    ``returned`` are those that they had submitted and have back."""
 
     batch: Batch
     parts: list[Part]

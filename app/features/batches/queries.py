@@ -323,7 +323,7 @@ def mark_submitted(
 ) -> None:
     """A group of a batch is done by its annotator; ``at`` None: it is not, after all.
 
-    ``invalidate_stale_connection``: it goes back to them, so that their name stays with it.
+    ``returned``: it goes back to them, so that their name stays with it.
     """
     where = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
     values = {"submitted": at, "submitted_by": by if at is not None or returned else None}

@@ -177,7 +177,7 @@ def export_dataset(
         everything: Every group, whatever its verdict.
         boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
             YOLO and Parquet hold. Other formats have no place for a chosen box.
-        images: ``make_empty_track``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
+        images: ``none``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
         views: ``valid`` or ``all``: whether COCO and YOLO, from which detectors learn, hold the
             views that annotate a ball and are in no valid pair. ``everything`` says all.
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:

@@ -153,7 +153,7 @@ def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, Vi
 class SharedStations:
     """The shared stations of a dataset within one write transaction.
 
-    ``apply_picture_change`` names those that were there and changed, ``kept`` those with edits that stayed.
+    ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
     ``lines_left``: what comes without lines has none, and does not keep those of before.
     """
 

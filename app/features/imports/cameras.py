@@ -79,7 +79,7 @@ def import_given_cameras(
         dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
-        ``apply_picture_change`` and ``unchanged`` count views and static cameras that a camera was attached to;
+        ``changed`` and ``unchanged`` count views and static cameras that a camera was attached to;
         ``problems`` name cameras that fit nothing, several views, or pictures of another size.
 
     Raises:
@@ -196,7 +196,7 @@ def attach_cameras(
 
     Args:
         source: Where they come from, for the log.
-        report: Counts ``apply_picture_change`` and ``unchanged``.
+        report: Counts ``changed`` and ``unchanged``.
     """
     stations = read_stations(session, [place.station for place, _ in batch])
     touched: set[int] = set()

@@ -251,7 +251,7 @@ POSITIONS = MatchJob(
 
 
 def _adjust_rig(call: MatchJobContext, progress: JobProgress) -> Json:
-    """The proposal and what of it was saved; ``classify_entry`` is asked for as ``rig.accept_rig`` takes it (none:
+    """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept_rig`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
     what, inputs = call.job.request["what"], call.job.request["inputs"]
     progress(0, None, "Adjusting cameras to lines and balls.")

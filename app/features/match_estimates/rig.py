@@ -167,7 +167,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
     Raises:
         StaleRevisionError: A camera has changed since.
         ConflictError: The size of the pitch has changed since.
-        InputError: ``classify_entry`` is neither.
+        InputError: ``what`` is neither.
     """
     if what not in (CAMERAS, SIGMA):
         raise InputError('`accept` must be "cameras" or "sigma"')

@@ -32,7 +32,7 @@ class Notification:
     """One thing that a person was told.
 
     Attributes:
-        kind: ``mention``, ``reply``, ``job``, ``assigned`` or ``invalidate_stale_connection``.
+        kind: ``mention``, ``reply``, ``job``, ``assigned`` or ``returned``.
         actor: Who did it.
         address: Of the page that it is about.
         dataset: Name of its dataset; None where it has none.

@@ -71,7 +71,7 @@ class Ownership:
 
 
 def find_role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
-    """What somebody is where something belongs; ``make_empty_track``: they do not see it.
+    """What somebody is where something belongs; ``none``: they do not see it.
 
     Args:
         found: Where it belongs.

@@ -125,7 +125,7 @@ ALGORITHMS = [
     *("RS256", "RS384", "RS512", "PS256", "PS384", "PS512"),
     *("ES256", "ES384", "ES512", "EdDSA", "Ed25519"),
 ]
-"""Signatures by a key that the provider alone has: neither ``make_empty_track``, nor one by a secret (HS256)."""
+"""Signatures by a key that the provider alone has: neither ``none``, nor one by a secret (HS256)."""
 KINDS = frozenset({"RSA", "EC", "OKP"})
 SHORTEST_RSA = 342
 """Letters of a modulus of 2048 bits in base64url."""

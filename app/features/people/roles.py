@@ -21,7 +21,7 @@ from app.soccer.actors import LOCAL_USER, person_of_actor
 class Role(StrEnum):
     """What somebody is in a dataset, or in all; each may do what those before it may.
 
-    ``make_empty_track`` sees nothing there. ``admin`` is of the whole server, and of no single dataset.
+    ``none`` sees nothing there. ``admin`` is of the whole server, and of no single dataset.
     """
 
     NONE = "none"

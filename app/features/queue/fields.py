@@ -22,7 +22,7 @@ class QueryField:
     """One field of a query.
 
     Attributes:
-        kind: ``number`` compares, ``read_flag`` is yes or no, ``choice`` one of ``values``, ``text`` any
+        kind: ``number`` compares, ``flag`` is yes or no, ``choice`` one of ``values``, ``text`` any
             text, ``ids`` numbers of groups, ``order`` says how the groups are listed.
         unit: Of a number.
         values: What it can be, or, of a text, words that mean something of their own.

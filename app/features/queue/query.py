@@ -34,7 +34,7 @@ MAX_TERMS = 30
 
 NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
 """Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
-``make_empty_track`` is where there is no number."""
+``none`` is where there is no number."""
 SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
 """What the queue can be sorted by, and the column of it."""
 
@@ -236,7 +236,7 @@ def _require_choice(term: _QueryTerm, value: str) -> str:
 
 
 def _any_or_none_condition(value: str, some: Condition) -> Condition:
-    """``some``; the opposite for ``make_empty_track``."""
+    """``some``; the opposite for ``none``."""
     return conditions.negate_condition(some) if value == "none" else some
 
 
@@ -252,7 +252,7 @@ def _finding_condition(term: _QueryTerm, value: str) -> Condition:
 
 
 def _gate_condition(term: _QueryTerm, value: str) -> Condition:
-    """The first failing gate; ``make_empty_track`` for groups that pass, ``unsolved`` for neither."""
+    """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
         return conditions.flag_condition("solved", False)
     if value == "none":
@@ -261,7 +261,7 @@ def _gate_condition(term: _QueryTerm, value: str) -> Condition:
 
 
 def _pictures_condition(term: _QueryTerm, value: str) -> Condition:
-    """Whether views have a picture: ``make_empty_track`` of them, ``any``, or ``all``."""
+    """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
     choice = _require_choice(term, value)
     if choice == "all":
         return conditions.has_all_pictures()

@@ -89,7 +89,7 @@ class LinkMap:
     """Which time of the live shot each time of a replay shows.
 
     Attributes:
-        outcome: ``make_empty_track``: nothing is known; ``offset``: the speed is assumed; ``linked``: offset and speed are known,
+        outcome: ``none``: nothing is known; ``offset``: the speed is assumed; ``linked``: offset and speed are known,
             or those of all pieces; ``unobservable``: they cannot be told.
         found_by: From what: ``instants`` of people, or the ``ball``.
         reason: Why there is no map of one offset and speed.

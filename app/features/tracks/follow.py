@@ -118,7 +118,7 @@ class FollowedViews:
         frame: Number of its frame.
         first, last: Frames through which it was followed.
         before, after: Why no further: it is ``lost``, it ``left`` the picture, a ball is ``known`` there, the
-            sequence is at its ``find_end_reason``, or no more was asked for (``limit``).
+            sequence is at its ``end``, or no more was asked for (``limit``).
         sized: Whether the camera is known, and with it how large the ball is.
         items: By frame.
     """

@@ -19,7 +19,7 @@ class TrackChoice:
     """Which tracks of a dataset, and in which order; None: all.
 
     Attributes:
-        verdict: ``make_empty_track``: nobody judged them.
+        verdict: ``none``: nobody judged them.
         stale: Whether their groups have changed since.
         assigned: Name of a person in whose open batches they are.
         batch: Id of an open batch that they are in.

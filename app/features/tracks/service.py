@@ -93,7 +93,7 @@ class TrackChange:
     """What a person says of a track; what is None stays as it is.
 
     Attributes:
-        verdict: ``make_empty_track`` takes a verdict back.
+        verdict: ``none`` takes a verdict back.
         note: Why.
         corrections: All of them.
     """

@@ -42,7 +42,7 @@ class BallMove:
 
 @dataclass(frozen=True)
 class ChangedGroup:
-    """A group of both versions: ``classify_entry`` of annotations, verdict, split and ball is another."""
+    """A group of both versions: ``what`` of annotations, verdict, split and ball is another."""
 
     group: str
     what: tuple[str, ...]

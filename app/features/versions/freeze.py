@@ -103,7 +103,7 @@ class FreezePlan:
     """What a freeze would do: how many groups enter, in which split, and why the others do not.
 
     Attributes:
-        splits: How many of the groups would be in each split; ``make_empty_track``: in no split, or in two.
+        splits: How many of the groups would be in each split; ``none``: in no split, or in two.
         left_out: Why the other groups do not enter.
         unsolved: How many of the groups that enter have to be solved first.
     """

@@ -137,7 +137,7 @@ class TestRequireWhole:
     ) -> None:
         own_store.require_intact_database()
         monkeypatch.setattr(
-            type(get_dialect(own_store.settings)), "file_faults", lambda *_: ["Tree 5 is torn"]
+            type(get_dialect(own_store.settings)), "find_file_faults", lambda *_: ["Tree 5 is torn"]
         )
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
             own_store.require_intact_database()

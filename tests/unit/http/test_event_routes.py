@@ -199,7 +199,7 @@ class TestListen:
     def test_the_last_event_says_more_than_the_moment(self, app, served) -> None:
         store, (address, _) = app.state.services.store, served
         change_policy(store, "static", STRICT, if_match=None, actor="bob")
-        last = str(app.state.services.events.position())
+        last = str(app.state.services.events.read_log_position())
         change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
         with opened(address, {"Last-Event-ID": last}, since="0-0") as stream:
             assert stream.next()[1]["dataset"] == "broadcast"
@@ -247,7 +247,7 @@ class TestListen:
                 change_policy(store, "broadcast", policy, if_match=None, actor="bob")
             heard: list[list[int]] = [[0], [0]]
             for policy in (PAPER, STRICT):
-                newest = app.state.services.events.position()
+                newest = app.state.services.events.read_log_position()
                 for one, told in zip((stream, other), heard, strict=True):
                     while told[-1] < newest:
                         one.next()

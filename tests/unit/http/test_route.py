@@ -28,17 +28,17 @@ BYTES = {"requestBody": {"content": {"application/octet-stream": {}}}}
 class Nobody:
     """A team that nobody has logged in to."""
 
-    async def log_in(self, scope: Any) -> Any:
+    async def authenticate(self, scope: Any) -> Any:
         raise NotLoggedInError("nobody is logged in here")
 
 
 class Somebody:
     """A team whose only member may do nothing."""
 
-    async def log_in(self, scope: Any) -> Any:
+    async def authenticate(self, scope: Any) -> Any:
         return object()
 
-    async def allow(self, asked: Any, login: Any) -> Any:
+    async def authorize(self, asked: Any, login: Any) -> Any:
         names = [mention.named.by for mention in asked.mentions]
         raise ForbiddenError(f"not that of {names}")
 
@@ -106,7 +106,7 @@ class Exchange:
 class KeyLess:
     """Repetitions, of requests that have no key."""
 
-    async def answer(self, request: Any, digest: Any, actor: str, hidden: Any, work: Any) -> Any:
+    async def answer_once(self, request: Any, digest: Any, actor: str, hidden: Any, work: Any) -> Any:
         return await work()
 
 

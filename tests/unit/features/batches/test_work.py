@@ -177,17 +177,17 @@ class TestLeases:
     ):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
         with counted(store) as cost:
-            assert leases.next(batch, BO).group is not None
+            assert leases.lease_next_group(batch, BO).group is not None
         assert (cost.reads, cost.commits) == (0, 0)
 
     def test_two_people_are_given_two_groups(self, store, dataset, groups, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
-        assert leases.next(batch, BO).group == groups[0]
-        assert leases.next(batch, CY).group == groups[1]
-        assert leases.next(batch, BO).group == groups[0]
-        assert leases.next(batch, BO, after=groups[0]).group == groups[2]
+        assert leases.lease_next_group(batch, BO).group == groups[0]
+        assert leases.lease_next_group(batch, CY).group == groups[1]
+        assert leases.lease_next_group(batch, BO).group == groups[0]
+        assert leases.lease_next_group(batch, BO, after=groups[0]).group == groups[2]
         few = make_batch(store, dataset, NewBatch("b", size=1, skip_given=False), actor="lead").id
-        assert leases.next(few, BO, after=groups[0]).group is None
+        assert leases.lease_next_group(few, BO, after=groups[0]).group is None
 
     def test_no_group_is_given_to_two_of_many_who_ask_at_once(self, store, dataset, groups):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
@@ -201,71 +201,71 @@ class TestLeases:
 
     def test_one_that_is_not_kept_runs_out(self, store, dataset, groups, leases, clock):
         batch = make_batch(store, dataset, NewBatch("a", size=1), actor="lead").id
-        leases.next(batch, BO)
+        leases.lease_next_group(batch, BO)
         clock.at += LASTS * 0.9
-        leases.take(batch, groups[0], BO)
+        leases.lease_group(batch, groups[0], BO)
         clock.at += LASTS * 0.9
-        assert leases.next(batch, CY).group is None
+        assert leases.lease_next_group(batch, CY).group is None
         clock.at += LASTS * 0.2
-        assert leases.next(batch, CY).group == groups[0]
+        assert leases.lease_next_group(batch, CY).group == groups[0]
 
     def test_one_is_given_back_and_taken_over(self, store, dataset, groups, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
-        leases.next(batch, BO)
+        leases.lease_next_group(batch, BO)
         with pytest.raises(HeldGroupError, match="bo has this group open") as held:
-            leases.take(batch, groups[0], CY)
+            leases.lease_group(batch, groups[0], CY)
         assert [one.person for one in held.value.here] == ["bo"]
-        over = leases.take(batch, groups[0], CY, take_over=True)
+        over = leases.lease_group(batch, groups[0], CY, take_over=True)
         assert [one.person for one in over.here] == ["cy"]
         with pytest.raises(ConflictError, match="cy has this group open"):
-            leases.take(batch, groups[0], BO)
-        assert leases.give_back(batch, groups[0], CY).here == ()
-        assert leases.next(batch, BO).group == groups[0]
+            leases.lease_group(batch, groups[0], BO)
+        assert leases.release_group(batch, groups[0], CY).here == ()
+        assert leases.lease_next_group(batch, BO).group == groups[0]
 
     def test_what_a_window_left_open_that_is_gone_comes_back_once_nothing_else_waits(
         self, store, dataset, groups, leases
     ):
         batch = make_batch(store, dataset, NewBatch("a", size=3), actor="lead").id
         # The window of the first group crashes: it says nothing, and another one goes on.
-        assert leases.next(batch, BO).group == groups[0]
-        leases.take(batch, groups[1], BO)
+        assert leases.lease_next_group(batch, BO).group == groups[0]
+        leases.lease_group(batch, groups[1], BO)
         judge(store, groups[1], "bo")
-        assert leases.next(batch, BO, after=groups[1]).group == groups[2]
-        assert leases.next(batch, CY, after=groups[1]).group is None
+        assert leases.lease_next_group(batch, BO, after=groups[1]).group == groups[2]
+        assert leases.lease_next_group(batch, CY, after=groups[1]).group is None
         judge(store, groups[2], "bo")
-        assert leases.next(batch, BO, after=groups[2]).group == groups[0]
-        assert leases.next(batch, BO, after=groups[0]).group is None
+        assert leases.lease_next_group(batch, BO, after=groups[2]).group == groups[0]
+        assert leases.lease_next_group(batch, BO, after=groups[0]).group is None
 
     def test_a_verdict_ends_the_lease_and_the_work_and_unreviewing_makes_it_work_again(
         self, store, dataset, groups, leases
     ):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
-        leases.next(batch, BO)
+        leases.lease_next_group(batch, BO)
         judge(store, groups[0], "bo")
         assert get_batch(store, batch).settled == 1
         assert get_batch(store, batch).here == []
-        assert leases.next(batch, CY).group == groups[1]
+        assert leases.lease_next_group(batch, CY).group == groups[1]
         judge(store, groups[0], "bo", "unreviewed")
         assert get_batch(store, batch).settled == 0
         judge(store, groups[0], "bo", "deferred")
-        assert leases.next(batch, BO, after=groups[1]).group == groups[2]
+        assert leases.lease_next_group(batch, BO, after=groups[1]).group == groups[2]
 
     def test_an_annotator_hands_in_and_a_reviewer_gets_it(self, store, dataset, groups, leases):
         new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        assert leases.next(batch, BO).group is None
-        lease = leases.next(batch, ADA)
+        assert leases.lease_next_group(batch, BO).group is None
+        lease = leases.lease_next_group(batch, ADA)
         assert (lease.group, lease.part) == (groups[0], Part.ANNOTATOR)
         assert leases.submit(batch, groups[0], ADA, actor="ada").batch.submitted == 1
-        assert leases.next(batch, ADA, after=groups[0]).group == groups[1]
-        review = leases.next(batch, BO)
+        assert leases.lease_next_group(batch, ADA, after=groups[0]).group == groups[1]
+        review = leases.lease_next_group(batch, BO)
         assert (review.group, review.part) == (groups[0], Part.REVIEWER)
         with pytest.raises(ConflictError):
             leases.submit(batch, groups[1], BO, actor="bo")
         with pytest.raises(ConflictError, match="assigned to other people"):
-            leases.next(batch, CY)
+            leases.lease_next_group(batch, CY)
         with pytest.raises(NotFoundError):
-            leases.take(batch, 99, BO)
+            leases.lease_group(batch, 99, BO)
         leases.submit(batch, groups[0], ADA, actor="ada", done=False)
         assert get_batch(store, batch).submitted == 0
 
@@ -294,7 +294,7 @@ class TestLeases:
         with pytest.raises(ConflictError, match="is not submitted"):
             leases.return_group(batch, groups[3], BO, actor="bo")
         leases.submit(batch, groups[3], ADA, actor="ada")
-        assert leases.next(batch, BO).group == groups[3]
+        assert leases.lease_next_group(batch, BO).group == groups[3]
         back = leases.return_group(batch, groups[3], BO, "the far goal  line", actor="bo")
         assert (back.batch.submitted, back.here) == (0, ())
         (mine,) = list_own_batches(store, lambda _: ADA)
@@ -307,9 +307,9 @@ class TestLeases:
         assert rings[0].sentence.endswith(" to you: the far goal line")
         told = read_audit(store, AuditQuery(), EVERYTHING).items[0]
         assert told.sentence == "returned to ada: the far goal line"
-        assert leases.next(batch, dan).group == groups[0]
-        assert leases.next(batch, dan, after=groups[2]).group == groups[4]
-        lease = leases.next(batch, ADA)
+        assert leases.lease_next_group(batch, dan).group == groups[0]
+        assert leases.lease_next_group(batch, dan, after=groups[2]).group == groups[4]
+        lease = leases.lease_next_group(batch, ADA)
         assert lease.group == groups[3] and lease.returned is not None
         lease = leases.submit(batch, groups[3], ADA, actor="ada")
         assert (
@@ -336,7 +336,7 @@ class TestLeases:
         new = NewBatch("a", size=2, annotators=["ada"], reviewers=["bo"], gold_every=2)
         batch = make_batch(store, dataset, new, actor="lead").id
         had = 0
-        while (copy := leases.next(batch, ADA).group) is not None:
+        while (copy := leases.lease_next_group(batch, ADA).group) is not None:
             # What is left falls by one with each, whatever it is a copy of.
             assert [one.left for one in list_own_batches(store, lambda _: ADA)] == [3 - had]
             leases.submit(batch, copy, ADA, actor="ada")
@@ -351,18 +351,18 @@ class TestLeases:
             )
         assert had == 3
         assert get_batch(store, batch).submitted == 2
-        found = leases.next(batch, BO)
+        found = leases.lease_next_group(batch, BO)
         assert (found.group, found.part, found.submitted_by) == (groups[0], Part.REVIEWER, "ada")
         leases.return_group(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = list_own_batches(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.returned]) == (1, [groups[0]])
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
-        back = leases.next(batch, ADA)
+        back = leases.lease_next_group(batch, ADA)
         assert (back.group, back.returned.reason) == (groups[0], "too wide")
         leases.submit(batch, groups[0], ADA, actor="ada")
-        assert leases.next(batch, ADA).group is None
+        assert leases.lease_next_group(batch, ADA).group is None
         judge(store, groups[0], "bo")
-        assert leases.next(batch, BO).group == groups[1]
+        assert leases.lease_next_group(batch, BO).group == groups[1]
 
     def test_what_was_submitted_before_a_stop_is_taken_over_when_the_server_starts(
         self, store, dataset, groups, leases
@@ -373,7 +373,7 @@ class TestLeases:
         # The copy of gold, of no use here, may come first.
         ordinary = False
         while not ordinary:
-            copy = leases.next(batch, ADA).group
+            copy = leases.lease_next_group(batch, ADA).group
             with store.read() as session:
                 ordinary = find_annotation_of_copy(session, copy).kind == INDEPENDENT
             leases.submit(batch, copy, ADA, actor="ada")
@@ -385,9 +385,9 @@ class TestLeases:
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
         change_batch(store, batch, actor="lead", state="closed")
         with pytest.raises(ConflictError, match="closed"):
-            leases.next(batch, BO)
+            leases.lease_next_group(batch, BO)
         with pytest.raises(ConflictError, match="closed"):
-            leases.take(batch, groups[0], BO)
+            leases.lease_group(batch, groups[0], BO)
 
     def test_nothing_is_handed_in_of_one_that_is_closed_meanwhile(
         self, store, dataset, groups, leases, monkeypatch

@@ -152,7 +152,7 @@ class TestDeleteDataset:
         def killed(_session, _identity):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(module.removal, "delete_rows", killed)
+        monkeypatch.setattr(module.removal, "delete_dataset_rows", killed)
         with pytest.raises(KeyboardInterrupt):
             delete_dataset(two, "demo", confirm="demo", actor="eve")
         monkeypatch.undo()

@@ -35,7 +35,7 @@ class Frames:
     def __init__(self, settings, problem: Exception | None = None):
         self.settings, self.problem = settings, problem
 
-    def ask_to(self, _media, work, *arguments):
+    def request_work(self, _media, work, *arguments):
         if isinstance(self.problem, OverloadedError):
             raise self.problem
         task = PoolTask(lambda error: error)
@@ -137,7 +137,7 @@ class TestFollow:
         gone = SetLines(view.key, dict.fromkeys([*view.station.lines][1:]))
         after = change(painted, paint, gone)
         assert after.solution.views[0].calibration.camera is None
-        monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
+        monkeypatch.setattr(Frames, "request_work", lambda *_: pytest.fail("a picture was asked for"))
         change(painted, paint, set_ball(view.key, None))
 
     def test_a_view_that_gets_its_first_lines_is_read_with_the_others(
@@ -149,7 +149,7 @@ class TestFollow:
         bare = replace(state.group, paint=paint_of)
         policy = state.stored.policy.calibration
         assert set(paint.update_paint(bare, policy, {}).paint) == set(state.group.paint)
-        monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
+        monkeypatch.setattr(Frames, "request_work", lambda *_: pytest.fail("a picture was asked for"))
         without = bare.with_view(replace(view, media=None))
         assert paint.update_paint(without, policy, {}) is without
 

@@ -166,7 +166,7 @@ class TestUpkeep:
             raise OSError("the disk is gone")
 
         upkeep = UpkeepScheduler(store, Jobs(store))
-        monkeypatch.setattr(store, "require_whole", damaged)
+        monkeypatch.setattr(store, "require_intact_database", damaged)
         with capture_logs() as logs:
             upkeep.run_once()
         assert logs[-1]["error"] == "the disk is gone"

@@ -207,7 +207,7 @@ class TestReadNoise:
             for size in rng.uniform(5, 40, 600)
         ]
         shown = iter([misses])
-        monkeypatch.setattr(NoiseGroup, "misses", lambda *_: tuple(next(shown, ())))
+        monkeypatch.setattr(NoiseGroup, "ray_residuals", lambda *_: tuple(next(shown, ())))
         found = read_noise(store, "demo")
         click, share = found.advice
         assert (click.name, share.name, share.unit) == (

@@ -178,7 +178,7 @@ class TestJobs:
         write_video(film, "mp4v", 120)
         recording = add_recording(store, "cup", film, actor="ann")
         first = Jobs(store)
-        with stopped_at_its_first_step(module, "index_now", first):
+        with stopped_at_its_first_step(module, "index_recording_in_worker", first):
             number = request_index(first, store, recording, actor="ann").id
         with closing(Jobs(store)) as second:
             resume_recordings(second, store)

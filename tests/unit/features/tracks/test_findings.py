@@ -209,7 +209,7 @@ class TestMeanwhile:
     def test_corrections_that_never_cease_are_all_in_the_track(
         self, store: Store, beside: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        read, turns = making.corrected, list[int]()
+        read, turns = making.apply_corrections, list[int]()
 
         def corrected_meanwhile(*given: Any) -> Any:
             if len(turns) < making.TRIES - 1:

@@ -199,7 +199,7 @@ class TestStoppedBetweenChunks:
             interrupt(run, session, {"ids": [3], "refused": []})
 
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "interrupt", in_its_words)
+            patch.setattr(BatchRun, "save_remaining", in_its_words)
             patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
             assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
         done = api.post(VERDICTS, json=self.BODY, headers=self.KEY).json()

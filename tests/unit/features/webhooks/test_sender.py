@@ -93,8 +93,8 @@ class TestTelling:
         after = undo_group_edit(allowed, state.id, if_match=after.etag, actor="ann")
         after = judge(allowed, after)
         end_job(allowed, "failed")
-        assert sender.look() == 3
-        assert sender.send() == 3
+        assert sender.queue_new_messages() == 3
+        assert sender.send_due_messages() == 3
         assert sorted(receiver.kinds) == [
             MessageKind.CHANGED,
             MessageKind.JUDGED,
@@ -106,11 +106,11 @@ class TestTelling:
         assert {entry["group"] for entry in changed["entries"]} == {state.id}
         assert (changed["dataset"], changed["actor"]) == ("demo", "ann")
         assert by_kind[MessageKind.JOB_FAILED]["job"]["kind"] == "export"
-        assert (sender.look(), sender.send()) == (0, 0)
+        assert (sender.queue_new_messages(), sender.send_due_messages()) == (0, 0)
         (webhook,) = list_webhooks(allowed, "demo")
         assert (webhook.waiting, webhook.delivered, webhook.failed) == (0, 3, 0)
         judge(allowed, after, "deferred")
-        assert (sender.look(), sender.send()) == (1, 1)
+        assert (sender.queue_new_messages(), sender.send_due_messages()) == (1, 1)
         assert len(receiver.got[-1][1]["data"]["entries"]) == 1
 
     def test_certificates_are_read_once(
@@ -123,7 +123,7 @@ class TestTelling:
         module._tls_context.cache_clear()
         for verdict in ("accepted", "deferred"):
             state = judge(allowed, state, verdict)
-            assert (sender.look(), sender.send()) == (1, 1)
+            assert (sender.queue_new_messages(), sender.send_due_messages()) == (1, 1)
         assert len(found) == 1
 
     def test_what_was_before_and_kinds_that_nobody_wants_are_not_told(
@@ -134,15 +134,15 @@ class TestTelling:
         state = judge(allowed, state, "deferred")
         end_job(allowed, "done")
         end_job(allowed, "cancelled")
-        sender.look()
-        sender.send()
+        sender.queue_new_messages()
+        sender.send_due_messages()
         assert receiver.kinds == [MessageKind.JOB_DONE]
 
     def test_a_sender_that_died_before_it_sent_is_followed_by_one_that_does(
         self, allowed, sender, receiver, hook, state, clock
     ) -> None:
         judge(allowed, state)
-        sender.look()
+        sender.queue_new_messages()
         later = WebhookSender(allowed, clock)
         assert (later.queue_new_messages(), later.send_due_messages()) == (0, 1)
         assert receiver.kinds == [MessageKind.JUDGED]
@@ -165,14 +165,14 @@ class TestTryingAgain:
         # The library takes no message of another hour; here it is the sender's clock that runs.
         receiver.answers, receiver.secret = [500, 302], None
         send_ping(allowed, "demo", hook, actor="ann")
-        assert sender.send() == 1
-        assert sender.send() == 0
+        assert sender.send_due_messages() == 1
+        assert sender.send_due_messages() == 0
         clock.now += AGAIN[0]
-        assert sender.send() == 1
+        assert sender.send_due_messages() == 1
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert delivery.problem == "it answered 302 (redirects are not followed)"
         clock.now += AGAIN[1]
-        assert sender.send() == 1
+        assert sender.send_due_messages() == 1
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert (delivery.state, delivery.attempts, delivery.status) == ("delivered", 3, 204)
         assert delivery.problem is None
@@ -185,14 +185,14 @@ class TestTryingAgain:
         receiver.answers, receiver.secret = [500] * 20, None
         send_ping(allowed, "demo", hook, actor="ann")
         for pause in (*AGAIN, timedelta()):
-            assert sender.send() == 1
+            assert sender.send_due_messages() == 1
             clock.now += pause
-        assert sender.send() == 0
+        assert sender.send_due_messages() == 0
         (webhook,) = list_webhooks(allowed, "demo")
         assert webhook.failed == 1
         assert "nothing arrived since" in (webhook.off or "")
         judge(allowed, state)
-        assert sender.look() == 0
+        assert sender.queue_new_messages() == 0
         with pytest.raises(ConflictError, match="nothing arrived since"):
             send_ping(allowed, "demo", hook, actor="ann")
 
@@ -202,14 +202,14 @@ class TestTryingAgain:
         change_webhook(allowed, "demo", hook, on=False, actor="local")
         state = judge(allowed, state)
         change_webhook(allowed, "demo", hook, on=True, actor="local")
-        assert sender.look() == 0
+        assert sender.queue_new_messages() == 0
         judge(allowed, state, "deferred")
-        assert (sender.look(), sender.send()) == (1, 1)
+        assert (sender.queue_new_messages(), sender.send_due_messages()) == (1, 1)
 
     def test_who_answers_410_wants_nothing_more(self, allowed, sender, receiver, hook) -> None:
         receiver.answers = [410]
         send_ping(allowed, "demo", hook, actor="ann")
-        sender.send()
+        sender.send_due_messages()
         (webhook,) = list_webhooks(allowed, "demo")
         assert "410" in (webhook.off or "")
 
@@ -217,10 +217,10 @@ class TestTryingAgain:
         self, allowed, sender, receiver, hook
     ) -> None:
         send_ping(allowed, "demo", hook, actor="ann")
-        sender.send()
+        sender.send_due_messages()
         (delivery,) = list_deliveries(allowed, "demo", hook)
         resend_delivery(allowed, "demo", hook, delivery.id)
-        assert sender.send() == 1
+        assert sender.send_due_messages() == 1
         assert receiver.kinds == [MessageKind.PING, MessageKind.PING]
         with pytest.raises(NotFoundError):
             resend_delivery(allowed, "demo", hook, delivery.id + 1)
@@ -233,7 +233,7 @@ class TestTryingAgain:
         monkeypatch.setattr(allowed, "settings", settings)
         change_webhook(allowed, "demo", hook, url=url, actor="local")
         send_ping(allowed, "demo", hook, actor="ann")
-        sender.send()
+        sender.send_due_messages()
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert (delivery.state, delivery.status) == ("waiting", None)
         assert "could not be reached" in (delivery.problem or "")
@@ -252,7 +252,7 @@ class TestTogether:
     ) -> None:
         monkeypatch.setattr(module, "SECONDS", 0.5)
         send_ping(allowed, "demo", hook, actor="ann")
-        assert sender.send() == 2
+        assert sender.send_due_messages() == 2
         assert receiver.kinds == [MessageKind.PING]
         (delivery,) = list_deliveries(allowed, "demo", slow)
         assert "no answer" in (delivery.problem or "")
@@ -264,14 +264,14 @@ class TestTogether:
         monkeypatch.setattr(module, "TOGETHER", 2)
         for verdict in ("accepted", "deferred", "accepted"):
             state = judge(allowed, state, verdict)
-            sender.look()
-        assert sender.send() == 2
+            sender.queue_new_messages()
+        assert sender.send_due_messages() == 2
         assert receiver.kinds == [MessageKind.JUDGED]
 
     def test_a_server_that_stops_does_not_wait_for_it(
         self, allowed, sender, receiver, slow
     ) -> None:
-        sending = threading.Thread(target=sender.send)
+        sending = threading.Thread(target=sender.send_due_messages)
         sending.start()
         sender.close()
         sending.join(SECONDS)
@@ -290,8 +290,8 @@ class TestTogether:
         monkeypatch.setattr(module, "sign_message", spoilt)
         send_ping(allowed, "demo", hook, actor="ann")
         judge(allowed, state)
-        sender.look()
-        assert (sender.send(), sender.send()) == (2, 0)
+        sender.queue_new_messages()
+        assert (sender.send_due_messages(), sender.send_due_messages()) == (2, 0)
         assert receiver.kinds == [MessageKind.JUDGED]
         (_, pinged) = list_deliveries(allowed, "demo", hook)
         assert (pinged.attempts, pinged.problem) == (
@@ -311,7 +311,7 @@ class TestWhere:
         send_ping(allowed, "demo", hook, actor="ann")
         elsewhere = allowed.settings.model_copy(update={"webhooks": ["https://other.test/"]})
         monkeypatch.setattr(allowed, "settings", elsewhere)
-        sender.send()
+        sender.send_due_messages()
         assert receiver.got == []
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert "does not allow" in (delivery.problem or "")
@@ -330,7 +330,7 @@ class TestWhere:
             send_ping(allowed, "demo", number, actor="ann")
         remove_webhook(allowed, "demo", hook, actor="local")
         delete_dataset(allowed, "demo", confirm="demo", actor="ann")
-        assert (sender.look(), sender.send()) == (0, 0)
+        assert (sender.queue_new_messages(), sender.send_due_messages()) == (0, 0)
         with allowed.read() as session:
             assert session.execute(text("SELECT count(*) FROM webhook_delivery")).scalar_one() == 0
 
@@ -349,7 +349,7 @@ class TestSecrets:
         assert renewed != receiver.secret
         receiver.secret = renewed
         send_ping(allowed, "demo", hook, actor="ann")
-        sender.send()
+        sender.send_due_messages()
         assert receiver.kinds == [MessageKind.PING]
 
 
@@ -358,7 +358,7 @@ class TestForgetting:
         self, allowed, sender, hook, clock, monkeypatch
     ) -> None:
         send_ping(allowed, "demo", hook, actor="ann")
-        sender.send()
+        sender.send_due_messages()
         send_ping(allowed, "demo", hook, actor="ann")
         clock.now += timedelta(days=31)
         assert delete_old_deliveries(allowed, clock.now) == 1
@@ -372,8 +372,8 @@ class TestForgetting:
     ) -> None:
         end_job(allowed, "done")
         end_job(allowed, "done")
-        assert (sender.look(), sender.send()) == (2, 2)
+        assert (sender.queue_new_messages(), sender.send_due_messages()) == (2, 2)
         clock.now += timedelta(days=31)
         assert delete_old_deliveries(allowed, clock.now) == 2
-        assert sender.look() == 0
+        assert sender.queue_new_messages() == 0
         assert receiver.kinds == [MessageKind.JOB_DONE] * 2
