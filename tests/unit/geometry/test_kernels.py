@@ -22,7 +22,7 @@ def test_kernels_of_several_modules_are_found() -> None:
     assert {
         "resection_kernels.minimize_curve_costs",
         "curve_residuals.accumulate_equations",
-        "polyline.nearest_places",
+        "polyline.find_nearest_places",
     } <= set(KERNELS)
 
 

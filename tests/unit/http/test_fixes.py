@@ -30,14 +30,14 @@ def proposed() -> dict[str, set[str]]:
         tree = ast.parse((ROOT / "app" / "solving" / name).read_text(encoding="utf-8"))
         for part in ast.walk(tree):
             if isinstance(part, ast.FunctionDef):
-                called: dict[str, set[str]] = {"Finding": set(), "Fix": set()}
+                called: dict[str, set[str]] = {"Finding": set(), "SuggestedFix": set()}
                 for call in ast.walk(part):
                     if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
                         words = called.get(call.func.id)
                         if words is not None and isinstance(call.args[0], ast.Constant):
                             words.add(str(call.args[0].value))
                 for kind in called["Finding"]:
-                    found.setdefault(kind, set()).update(called["Fix"])
+                    found.setdefault(kind, set()).update(called["SuggestedFix"])
     return found
 
 
