@@ -36,7 +36,7 @@ from app.features.versions import commands as versions
 from app.json_text import quote_text
 from app.terminal.options import set_current_actor
 from app.terminal.server import set_current_server
-from app.terminal.terminal import allow_any_text, escape_controls, print_error
+from app.terminal.terminal import escape_controls, escape_unencodable_output, print_error
 from app.workers import commands as cluster
 
 READER_GONE = 141
@@ -144,7 +144,7 @@ def options(
 
 def run() -> None:
     """Carry out a command line: what a caller can cause is one sentence on stderr and exit code 1."""
-    allow_any_text()
+    escape_unencodable_output()
     gc.set_threshold(YOUNG)
     try:
         app()

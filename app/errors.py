@@ -69,10 +69,12 @@ class ReviewError(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         """Travels from one process to another, with the disk's own error where it has one."""
         cause = self.__cause__ if isinstance(self.__cause__, OSError) else None
-        return type(self)._again, (self.args, vars(self), cause)
+        return type(self)._rebuild_from_pickle, (self.args, vars(self), cause)
 
     @classmethod
-    def _again(cls, args: tuple[Any, ...], values: dict[str, Any], cause: OSError | None) -> Self:
+    def _rebuild_from_pickle(
+        cls, args: tuple[Any, ...], values: dict[str, Any], cause: OSError | None
+    ) -> Self:
         error = cls.__new__(cls, *args)
         vars(error).update(values)
         error.__cause__ = cause

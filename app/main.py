@@ -57,7 +57,7 @@ from app.http import openapi
 from app.http.access import AccessControl
 from app.http.deps import Services
 from app.http.errors import install_error_handlers
-from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
+from app.http.headers import HostNameGuard, SameOriginGuard, SecurityHeaders
 from app.http.idempotency import IdempotencyHandler
 from app.http.metrics import SharedProcessMetrics, install_metrics
 from app.http.openapi import install_openapi_document
@@ -197,8 +197,8 @@ def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None
     app.add_middleware(SingleRangeFilter)
     app.add_middleware(HeadAsGet)
     app.add_middleware(AmbiguousLengthGuard)
-    app.add_middleware(SameOrigin, url=settings.url, required=settings.team)
-    app.add_middleware(KnownHosts, allowed=list_allowed_hosts(settings))
+    app.add_middleware(SameOriginGuard, url=settings.url, required=settings.team)
+    app.add_middleware(HostNameGuard, allowed=list_allowed_hosts(settings))
     install_metrics(app, app.state.gate.limits)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.get_security_policy)

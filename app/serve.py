@@ -85,7 +85,7 @@ def serve(
                 application.state.services.store.require_intact_database()
             say(f"Touchline is at {address}")
             if settings.team:
-                _print_first_link(application.state.services.store, settings.url or address)
+                _print_first_admin_link(application.state.services.store, settings.url or address)
             serve_application(application, socket)
 
 
@@ -130,14 +130,14 @@ def _print_address(settings: Settings, address: str) -> None:
     say(f"Touchline is at {address}")
     if settings.team:
         with open_store(settings) as store:
-            _print_first_link(store, settings.url or address)
+            _print_first_admin_link(store, settings.url or address)
 
 
-def _print_first_link(store: Store, base: str) -> None:
+def _print_first_admin_link(store: Store, base: str) -> None:
     """Show whoever starts a server without an admin how to become one."""
-    from app.features.people.links import FIRST_LASTS, make_first_link
+    from app.features.people.links import FIRST_LASTS, make_first_admin_link
 
-    link = make_first_link(store, actor=get_current_actor())
+    link = make_first_admin_link(store, actor=get_current_actor())
     if link is not None:
         hours = int(FIRST_LASTS.total_seconds() // 3600)
         say(f"No admin can log in yet. Become one here (good once, for {hours} hours):")

@@ -28,7 +28,7 @@ WARM_WAITING = 100
 Explain = Callable[[WorkerEnded], Exception]
 
 
-def accept_all_tasks() -> None:
+def begin_without_check() -> None:
     """Begin every task."""
 
 
@@ -40,7 +40,7 @@ class PoolTask:
         begin: Called before the task is given to a worker; what it raises is the result instead.
     """
 
-    def __init__(self, explain: Explain, begin: Callable[[], None] = accept_all_tasks) -> None:
+    def __init__(self, explain: Explain, begin: Callable[[], None] = begin_without_check) -> None:
         self.future: Future[Any] = Future()
         self._explain, self._begin = explain, begin
         self._abandoned = threading.Event()
@@ -145,7 +145,7 @@ class WorkerPool:
         work: Callable[..., Any],
         *arguments: Any,
         explain: Explain | None = None,
-        begin: Callable[[], None] = accept_all_tasks,
+        begin: Callable[[], None] = begin_without_check,
         bounded: bool = True,
     ) -> PoolTask:
         """Have a function of a module called in a worker.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.sample.fixture import group_counts_by_match
 from app.sample.scene import Scene
-from app.sample.scenes import make_match
+from app.sample.scenes import make_match_scenes
 
 
 def make_scenes(groups: int, seed: int, faults: bool = True) -> list[Scene]:
@@ -12,5 +12,5 @@ def make_scenes(groups: int, seed: int, faults: bool = True) -> list[Scene]:
     return [
         scene
         for match, count in enumerate(group_counts_by_match(groups))
-        for scene in make_match(match, count, seed, faults)
+        for scene in make_match_scenes(match, count, seed, faults)
     ]

@@ -27,12 +27,16 @@ from app.db.dialects.dialect import (
     get_dialect,
     get_session_dialect,
     make_engine,
-    report_storage_errors,
+    translate_storage_errors,
 )
 from app.db.home import is_half_written, make_file_access_error
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseOpenLock
 from app.db.log import verify_chain
-from app.db.recovery.anchor import DatabaseAnchor, read_anchor_of_database, require_own_database
+from app.db.recovery.anchor import (
+    DatabaseAnchor,
+    compute_anchor_from_database,
+    require_own_database,
+)
 from app.db.recovery.preopen_check import list_signs_of_use, require_consistent_home_files
 from app.db.session import Session, now
 from app.durable import PARTIAL, sync_to_disk
@@ -92,7 +96,7 @@ def back_up_home(settings: Settings, out: Path, folders: Sequence[str] = ()) -> 
             f"there is no database in {settings.home}",
             hint="Set TOUCHLINE_HOME to the home folder of an installation.",
         )
-    lock = DatabaseLock(settings)
+    lock = DatabaseOpenLock(settings)
     try:
         if lock.alone:
             require_consistent_home_files(settings)
@@ -216,7 +220,7 @@ def examine_database(
     own = settings.model_copy(update={"database_url": f"sqlite+pysqlite:///{file}"})
     engine = make_engine(own)
     try:
-        with report_storage_errors(own), Session(engine) as session:
+        with translate_storage_errors(own), Session(engine) as session:
             dialect, tables = get_session_dialect(session), set(inspect(session).get_table_names())
             if "alembic_version" not in tables or "log" not in tables:
                 raise DamagedError(f"{known_as} is not a Touchline database", hint=EXAMINE)
@@ -231,7 +235,7 @@ def examine_database(
                 for name in _COUNTED
                 if name in tables
             }
-            return read_anchor_of_database(session) or _read_anchor_without_installation(
+            return compute_anchor_from_database(session) or _read_anchor_without_installation(
                 session
             ), counts
     finally:
@@ -276,10 +280,10 @@ def _copy_database(settings: Settings, copy: Path) -> None:
     os.close(os.open(copy, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     engine = make_engine(settings)
     try:
-        with report_storage_errors(settings):
+        with translate_storage_errors(settings):
             require_own_database(engine, settings)
         with (
-            report_storage_errors(settings),
+            translate_storage_errors(settings),
             engine.connect() as connection,
             closing(pysqlite3.dbapi2.connect(str(copy))) as target,
         ):
@@ -346,7 +350,7 @@ def _iterate_files_of_folders(home: Path, folders: Sequence[str]) -> Iterator[Pa
 
 def _add_file(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
     """Put a file into a backup; FileNotFoundError, and nothing is in it, where there is none."""
-    with _report_read_errors(path):
+    with _translate_read_errors(path):
         info = zipfile.ZipInfo.from_file(path, name)
         source = path.open("rb")
     info.compress_type = packed
@@ -356,7 +360,7 @@ def _add_file(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> di
 
 def _read_chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
     while True:
-        with _report_read_errors(path):
+        with _translate_read_errors(path):
             chunk = source.read(_CHUNK)
         if not chunk:
             return
@@ -364,7 +368,7 @@ def _read_chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
 
 
 @contextmanager
-def _report_read_errors(path: Path) -> Iterator[None]:
+def _translate_read_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:

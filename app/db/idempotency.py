@@ -298,15 +298,15 @@ def claim_key(store: Store, key: str, actor: str) -> bool:
     Raises:
         StorageError: The database cannot be asked.
     """
-    return store.sharing.claim(_claim_name(key, actor))
+    return store.sharing.claim(_make_claim_name(key, actor))
 
 
 def release_key(store: Store, key: str, actor: str) -> None:
     """Let others respond under it: what they find is stored by now."""
-    store.sharing.release(_claim_name(key, actor))
+    store.sharing.release(_make_claim_name(key, actor))
 
 
-def _claim_name(key: str, actor: str) -> str:
+def _make_claim_name(key: str, actor: str) -> str:
     return f"answer/{actor}/{key}"
 
 

@@ -55,7 +55,7 @@ def parse_json_as(text: str | bytes, kind: type[Shape]) -> Shape:
 
 
 @contextmanager
-def report_damaged_values() -> Iterator[None]:
+def translate_shape_errors_to_damage() -> Iterator[None]:
     """For making values of stored JSON: what has another shape than we gave it is damage.
 
     Raises:

@@ -55,7 +55,7 @@ def require_lock(handle: int, held: str, seconds: float) -> None:
         )
 
 
-class DatabaseLock:
+class DatabaseOpenLock:
     """Says that a process has the database open.
 
     ``database.lock`` is shared by all who have. Who opens it holds ``opening.lock`` meanwhile:
@@ -101,7 +101,7 @@ def hold_exclusive_database_lock(settings: Settings, why: str) -> Iterator[None]
     Raises:
         StorageError: Somebody has it open; ``why`` says what cannot be done meanwhile.
     """
-    lock = DatabaseLock(settings)
+    lock = DatabaseOpenLock(settings)
     try:
         if not lock.alone:
             raise StorageError(

@@ -143,14 +143,14 @@ _NEWEST_STEPS = (
 )
 
 
-def list_group_steps(
+def list_group_entry_kinds(
     session: Session, group_ids: Sequence[int], kinds: Iterable[str]
 ) -> Sequence[Any]:
     """Rows (group_id, id, kind) of the entries of some kinds about groups, in order."""
     return session.execute(_STEPS, {"groups": list(group_ids), "kinds": list(kinds)}).all()
 
 
-def list_newest_steps(
+def list_newest_entry_kinds(
     session: Session, group_id: int, kinds: Iterable[str], most: int
 ) -> Sequence[Any]:
     """Rows (id, kind) of the newest entries of some kinds about a group, the newest first."""
@@ -158,7 +158,9 @@ def list_newest_steps(
     return session.execute(_NEWEST_STEPS, parameters).all()
 
 
-def list_station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:
+def list_station_entry_kinds(
+    session: Session, station_id: int, kinds: Iterable[str]
+) -> Sequence[Any]:
     """Rows (id, kind) of the entries of some kinds about a station, in order."""
     statement = (
         select(LogModel.id, LogModel.kind)

@@ -9,9 +9,15 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings, find_packaged_folder
 from app.db.backup import write_backup
-from app.db.dialects.dialect import WRITE, Dialect, get_dialect, make_engine, report_storage_errors
+from app.db.dialects.dialect import (
+    WRITE,
+    Dialect,
+    get_dialect,
+    make_engine,
+    translate_storage_errors,
+)
 from app.db.home import create_private_file
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseOpenLock
 from app.db.recovery.anchor import renew_anchor, require_own_database
 from app.db.recovery.preopen_check import require_consistent_home_files
 from app.errors import StorageError
@@ -65,16 +71,16 @@ def migrate_database(settings: Settings) -> MigrationResult:
         StorageError: The database is newer than this version, or somebody has it open.
         DamagedError: The database is not what was written, or not the one of its home.
     """
-    lock = DatabaseLock(settings)
+    lock = DatabaseOpenLock(settings)
     try:
         if lock.alone and get_dialect(settings).is_file:
             require_consistent_home_files(settings)
-        return migrate_locked_database(settings, alone=lock.alone)
+        return migrate_database_under_lock(settings, alone=lock.alone)
     finally:
         lock.release()
 
 
-def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResult:
+def migrate_database_under_lock(settings: Settings, *, alone: bool) -> MigrationResult:
     """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
     dialect = get_dialect(settings)
     if dialect.is_file:
@@ -82,7 +88,7 @@ def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResu
     engine = make_engine(settings)
     copy = None
     try:
-        with report_storage_errors(settings):
+        with translate_storage_errors(settings):
             revision = read_schema_revision(engine)
             _refuse_newer_schema(revision, settings)
             require_own_database(engine, settings)
@@ -94,7 +100,7 @@ def migrate_locked_database(settings: Settings, *, alone: bool) -> MigrationResu
                         hint="Stop that process, then run touchline migrate.",
                     )
                 if dialect.is_file:
-                    copy = _backup_folder(settings) / COPY.format(SCHEMA_REVISION)
+                    copy = _make_backup_folder(settings) / COPY.format(SCHEMA_REVISION)
                     write_backup(settings, copy, replace=True)
             if revision != SCHEMA_REVISION:
                 apply_missing_migrations(engine, dialect, new=revision is None)
@@ -122,7 +128,7 @@ def apply_missing_migrations(engine: Engine, dialect: Dialect, *, new: bool) -> 
         command.upgrade(config, "head")
 
 
-def _backup_folder(settings: Settings) -> Path:
+def _make_backup_folder(settings: Settings) -> Path:
     folder = settings.home / "backups"
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder

@@ -92,7 +92,7 @@ def _restore_through_folder(settings: Settings, source: Path, folder: Path) -> R
     if zipfile.is_zipfile(source):
         expected, foreign_log = _unpack_backup(source, folder), False
     else:
-        expected, foreign_log = None, _copy_files(source, folder)
+        expected, foreign_log = None, _copy_database_and_own_log(source, folder)
     anchor, rows = examine_database(settings, folder / DATABASE, source)
     if anchor.schema not in KNOWN_REVISIONS:
         raise newer_schema_error(anchor.schema, settings)
@@ -148,7 +148,7 @@ def _safe_member_path(name: str, source: Path) -> PurePosixPath:
     return path
 
 
-def _copy_files(source: Path, folder: Path) -> bool:
+def _copy_database_and_own_log(source: Path, folder: Path) -> bool:
     """Copy a database and the log that belongs to it; returns whether another one lay there."""
     header = read_header(source)
     if header is None:

@@ -13,23 +13,23 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
-from app.db.dialects.dialect import AGAIN, WRITE, get_dialect, make_engine, report_storage_errors
+from app.db.dialects.dialect import AGAIN, WRITE, get_dialect, make_engine, translate_storage_errors
 from app.db.home import create_private_file
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseOpenLock
 from app.db.migrate import (
     KNOWN_REVISIONS,
     SCHEMA_REVISION,
-    migrate_locked_database,
+    migrate_database_under_lock,
     newer_schema_error,
     read_schema_revision,
 )
 from app.db.recovery.anchor import (
     DatabaseAnchor,
+    flush_anchor_to_disk,
     overwrite_anchor,
     read_anchor,
     renew_anchor,
     require_own_database,
-    sync_anchor,
 )
 from app.db.recovery.preopen_check import OpenDatabaseFile, require_consistent_home_files
 from app.db.session import InstallationModel, Session
@@ -81,7 +81,7 @@ class Store:
         self,
         engine: Engine,
         settings: Settings,
-        lock: DatabaseLock,
+        lock: DatabaseOpenLock,
         turn: AbstractContextManager[object],
     ):
         self.settings = settings
@@ -93,7 +93,7 @@ class Store:
         # Connections of its own: one that waits for no disk must never carry what was promised.
         self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
         self.sharing = get_dialect(settings).sharing(
-            engine, lambda: report_storage_errors(settings)
+            engine, lambda: translate_storage_errors(settings)
         )
         self._lock = lock
         self.turn = turn
@@ -119,7 +119,7 @@ class Store:
             DamagedError: The database is not what was written, or not the one of its home.
             InputError: The URL is neither one of SQLite nor of PostgreSQL.
         """
-        lock = DatabaseLock(settings)
+        lock = DatabaseOpenLock(settings)
         engine: Engine | None = None
         try:
             engine = _open_engine(settings, lock.alone)
@@ -266,7 +266,7 @@ class Store:
     @contextmanager
     def _note_raised_damage(self) -> Iterator[None]:
         try:
-            with report_storage_errors(self.settings):
+            with translate_storage_errors(self.settings):
                 yield
         except DamagedError as error:
             self.note_damage(error)
@@ -341,7 +341,7 @@ class Store:
             if engine is not None:
                 engine.dispose()
         try:
-            sync_anchor(self.settings.database_file)
+            flush_anchor_to_disk(self.settings.database_file)
         except OSError as error:
             # One that stays behind is right, too.
             log.warning("home.json cannot be synced", error=str(error))
@@ -356,10 +356,10 @@ def _open_engine(settings: Settings, alone: bool) -> Engine:
             require_consistent_home_files(settings)
         create_private_file(settings.database_file)
     try:
-        with report_storage_errors(settings):
+        with translate_storage_errors(settings):
             dialect.require_supported_configuration(engine)
             if read_schema_revision(engine) is None:
-                migrate_locked_database(settings, alone=alone)
+                migrate_database_under_lock(settings, alone=alone)
             _require_schema(engine, settings)
             require_own_database(engine, settings)
             renew_anchor(engine, settings, alone=alone)

@@ -217,7 +217,7 @@ COLUMNS = (
 )
 
 
-def make_detection_summary(judged: Sequence[JudgedFrame], resamples: MatchResamples) -> Table:
+def make_average_precision_table(judged: Sequence[JudgedFrame], resamples: MatchResamples) -> Table:
     """AP with intervals by match."""
     hits = match_detections_to_balls(judged)
     place = resamples.find_match_columns([item.frame.match for item in judged])
@@ -369,7 +369,7 @@ def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
     return Figure(bins.figure, bins.title, (panel,), note)
 
 
-def make_detection_table(
+def make_detection_table_by_bin(
     judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: ErrorBins
 ) -> Table:
     """AP over the frames of each bin, with how many of their balls were found.

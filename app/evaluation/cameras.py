@@ -39,7 +39,7 @@ from app.solving.jaccard import (
     measure_markings,
     project_markings,
 )
-from app.solving.match_position import NO_PLACES, FramePlaces, calibrate_with_match_position
+from app.solving.match_position import NO_PLACES, FrameCameraPlaces, calibrate_with_match_position
 from app.solving.observations import make_observations
 from app.solving.resect import ResectionProblem
 from app.wording import plural
@@ -121,7 +121,7 @@ def measure_leave_one_out_errors(
     pitch: Pitch,
     size: ImageSize,
     policy: CalibrationPolicy,
-    others: FramePlaces = NO_PLACES,
+    others: FrameCameraPlaces = NO_PLACES,
 ) -> Iterator[tuple[str, float | None]]:
     """Each marking with the largest distance of its points from where the others put it.
 
@@ -145,7 +145,7 @@ def measure_error_without_marking(
     pitch: Pitch,
     size: ImageSize,
     policy: CalibrationPolicy,
-    others: FramePlaces = NO_PLACES,
+    others: FrameCameraPlaces = NO_PLACES,
 ) -> float | None:
     """Largest distance of a marking's points from where the others put it, pixels."""
     rest = make_lines({name: points for name, points in lines.items() if name != marking})

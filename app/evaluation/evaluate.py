@@ -13,8 +13,8 @@ from app.evaluation.average_precision import (
     DISTANCE,
     PARALLAX,
     SIZE,
-    make_detection_summary,
-    make_detection_table,
+    make_average_precision_table,
+    make_detection_table_by_bin,
     make_error_figure,
     make_precision_recall_figure,
 )
@@ -29,9 +29,9 @@ from app.evaluation.frame import (
     size_error_percent,
 )
 from app.evaluation.localization import (
+    make_frame_result,
     make_localization_table,
     make_precision_distance_figure,
-    measure_frame,
 )
 from app.evaluation.result import (
     Axis,
@@ -313,7 +313,7 @@ def _measure_frames(
     results = []
     for item in judged:
         frame = item.frame
-        result = measure_frame(
+        result = make_frame_result(
             item, options.ball_diameter_m, cameras.get(frame.id), options.min_score
         )
         box = careful.get(frame.id)
@@ -343,10 +343,10 @@ def _make_detection_tables(
     inputs: EvaluationInputs,
     resamples: MatchResamples,
 ) -> Iterator[Table]:
-    yield make_detection_summary(judged, resamples)
+    yield make_average_precision_table(judged, resamples)
     yield make_localization_table(results, resamples, predicted=inputs.cameras is not None)
-    yield make_detection_table(judged, results, SIZE)
-    yield make_detection_table(judged, results, DISTANCE)
+    yield make_detection_table_by_bin(judged, results, SIZE)
+    yield make_detection_table_by_bin(judged, results, DISTANCE)
 
 
 def _make_detection_figures(

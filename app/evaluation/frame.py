@@ -192,7 +192,7 @@ class FrameNameIndex:
                 stations.setdefault(frame.station, []).append(frame.id)
             own = _distinguishing_names(frame)
             telling |= own
-            for name in own | _names_within_dataset(frame):
+            for name in own | _ambiguous_names(frame):
                 other = index.setdefault(name, frame.id)
                 if other != frame.id:
                     index[name] = _SEVERAL
@@ -292,7 +292,7 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
     return _add_separator_variants(names) | {name for name in _exported_names(frame) if name}
 
 
-def _names_within_dataset(frame: NamedFrame) -> set[str]:
+def _ambiguous_names(frame: NamedFrame) -> set[str]:
     """Names that another match could have as well."""
     last = _strip_suffix(frame.match).rsplit("/", 1)[-1]
     within = _names_within_match(frame)

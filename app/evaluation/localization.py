@@ -28,7 +28,7 @@ from app.geometry.sphere import position_from_diameter
 from app.wording import plural
 
 
-def measure_frame(
+def make_frame_result(
     item: JudgedFrame, diameter_m: float, predicted: Camera | None = None, min_score: float = 0.0
 ) -> FrameResult:
     """Everything that is known about one frame.
@@ -147,7 +147,7 @@ def make_localization_table(
     and a frame without any place counts as missed in P_2m.
 
     Args:
-        frames: As ``place.measure_frame`` made them.
+        frames: As ``place.make_frame_result`` made them.
         resamples: For the intervals.
         predicted: Whether there are predicted cameras.
     """

@@ -37,7 +37,12 @@ from app.evaluation.prediction_run import (
     read_field,
     report_invalid_record,
 )
-from app.evaluation.prediction_table import is_ball_table, is_mot_text, read_table, read_tracks
+from app.evaluation.prediction_table import (
+    is_ball_track_table,
+    is_mot_text,
+    read_table,
+    read_tracks,
+)
 from app.formats import fields
 from app.formats.ball_names import is_ball_name
 from app.formats.cameras import read_cameras
@@ -157,7 +162,9 @@ def _guess_format_from_suffixes(path: Path, limits: ImportLimits) -> str:
         if tree is not None and kind == "csv":
             tables = (name for name in names if name.lower().endswith(".csv"))
             return (
-                "tracks" if any(is_ball_table(tree.read_bytes(name)) for name in tables) else kind
+                "tracks"
+                if any(is_ball_track_table(tree.read_bytes(name)) for name in tables)
+                else kind
             )
         if tree is not None and kind == "yolo":
             first = next(name for name in names if name.lower().endswith(".txt"))

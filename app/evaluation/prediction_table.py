@@ -242,7 +242,7 @@ _SIGMAS = ("sigma_x_m", "sigma_y_m", "sigma_z_m")
 _MOST_FRAME = 2**31
 
 
-def is_ball_table(content: bytes) -> bool:
+def is_ball_track_table(content: bytes) -> bool:
     """Whether a CSV is of balls in 3D over time, by its header."""
     header = content[:4096].split(b"\n", 1)[0].decode("utf-8", "replace").lower()
     return set(_PLACE) <= {name.strip() for name in header.split(",")}
@@ -260,7 +260,7 @@ def read_tracks(
     """
     tables = [name for name in tree.names() if name.lower().endswith(".csv")]
     names = [name for name in tables if PurePosixPath(name).name.lower() == BALL]
-    names = names or [name for name in tables if is_ball_table(tree.read_bytes(name))]
+    names = names or [name for name in tables if is_ball_track_table(tree.read_bytes(name))]
     folders = [str(PurePosixPath(name).parent) for name in names]
     if not names or len(set(folders)) < len(folders):
         what = "no ball.csv" if not names else "several tables of balls in one folder"

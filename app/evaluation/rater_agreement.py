@@ -266,7 +266,7 @@ def find_disagreements(
     return tuple(sorted(found, key=lambda item: -item.weight))
 
 
-def measure_spreads(distances: Iterable[GroupDistance]) -> dict[str, MedianAndTail]:
+def compute_medians_and_tails(distances: Iterable[GroupDistance]) -> dict[str, MedianAndTail]:
     """Each of ``MEASURES`` over many groups: of every line, every ball, every view and group."""
     values: dict[str, list[float | None]] = {name: [] for name in MEASURES}
     for distance in distances:

@@ -26,7 +26,7 @@ STEPS = 21
 
 
 @dataclass(frozen=True)
-class BallSample:
+class BallSensitivity:
     """One ball of the sample.
 
     Attributes:
@@ -69,7 +69,7 @@ def choose_frames(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> lis
     return [able[index] for index in sorted(chosen.tolist())]
 
 
-def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
+def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSensitivity:
     """The curves of one ball; the frame is one of ``choose_frames``."""
     camera, box = frame.camera, frame.boxes["optimized"]
     assert camera is not None
@@ -84,7 +84,7 @@ def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
         return float(np.linalg.norm(place - origin))
 
     size_slope, shift_slope = error_slopes(camera, box, diameter_m)
-    return BallSample(
+    return BallSensitivity(
         frame,
         float(np.linalg.norm(origin - camera.position)),
         np.array([measure_displacement(0.0, percent) for percent in make_size_changes()]),
@@ -137,7 +137,7 @@ def _error_slopes_of_wide_lens(
     return away / diameter, float(np.linalg.norm(locate_ball(0.5) - locate_ball(-0.5)))
 
 
-def make_sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
+def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Figure:
     """Both panels, a curve per ball coloured by its distance, the derivative dashed beside it."""
     color = Axis("Distance to the camera", "m")
     size = Panel(
@@ -170,7 +170,7 @@ def make_sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
     return Figure("sensitivity", "Sensitivity of the ball from one view", (size, shift), note)
 
 
-def make_sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
+def make_sensitivity_table(samples: Sequence[BallSensitivity], able: int) -> Table:
     """How far the ball moves at the ends of both curves, and what that has to do with distance."""
     rows = (
         _make_sensitivity_row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
@@ -193,7 +193,7 @@ def make_sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
 
 
 def _make_sensitivity_row(
-    name: str, label: str, samples: Sequence[BallSample], able: int, percent: float
+    name: str, label: str, samples: Sequence[BallSensitivity], able: int, percent: float
 ) -> Row:
     curves = [item.by_size if name == "size" else item.by_shift for item in samples]
     slope = [item.size_slope if name == "size" else item.shift_slope for item in samples]
@@ -214,7 +214,7 @@ def _make_sensitivity_row(
 
 
 def _make_curve_and_slope_series(
-    item: BallSample, places: FloatArray, moved: FloatArray, slope: float
+    item: BallSensitivity, places: FloatArray, moved: FloatArray, slope: float
 ) -> tuple[Series, ...]:
     name = f"{item.frame.group} {item.frame.view}"
     x = tuple(places.round(9).tolist())

@@ -188,7 +188,7 @@ def _compare_track(
         rows[place[known[::-1]]] = known[::-1]
         found.beside += len(place) - int((there & (rows >= 0)).sum())
         if predicted.events is not None:
-            found.events.append(_pair_track_events(track, predicted))
+            found.events.append(_collect_track_events(track, predicted))
     position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)
     sigma = np.zeros((0, 3)) if predicted is None else predicted.sigma_array
     for row in np.flatnonzero(there):
@@ -220,7 +220,7 @@ def _estimate_frame_interval_s(track: GroundTruthTrack) -> float:
     return float(np.median(np.diff(track.times))) if len(track.times) > 1 else 0.04
 
 
-def _pair_track_events(
+def _collect_track_events(
     track: GroundTruthTrack, predicted: PredictedTrack
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]], float]:
     by_frame = {

@@ -22,7 +22,7 @@ Annotation = tuple[str, Mapping[str, Any]]
 """Its place in the file (``annotations[3]``), and itself."""
 
 
-class JoinedAnnotations:
+class AnnotationsByImage:
     """The annotations of each image.
 
     Args:

@@ -19,7 +19,7 @@ from app.formats.picture_finder import (
     LabelLocation,
     PictureFinder,
     PictureSearchResult,
-    assign_pictures,
+    drop_contested_pictures,
     parse_split_name,
     split_picture_name,
 )
@@ -74,7 +74,7 @@ class CocoFrame:
 
 
 @dataclass
-class FrameFile:
+class CocoFileFrames:
     """The frames of one file, and where that lies."""
 
     path: str
@@ -88,7 +88,7 @@ class FrameFile:
 
 
 def group_frames(
-    files: Sequence[FrameFile],
+    files: Sequence[CocoFileFrames],
     tree: FileTree,
     names: Sequence[str],
     calibration: str,
@@ -105,7 +105,7 @@ def group_frames(
     """
     finder = PictureFinder(names)
     for file in _mark_folders_of_other_files(files):
-        _find_pictures(file, finder, report)
+        _assign_pictures_to_frames(file, finder, report)
     frames = _merge_frames(files, report)
     for key, members in _group_by_key(frames, report):
         views = tuple(_make_view(key, frame, tree, calibration) for frame in members)
@@ -121,7 +121,7 @@ def group_frames(
         )
 
 
-def _mark_folders_of_other_files(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
+def _mark_folders_of_other_files(files: Sequence[CocoFileFrames]) -> Iterator[CocoFileFrames]:
     """The files, each knowing which pictures are those of others."""
     subsets = {file.home.subset.lower() for file in files} - {"", "default", *PICTURE_FOLDERS}
     roots = {file.home.root for file in files} - {""}
@@ -136,11 +136,15 @@ def _mark_folders_of_other_files(files: Sequence[FrameFile]) -> Iterator[FrameFi
         yield file
 
 
-def _find_pictures(file: FrameFile, finder: PictureFinder, report: ReaderReport) -> None:
+def _assign_pictures_to_frames(
+    file: CocoFileFrames, finder: PictureFinder, report: ReaderReport
+) -> None:
     first: dict[tuple[str, ...], CocoFrame] = {}
     for frame in file.frames:
         first.setdefault(frame.parts, frame)
-    found = assign_pictures({parts: _find_picture(parts, file.home, finder) for parts in first})
+    found = drop_contested_pictures(
+        {parts: _find_picture(parts, file.home, finder) for parts in first}
+    )
     for frame in file.frames:
         frame.place = found[frame.parts].place
     _report_picture_problems(file, found, first, finder, report)
@@ -157,7 +161,7 @@ def _find_picture(
 
 
 def _report_picture_problems(
-    file: FrameFile,
+    file: CocoFileFrames,
     found: Mapping[tuple[str, ...], PictureSearchResult],
     first: Mapping[tuple[str, ...], CocoFrame],
     finder: PictureFinder,
@@ -196,7 +200,7 @@ def _report_picture_problems(
             report.add_remark(f"{file.path}: {sentence}")
 
 
-def _merge_frames(files: Sequence[FrameFile], report: ReaderReport) -> list[CocoFrame]:
+def _merge_frames(files: Sequence[CocoFileFrames], report: ReaderReport) -> list[CocoFrame]:
     """Each frame once, with all that the files say of it."""
     known: dict[tuple[str, ...], list[CocoFrame]] = {}
     frames: list[CocoFrame] = []

@@ -22,14 +22,14 @@ from app.formats.ball_names import (
 from app.formats.camera_json import camera_from_json
 from app.formats.coco_annotation import (
     Annotation,
-    JoinedAnnotations,
+    AnnotationsByImage,
     MissingPositionError,
     ball_from_annotation,
     box_from_annotation,
     is_occluded,
     quote_value,
 )
-from app.formats.coco_frames import CocoFrame, FrameFile, find_split_in_folders, group_frames
+from app.formats.coco_frames import CocoFileFrames, CocoFrame, find_split_in_folders, group_frames
 from app.formats.fields import id_to_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import UNASSIGNED
@@ -44,7 +44,7 @@ from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc_image_record
 from app.formats.trees import open_tree_context
-from app.formats.view_state import GroupAssembler, PlacedView, StateReader
+from app.formats.view_state import GroupAssembler, PlacedView, RecordFieldReader
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, box_from_corner_origin
@@ -163,17 +163,17 @@ class _CocoFileReader:
         folder = "" if str(place.parent) == "." else str(place.parent)
         known = task is not None or bool(find_split_in_word(stem))
         self._home = LabelLocation(folder, subset if known and subset != "default" else "", split)
-        self.frames = FrameFile(self.path, self._home, [])
+        self.frames = CocoFileFrames(self.path, self._home, [])
         annotations = self._get_list("annotations")
         self.categories = CocoCategories(
             self._get_list("categories"), annotations, self.path, report, ball_category
         )
-        self._joined = JoinedAnnotations(value["images"], annotations, self.path, report)
+        self._joined = AnnotationsByImage(value["images"], annotations, self.path, report)
         self.captions = self._joined.captions
 
     def release_parsed_content(self) -> None:
         """Let go of everything but the frames: the next file may be as large."""
-        self._value, self._joined = {}, JoinedAnnotations([], [], self.path, self._report)
+        self._value, self._joined = {}, AnnotationsByImage([], [], self.path, self._report)
 
     def _get_list(self, name: str) -> list[Any]:
         """A list that need not be there."""
@@ -194,7 +194,7 @@ class _CocoFileReader:
             record = f"images[{index}]"
             self._report.read += 1
             try:
-                image = StateReader(item, self.path, record)
+                image = RecordFieldReader(item, self.path, record)
                 if STATE in image.value:
                     yield self._read_own_image(image, index)
                 else:
@@ -212,8 +212,8 @@ class _CocoFileReader:
         problem = f"{error.problem}; left out with {plural(count, 'annotation')}"
         return DatasetFormatError(error.path, error.record, error.field, problem)
 
-    def _read_own_image(self, image: StateReader, index: int) -> PlacedView:
-        state = StateReader(image.value[STATE], self.path, image.record)
+    def _read_own_image(self, image: RecordFieldReader, index: int) -> PlacedView:
+        state = RecordFieldReader(image.value[STATE], self.path, image.record)
         view = state.read_view(image.read_size(), Extras())
         changed = self._apply_box_changes(index, view, state.value.get(ORIGIN) == CORNER)
         media = self._find_own_media(image.read_short_text("file_name", ""))
@@ -278,7 +278,7 @@ class _CocoFileReader:
 
     def _read_bbox(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
-            return StateReader.parse_box(item.get("bbox"))
+            return RecordFieldReader.parse_box(item.get("bbox"))
         except ValueError as error:
             self._report_problem(record, "bbox", f"{error}; left out")
             return None
@@ -288,7 +288,7 @@ class _CocoFileReader:
         place = self._finder.find_picture(split_picture_name(name), self._home).place
         return None if place is None else self._tree.media(place)
 
-    def _read_foreign_image(self, image: StateReader, index: int) -> CocoFrame:
+    def _read_foreign_image(self, image: RecordFieldReader, index: int) -> CocoFrame:
         parts = split_picture_name(image.read_short_text("file_name"))
         key = self._make_image_key(image, parts)
         group, view = self._read_group_and_view(image, key)
@@ -301,7 +301,7 @@ class _CocoFileReader:
             self._add_annotation(frame, item, record)
         return frame
 
-    def _make_image_key(self, image: StateReader, parts: tuple[str, ...]) -> str:
+    def _make_image_key(self, image: RecordFieldReader, parts: tuple[str, ...]) -> str:
         """Key of an image: its name; of one on another machine the last part, where that is enough."""
         text = image.read_short_text("file_name")
         key = "/".join(parts)
@@ -352,7 +352,7 @@ class _CocoFileReader:
             self._report_problem(record, "iscrowd", "is 1: a crowd cannot be one ball; left out")
         return crowd
 
-    def _read_foreign_camera(self, image: StateReader) -> Camera | None:
+    def _read_foreign_camera(self, image: RecordFieldReader) -> Camera | None:
         """The camera that a file of somebody else gives; one that is none is reported."""
         given = image.value.get(CAMERA)
         try:
@@ -365,7 +365,7 @@ class _CocoFileReader:
             self._report_problem(image.record, field, f"{error.problem}; left out")
             return None
 
-    def _read_group_and_view(self, image: StateReader, key: str) -> tuple[str | None, str]:
+    def _read_group_and_view(self, image: RecordFieldReader, key: str) -> tuple[str | None, str]:
         """Group and name of a view; no group where the file says none."""
         group, view = image.value.get("group_id"), image.value.get("view")
         if group is None or isinstance(group, bool) or not isinstance(group, str | int | float):
@@ -377,7 +377,7 @@ class _CocoFileReader:
         return _require_safe_path(image, "group_id", group), _require_safe_path(image, "view", view)
 
 
-def _require_safe_path(image: StateReader, field: str, value: str | float) -> str:
+def _require_safe_path(image: RecordFieldReader, field: str, value: str | float) -> str:
     text = value if isinstance(value, str) else id_to_text(value) or ""
     try:
         return str(PurePosixPath(require_safe_path(text)))

@@ -57,7 +57,7 @@ def _to_builtin_number(value: float) -> float:
     return int(value) if isinstance(value, int) else float(value)
 
 
-class CsvTable:
+class CsvTableWriter:
     """A CSV file with pandas' unnamed index column, written row by row."""
 
     def __init__(self, file: IO[str], columns: Iterable[str]):

@@ -144,7 +144,7 @@ def write_format(
         records = _require_supported_lenses(records, options.format)
     everything, boxes = options.everything, options.boxes
     counts = {"groups": 0}
-    groups = _count_groups(records, counts)
+    groups = _iterate_counted_groups(records, counts)
     match options.format:
         case "soccernet-v3d":
             return write_soccernet_v3d(root, records, everything=everything, boxes=boxes)
@@ -187,7 +187,9 @@ def write_format(
             return found | (write_track_tables(root, options.kept) if options.kept else {})
 
 
-def _count_groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:
+def _iterate_counted_groups(
+    records: Iterable[ExportRecord], counts: dict[str, int]
+) -> Iterator[Group]:
     for record in records:
         counts["groups"] += 1
         yield record.group
@@ -221,7 +223,7 @@ def find_frame_path_rule(format: str) -> FrameName:  # noqa: A002
     return LAYOUTS.get(format, frame_path_by_match)
 
 
-def make_export_names(format: str, outlines: Iterable[Outline]) -> ExportKeyAssigner:  # noqa: A002
+def make_export_key_assigner(format: str, outlines: Iterable[Outline]) -> ExportKeyAssigner:  # noqa: A002
     """By which keys a format calls the files of the views that will be exported."""
     if format in PRESCRIBED:
         return ExportKeyAssigner(lambda group, view, split: {})

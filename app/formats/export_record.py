@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from app.formats.frame_names import frame_path_by_match, guess_frame_suffix, with_export_key
 from app.geometry.camera import Camera
-from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, is_ball_3d_valid_in_view
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
@@ -77,7 +77,7 @@ class ExportRecord:
 
     def has_ball_3d(self, view: View) -> bool:
         """Whether the 3D ball holds in one view; every format's count of balls counts these."""
-        return has_ball_3d(self.solution, view)
+        return is_ball_3d_valid_in_view(self.solution, view)
 
     def is_training_view(self, view: View) -> bool:
         """Whether a detector may learn from a view: its ball holds in 3D, or it shows none.

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from app.errors import InputError
-from app.object_store.path import unseal_address
+from app.object_store.path import split_pinned_address
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, View
 
@@ -80,7 +80,7 @@ def folder_name_of_split(split: str) -> str:
 def guess_frame_suffix(view: View) -> str:
     """Ending that a copy of a view's frame would most likely have."""
     media = view.media
-    name = "" if media is None else media.member or unseal_address(media.path)[0]
+    name = "" if media is None else media.member or split_pinned_address(media.path)[0]
     suffix = PurePosixPath(name).suffix.lower()
     return suffix if suffix in IMAGE_SUFFIXES else ".jpg"
 

@@ -22,8 +22,8 @@ from app.object_store.path import (
     StoredPath,
     find_path,
     is_address,
+    pin_address_to_content,
     resolve_target_path,
-    seal_address,
 )
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -258,7 +258,7 @@ class FrameList:
             stored = find_path(self._settings, address).stored
             if stored is None:
                 raise InputError(f"{address} is a folder, not a file")
-            self._sealed[address] = seal_address(address, stored.etag)
+            self._sealed[address] = pin_address_to_content(address, stored.etag)
         return self._sealed[address]
 
     def replace_listed_frames(self, groups: Iterator[Group]) -> Iterator[Group]:

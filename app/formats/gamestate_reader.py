@@ -48,7 +48,7 @@ def sequence_folder(match: str, split: str) -> str:
 
 def frame_file_name(group: Group, view: View) -> str:
     """Name of the frame of a view: as its file called it, or made from its key."""
-    image = read_source_fields(view).get("image")
+    image = get_gamestate_metadata(view).get("image")
     if isinstance(image, dict) and isinstance(image.get("file_name"), str):
         return str(image["file_name"])
     stem = strip_image_suffix(view.key)
@@ -67,7 +67,7 @@ def map_sequence_names_to_owners(group: Group, view: View, split: str) -> Mappin
     return {f"{sequence_folder(group.match, '')}/{stem}": (group.key, view.key)}
 
 
-def read_source_fields(view: View) -> Mapping[str, Any]:
+def get_gamestate_metadata(view: View) -> Mapping[str, Any]:
     """What the file said that a view came from; empty for views of other formats."""
     kept = view.extras.metadata.get(METADATA)
     return kept if isinstance(kept, dict) else {}

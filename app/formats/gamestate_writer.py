@@ -26,7 +26,7 @@ from app.formats.gamestate_reader import (
     METADATA,
     PITCH_ID,
     frame_file_name,
-    read_source_fields,
+    get_gamestate_metadata,
     sequence_folder,
 )
 from app.formats.safe_path import resolve_inside
@@ -188,7 +188,7 @@ def _compact_json(value: Any) -> str:
 
 
 def _add_view(file: _LabelsFile, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
-    kept = read_source_fields(view)
+    kept = get_gamestate_metadata(view)
     file.kept = file.kept or kept
     camera = record.camera(view)
     people = _make_people_annotations(file, record.group, view, camera)
@@ -218,7 +218,7 @@ def _image_to_json(
     people: list[dict[str, Any]],
 ) -> dict[str, Any]:
     kept, name = (
-        read_source_fields(view).get("image"),
+        get_gamestate_metadata(view).get("image"),
         frame_file_name(record.group, record.with_export_file_key(view)),
     )
     if isinstance(kept, dict):
@@ -305,7 +305,7 @@ def _make_bbox_pitch(place: Sequence[float]) -> dict[str, float]:
 def _make_ball_annotations(
     file: _LabelsFile, record: ExportRecord, view: View
 ) -> Iterator[dict[str, Any]]:
-    rest = read_source_fields(view).get("balls") or []
+    rest = get_gamestate_metadata(view).get("balls") or []
     balls = [ball for ball in view.balls if ball.center is not None]
     for index, ball in enumerate(balls):
         kept = rest[index] if index < len(rest) else _make_ball_fields(file, record, view, index)
@@ -336,7 +336,7 @@ def _locate_spot_below_ball(record: ExportRecord, view: View) -> dict[str, float
 
 def _make_other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
     """The lines, the camera, and what else there was."""
-    kept = read_source_fields(view)
+    kept = get_gamestate_metadata(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:
         lines = lines_to_json(view.station.lines, view.size, view.extras.lines)
         head = {"supercategory": "pitch", "category_id": PITCH_ID}

@@ -223,7 +223,7 @@ _HEADS = {
 }  # fmt: skip
 
 
-def guess_from_content(path: Root, format_: str) -> FormatGuess | None:
+def guess_other_format(path: Root, format_: str) -> FormatGuess | None:
     """What the files at a path look like, other than the format for which they were given.
 
     Args:

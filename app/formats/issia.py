@@ -144,7 +144,7 @@ def find_cameras_with_mirrored_people(
         name = PurePosixPath(track.source.replace("\\", "/")).stem
         if not track.persons:
             continue
-        apart = _median_person_distances(number, tracks, given, widths[number])
+        apart = _measure_person_distances(number, tracks, given, widths[number])
         if len(apart) >= LEAST_PAIRS:
             written, turned = np.median(apart, axis=0)
             is_mirrored = bool(turned < written)
@@ -170,7 +170,7 @@ def mirror_people(track: ViperTrack, width: int) -> ViperTrack:
     )
 
 
-def _median_person_distances(
+def _measure_person_distances(
     number: int, tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], width: int
 ) -> FloatArray:
     """How far the same person lies from where another camera puts it, as written and turned, metres,

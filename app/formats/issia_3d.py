@@ -11,7 +11,7 @@ from app.errors import DatasetFormatError
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
 from app.formats.csv_text import (
-    CsvTable,
+    CsvTableWriter,
     Value,
     format_csv_cell,
     format_number_list,
@@ -31,7 +31,7 @@ from app.formats.issia_reader import (
     IssiaFolder,
     IssiaOptions,
     add_stations_and_media,
-    count_annotations,
+    report_annotation_counts,
 )
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree_context
@@ -71,7 +71,7 @@ def open_issia_3d(
         for name in tables[:1]:
             _read_table(tree, name, found, report, limits)
         add_stations_and_media(found, tree, names, options, report, limits)
-    count_annotations(found, report)
+    report_annotation_counts(found, report)
     return found
 
 
@@ -199,7 +199,7 @@ def write_issia_3d(
 
 def _write_table(path: Path, spill: SortedSpill, everything: bool) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        table = CsvTableWriter(file, (*COLUMNS, *(("verdict",) if everything else ())))
         for _, cells in spill.items():
             table.add_cells(json.loads(cells))
 

@@ -159,7 +159,7 @@ def open_issia(
         names = tree.names()
         _read_tracks(tree, names, options, found, report, limits)
         add_stations_and_media(found, tree, names, options, report, limits)
-    count_annotations(found, report)
+    report_annotation_counts(found, report)
     return found
 
 
@@ -173,7 +173,7 @@ def add_stations_and_media(
 ) -> None:
     """Give each camera that has a track its station and its media."""
     given = _read_given_cameras(tree, names, report)
-    _find_media(tree, names, found)
+    _add_media_to_folder(tree, names, found)
     sizes = {camera: options.get_image_size(track) for camera, track in found.tracks.items()}
     lines: dict[int, LineFile] = {}
     drawn = set[int]()
@@ -393,7 +393,7 @@ def _make_station(
     )
 
 
-def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
+def _add_media_to_folder(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
     """Videos ``cam3.mp4`` and frames ``cam3/000123.jpg``, where they lie in the folder.
 
     Their numbers count as the groups' keys do.
@@ -414,7 +414,7 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
                 found.frames.setdefault((camera, int(number[1])), tree.media(name))
 
 
-def count_annotations(found: IssiaFolder, report: ReaderReport) -> None:
+def report_annotation_counts(found: IssiaFolder, report: ReaderReport) -> None:
     """Note what a folder held."""
     balls = {frame for track in found.tracks.values() for frame in track.balls}
     persons = {frame for track in found.tracks.values() for frame in track.persons}

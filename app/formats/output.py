@@ -245,7 +245,7 @@ def open_output(
         yield folder
 
 
-def require_absent_in_store(out: StoredPath) -> None:
+def require_new_zip_in_store(out: StoredPath) -> None:
     """Refuse a place where anything is, and one that is no zip.
 
     Raises:
@@ -277,7 +277,9 @@ def require_free_in_store(out: StoredPath) -> None:
     if not out.key:
         raise InputError(f"name a folder or a zip in the store, such as {out}league.zip")
     is_ours = (
-        _is_earlier_zip_in_store(out) if _is_zip_in_store(out) else _is_earlier_export_in_store(out)
+        _may_replace_zip_in_store(out)
+        if _is_zip_in_store(out)
+        else _may_replace_folder_in_store(out)
     )
     if not is_ours:
         raise make_occupied_output_error(f"{out} already exists and is not an earlier export")
@@ -287,7 +289,7 @@ def _is_zip_in_store(out: StoredPath) -> bool:
     return out.suffix.lower() == ".zip"
 
 
-def _is_earlier_zip_in_store(out: StoredPath) -> bool:
+def _may_replace_zip_in_store(out: StoredPath) -> bool:
     """Whether there is nothing, or a zip that holds what its manifest lists."""
     try:
         present = out.of(out.store.head(out.key))
@@ -302,7 +304,7 @@ def _is_earlier_zip_in_store(out: StoredPath) -> bool:
         return False
 
 
-def _is_earlier_export_in_store(out: StoredPath) -> bool:
+def _may_replace_folder_in_store(out: StoredPath) -> bool:
     """The same of a folder; one whose manifest never came is somebody's own, too."""
     present = {
         item.key.removeprefix(f"{out.key}/") for item in out.store.iterate_objects_below(out.key)

@@ -23,7 +23,7 @@ from app.formats.trees import FolderTree, open_tree_context
 from app.formats.view_state import (
     GroupAssembler,
     PlacedView,
-    StateReader,
+    RecordFieldReader,
     extras_from_json,
     view_to_json,
 )
@@ -164,19 +164,19 @@ def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
 
 
 def _make_ball_coordinate_getter(number: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_center_coordinate(row: ViewRow) -> float | None:
         point = row.record.point
         return None if point is None or row.fit is None else float(point[number])
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _make_ball_getter(name: str) -> Getter:
-    def get_jac(row: ViewRow) -> Any:
+    def get_center_coordinate(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.fit is None else getattr(ball, name)
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
@@ -200,11 +200,11 @@ def _get_p_value_of_solution(solution: Solution) -> float | None:
 
 
 def _make_box_getter(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_center_coordinate(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _get_annotated_box(row: ViewRow) -> Box | None:
@@ -216,19 +216,19 @@ def _choose_exported_box(row: ViewRow) -> Box | None:
 
 
 def _make_center_coordinate_getter(axis: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_center_coordinate(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _make_jac_getter(index: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_center_coordinate(row: ViewRow) -> float | None:
         jac = row.view_solution.calibration.jac if row.view_solution else None
         return None if jac is None else float(jac[index])
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _find_first_failing_gate(row: ViewRow) -> str | None:
@@ -486,7 +486,7 @@ def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> PlacedVie
     value = {**row, **parsed, "pitch": None if None in pitch else pitch, "split": split}
     if row.get("left_out_reason") is not None:
         value["left_out"] = {"reason": row["left_out_reason"], "note": row.get("left_out_note")}
-    state = StateReader(value, path, record)
+    state = RecordFieldReader(value, path, record)
     view = state.read_view(state.read_size(), extras_from_json(parsed["extras"]))
     return PlacedView(state.read_group_head(), state.read_count("position"), view)
 

@@ -219,7 +219,9 @@ class PictureFinder:
         return PictureSearchResult(ranks[best][0], best[0], folded=fold)
 
 
-def assign_pictures(found: Mapping[Name, PictureSearchResult]) -> dict[Name, PictureSearchResult]:
+def drop_contested_pictures(
+    found: Mapping[Name, PictureSearchResult],
+) -> dict[Name, PictureSearchResult]:
     """What was found for each name, without pictures that fit another name better or as well.
 
     Two pictures of a file are two pictures: ``clip1/1.jpg`` is not ``clip2/1.jpg``, where that

@@ -310,7 +310,7 @@ def record_to_json(view: View, split: str = "") -> dict[str, Any]:
     metadata = _extract_image_metadata(kept)
     for name, side in (("width", view.size.width), ("height", view.size.height)):
         # The source's own spelling of the same number ("1280") stays.
-        metadata[name] = metadata[name] if _is_same_length(metadata.get(name), side) else side
+        metadata[name] = metadata[name] if _equals_side_length(metadata.get(name), side) else side
     if split:
         metadata["set"] = split
     lines = [
@@ -332,7 +332,7 @@ def _extract_image_metadata(kept: Mapping[str, Any]) -> dict[str, Any]:
     return {name: item for name, item in kept.items() if name not in OTHERS}
 
 
-def _is_same_length(value: Any, side: int) -> bool:
+def _equals_side_length(value: Any, side: int) -> bool:
     try:
         return fields.parse_whole_number(value) == side
     except ValueError:

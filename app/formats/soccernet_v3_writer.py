@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from app.errors import InputError
 from app.formats.camera_json import camera_to_json
-from app.formats.csv_text import CsvTable, Value, format_number_list
+from app.formats.csv_text import CsvTableWriter, Value, format_number_list
 from app.formats.export_record import ExportRecord, choose_ball_box
 from app.formats.frame_names import frame_path_by_match, normalize_file_name
 from app.formats.safe_path import resolve_inside
@@ -210,7 +210,7 @@ def write_soccernet_v3d(
             for split, name in SPLIT_FILES.items()
         }
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
-        table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        table = CsvTableWriter(file, (*COLUMNS, *(("verdict",) if everything else ())))
         for match, run in groupby(
             records, key=lambda record: parse_league_season_match(record.group)
         ):
@@ -224,7 +224,7 @@ def write_soccernet_v3d(
 
 
 def _add_rows(
-    table: CsvTable,
+    table: CsvTableWriter,
     lists: Mapping[str, TextIO],
     record: ExportRecord,
     everything: bool,

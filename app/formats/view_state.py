@@ -22,7 +22,7 @@ from app.soccer.codec import (
     ball_to_json,
     covariance_to_json,
     lines_to_json,
-    picture_to_json,
+    picture_geometry_to_json,
     view_exclusion_to_json,
 )
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
@@ -80,14 +80,18 @@ def view_to_json(view: View) -> dict[str, Any]:
         "calibration": station.calibration,
         "given": None if given is None else camera_to_json(given),
         **({} if covariance is None else {"given_covariance": covariance_to_json(covariance)}),
-        **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
+        **(
+            {}
+            if station.picture is None
+            else {"picture": picture_geometry_to_json(station.picture)}
+        ),
         "lines": lines_to_json(station.annotated_lines),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }
 
 
-class StateReader:
+class RecordFieldReader:
     """Reads one record's values; whatever is wrong is an error with file, record and field."""
 
     def __init__(self, value: Any, path: str, record: str):

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from app.formats.csv_text import CsvTable
+from app.formats.csv_text import CsvTableWriter
 from app.formats.export_record import ExportRecord, choose_ball_box
 from app.formats.frame_names import folder_name_of_split, frame_path_in_split, guess_frame_suffix
 from app.formats.view_files import PutText, make_disk_writer
@@ -176,7 +176,7 @@ def write_yolo(
     with ExitStack() as stack:
         lists = stack.enter_context(ImageListWriter(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
-        table = CsvTable(file, _COLUMNS)
+        table = CsvTableWriter(file, _COLUMNS)
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
@@ -191,7 +191,7 @@ def _write_label_file(
     put: PutText,
     record: ExportRecord,
     view: View,
-    table: CsvTable,
+    table: CsvTableWriter,
     boxes: str,
     counts: dict[str, int],
 ) -> str:

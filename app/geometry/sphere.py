@@ -33,7 +33,9 @@ def position_from_diameter(
     """
     center = require_shape(center, (2,), "center")
     if not diameter_px > 0:
-        raise DegenerateGeometryError("the diameter of a ball in the picture must be above 0 pixels")
+        raise DegenerateGeometryError(
+            "the diameter of a ball in the picture must be above 0 pixels"
+        )
     if camera.is_wide:
         ideal = camera.pixel_to_ideal(center[None])[0]
         ray = camera.rotation.T @ np.append(ideal, 1.0)

@@ -64,7 +64,7 @@ def get_current_visibility(scope: Mapping[str, Any]) -> Visibility:
     return EVERYTHING if login is None else login.visibility
 
 
-def get_current_visibility_without_hidden(scope: Mapping[str, Any]) -> Visibility:
+def get_current_visibility_of_whole_datasets(scope: Mapping[str, Any]) -> Visibility:
     """The same without the datasets of which some groups are hidden from whoever asks."""
     login = get_current_login(scope)
     return EVERYTHING if login is None else login.whole_visibility

@@ -32,24 +32,24 @@ from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.people.visibility_queries import Visibility
 from app.features.policies.noise import NoiseCache
-from app.features.practice.service import resume_practice
-from app.features.predictions.jobs import resume_evaluations
+from app.features.practice.service import register_practice_resume
+from app.features.predictions.jobs import resume_prediction_jobs
 from app.features.predictions.reader import PredictionReader
 from app.features.recordings.camera_jobs import resume_camera_jobs
 from app.features.recordings.follow import BallFollower
 from app.features.recordings.frames import RecordingFrames
-from app.features.recordings.jobs import resume_recordings
-from app.features.solve.jobs import resume_solving, solve_leftovers
+from app.features.recordings.jobs import resume_recording_jobs
+from app.features.solve.jobs import register_solve_resume, request_solve_of_leftovers
 from app.features.tracks.jobs import TRACKS
-from app.features.tracks.link_ball import resume_ball_links
-from app.features.versions.jobs import resume_versions
+from app.features.tracks.link_ball import resume_link_by_ball_jobs
+from app.features.versions.jobs import resume_version_jobs
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsCache
 from app.http.access import (
     get_current_login,
     get_current_visibility,
-    get_current_visibility_without_hidden,
+    get_current_visibility_of_whole_datasets,
 )
 from app.http.errors import PreconditionRequiredError
 from app.http.event_stream import EventPublisher
@@ -162,17 +162,17 @@ class Services:
         Thread(target=warm_up_solver, daemon=True).start()
         Thread(target=self._refresh_large_datasets, name="yield", daemon=True).start()
         self.frames.warm()
-        resume_solving(self.jobs, self.store)
+        register_solve_resume(self.jobs, self.store)
         for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
             kind.register_with_jobs(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
-        resume_versions(self.jobs, self.store)
+        resume_version_jobs(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
-        resume_recordings(self.jobs, self.store)
+        resume_recording_jobs(self.jobs, self.store)
         resume_camera_jobs(self.jobs, self.store)
-        resume_ball_links(self.jobs, self.store)
-        resume_evaluations(self.jobs, self.store)
-        resume_practice(self.jobs, self.store)
+        resume_link_by_ball_jobs(self.jobs, self.store)
+        resume_prediction_jobs(self.jobs, self.store)
+        register_practice_resume(self.jobs, self.store)
         self.jobs.call_on_leadership(self._start_leader_work)
         self.jobs.start()
         self.store.subscribe()
@@ -181,8 +181,8 @@ class Services:
 
     def _start_leader_work(self) -> None:
         """Begin what one process does for all."""
-        if not self._try_solve_leftovers():
-            Thread(target=self._retry_leftovers_until_solved, daemon=True).start()
+        if not self._try_request_solve_of_leftovers():
+            Thread(target=self._retry_leftovers_until_requested, daemon=True).start()
         Thread(target=self._compare_uncompared_annotations, name="agreement", daemon=True).start()
         self.webhooks.wake()
 
@@ -197,16 +197,18 @@ class Services:
         self.statistics.refresh_large_datasets()
         self.yields.refresh_large_datasets()
 
-    def _try_solve_leftovers(self) -> bool:
+    def _try_request_solve_of_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""
         try:
-            solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
+            request_solve_of_leftovers(self.jobs, self.store, actor=LOCAL_USER)
         except BusyError:
             return False
         return True
 
-    def _retry_leftovers_until_solved(self) -> None:
-        while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._try_solve_leftovers():
+    def _retry_leftovers_until_requested(self) -> None:
+        while (
+            not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._try_request_solve_of_leftovers()
+        ):
             pass
 
     def stop(self) -> None:
@@ -280,9 +282,9 @@ async def get_visibility(request: Request) -> Visibility:
     return get_current_visibility(request.scope)
 
 
-async def get_visibility_without_hidden(request: Request) -> Visibility:
+async def get_visibility_of_whole_datasets(request: Request) -> Visibility:
     """What whoever asks sees and nothing of which is hidden from them."""
-    return get_current_visibility_without_hidden(request.scope)
+    return get_current_visibility_of_whole_datasets(request.scope)
 
 
 async def require_if_match(
@@ -319,7 +321,7 @@ AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
 Sees = Annotated[Visibility, Depends(get_visibility)]
-SeesWhole = Annotated[Visibility, Depends(get_visibility_without_hidden)]
+SeesWhole = Annotated[Visibility, Depends(get_visibility_of_whole_datasets)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 
 

@@ -34,7 +34,7 @@ from app.features.queue.changes import (
     find_newest_entry_and_solution,
     read_groups_solved_since,
     read_new_changes,
-    read_position,
+    read_newest_entry_id,
 )
 from app.http.documents import encode_document
 from app.http.problem import PresenceDocument
@@ -195,7 +195,7 @@ class EventPublisher:
 
     def read_log_position(self) -> int:
         """Id of the newest entry of the log."""
-        return read_position(self._store)
+        return read_newest_entry_id(self._store)
 
     def read_resume_token(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
@@ -353,7 +353,7 @@ class EventPublisher:
 def _deliver_events(queued: Mapping[EventListener, list[bytes]], *, ended: bool = False) -> None:
     """Tell listeners of something, each loop by one call; from any thread."""
 
-    def take(loop: asyncio.AbstractEventLoop) -> None:
+    def queue_events_on_loop(loop: asyncio.AbstractEventLoop) -> None:
         for feed, events in queued.items():
             if feed.loop is loop:
                 feed.take(events, ended=ended)
@@ -361,7 +361,7 @@ def _deliver_events(queued: Mapping[EventListener, list[bytes]], *, ended: bool 
     for loop in {feed.loop for feed in queued}:
         # One of a server that has stopped calls nothing any more.
         with suppress(RuntimeError):
-            loop.call_soon_threadsafe(take, loop)
+            loop.call_soon_threadsafe(queue_events_on_loop, loop)
 
 
 def make_first_event(position: int) -> bytes:

@@ -126,7 +126,7 @@ def _remove_default_port(url: str) -> str:
     return f"{scheme}://{host.removesuffix(default) if default else host}"
 
 
-class KnownHosts:
+class HostNameGuard:
     """Refuses a request for another host name than this server's: DNS rebinding reaches nothing."""
 
     def __init__(self, app: ASGIApp, allowed: Iterable[str]):
@@ -147,7 +147,7 @@ class KnownHosts:
         await self.app(scope, receive, send)
 
 
-class SameOrigin:
+class SameOriginGuard:
     """Refuses a request that changes something and comes from another site's page.
 
     Args:

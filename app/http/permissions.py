@@ -22,7 +22,7 @@ from app.features.people.ownership import (
     NamedResource,
     Ownership,
     find_ownership,
-    find_role_at,
+    find_role_by_ownership,
     is_hidden_from,
 )
 from app.features.people.ownership import OwnedKind as OwnedKind
@@ -265,7 +265,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
             _require_create_permission(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
-            role = find_role_at(item.ownership, roles, login.owner)
+            role = find_role_by_ownership(item.ownership, roles, login.owner)
             require_permission(role, action, here)
             if query_of_request_reveals_hidden_work(subject):
                 require_permission(role, Action.REVIEW, here)
@@ -329,7 +329,7 @@ def _find_ownership_if_needed(
     found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
-    hidden = find_role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
+    hidden = find_role_by_ownership(found, roles, login.owner) is Role.NONE or is_hidden_from(
         store, named, found, login.reader
     )
     return None if hidden else found

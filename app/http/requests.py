@@ -138,7 +138,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
         for name, times in given.items()
         if name not in known or times > 1
     ]
-    for place, name, spelling in _number_parameters(route.path_format, route.endpoint):
+    for place, name, spelling in _list_numeric_parameters(route.path_format, route.endpoint):
         sent = request.path_params if place == "path" else request.query_params
         if name in sent and not spelling.fullmatch(str(sent[name])):
             problems.append({"type": "value_error", "loc": (place, name), "msg": _NO_NUMBER})
@@ -184,7 +184,7 @@ def _list_query_names(path: str, endpoint: Callable[..., Any]) -> frozenset[str]
 
 
 @lru_cache(maxsize=256)
-def _number_parameters(
+def _list_numeric_parameters(
     path: str, endpoint: Callable[..., Any]
 ) -> tuple[tuple[str, str, re.Pattern[str]], ...]:
     """Place, name and spelling of each parameter of a route that is a number."""

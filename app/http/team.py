@@ -269,7 +269,7 @@ def list_allowed_hosts(settings: Settings) -> list[str]:
     return [*settings.allowed_hosts, *([name] if name else [])]
 
 
-async def get_team(request: Request) -> TeamLogin:
+async def get_team_login(request: Request) -> TeamLogin:
     """The way in.
 
     Raises:
@@ -284,4 +284,4 @@ async def get_team(request: Request) -> TeamLogin:
     return team
 
 
-AppTeam = Annotated[TeamLogin, Depends(get_team)]
+AppTeam = Annotated[TeamLogin, Depends(get_team_login)]

@@ -22,7 +22,7 @@ from app.json_text import digest_content
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.media.object_frames import ArchiveMembers, is_in_object_store, read_object
 from app.media.video import Times, make_index, open_video, read_cached_index, read_frame_at
-from app.object_store.path import unseal_address
+from app.object_store.path import split_pinned_address
 from app.soccer.group import Media
 from app.wording import plural
 
@@ -40,7 +40,7 @@ _DECODED_BYTES = 6
 """Of a pixel while it is decoded: three channels of 16 bits at most."""
 
 
-def read_frame(media: Media, width: int | None, flipped: bool, settings: Settings) -> bytes:
+def read_encoded_frame(media: Media, width: int | None, flipped: bool, settings: Settings) -> bytes:
     """The frame of a view as JPEG, PNG or WebP.
 
     Args:
@@ -60,7 +60,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     """
     _require_inside_root(media, settings)
     if media.frame is None and width is None and not flipped:
-        data, name = _read_source(media, settings), describe_frame(media)
+        data, name = _read_image_bytes(media, settings), describe_frame(media)
         if read_header(data, name).orientation == 1:
             # They are sent once they were seen to decode.
             _decode_pixels(data, settings, name)
@@ -76,7 +76,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     return data
 
 
-def read_pixels(
+def read_digest_and_pixels(
     media: Media, flipped: bool, settings: Settings, known: str = ""
 ) -> tuple[str, npt.NDArray[np.uint8] | None]:
     """Digest of a frame's bytes, and what ``decode_frame`` gives of them.
@@ -90,14 +90,14 @@ def read_pixels(
         known: A digest; the frame of these bytes is not decoded, its pixels are None.
 
     Raises:
-        NotFoundError, ImageError, TooLargeError: As ``read_frame`` does.
+        NotFoundError, ImageError, TooLargeError: As ``read_encoded_frame`` does.
     """
     _require_inside_root(media, settings)
     if media.frame is not None:
         picture = _read_video_frame(media, settings)
         digest = digest_content(np.ascontiguousarray(picture).tobytes())
     else:
-        data, name = _read_source(media, settings), describe_frame(media)
+        data, name = _read_image_bytes(media, settings), describe_frame(media)
         digest = digest_content(data)
         if read_header(data, name).orientation != 1:
             # What was once read of the stored pixels, under the plain digest, is read again.
@@ -166,7 +166,7 @@ def read_picture_header(media: Media) -> ImageHeader | None:
 
 def describe_frame(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
-    file = Path(unseal_address(media.path)[0]).name
+    file = Path(split_pinned_address(media.path)[0]).name
     if media.member is not None:
         return f"frame {media.member} of {file}"
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
@@ -196,7 +196,7 @@ def read_video_times(
     return make_index(path, stamp, settings, tell)
 
 
-def read_video_length(media: Media) -> int:
+def read_declared_frame_count(media: Media) -> int:
     """How many frames a view's video promises to have, which is a guess.
 
     Raises:
@@ -211,7 +211,7 @@ def read_video_length(media: Media) -> int:
         return int(video.get(cv2.CAP_PROP_FRAME_COUNT))
 
 
-def has_index(media: Media, settings: Settings) -> bool:
+def has_video_index(media: Media, settings: Settings) -> bool:
     """Whether the index of a view's video is kept.
 
     Raises:
@@ -229,7 +229,7 @@ def make_video_stamp(media: Media) -> str:
     return make_frame_stamp(replace(media, frame=None))
 
 
-def read_media_facts(media: Media) -> dict[str, int]:
+def read_media_size_and_crc(media: Media) -> dict[str, int]:
     """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone.
 
     Empty, too, of a frame in an object store: it is known by its address.
@@ -260,10 +260,10 @@ def has_member(media: Media, member: str) -> bool:
 def _decode_frame(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
         return _read_video_frame(media, settings)
-    return _decode_pixels(_read_source(media, settings), settings, describe_frame(media))
+    return _decode_pixels(_read_image_bytes(media, settings), settings, describe_frame(media))
 
 
-def _read_source(media: Media, settings: Settings) -> bytes:
+def _read_image_bytes(media: Media, settings: Settings) -> bytes:
     if is_in_object_store(media):
         return read_object(media, settings)
     path = Path(media.path)

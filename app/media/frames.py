@@ -31,12 +31,12 @@ from app.json_text import digest_content
 from app.media.files import (
     describe_frame,
     guess_content_type,
-    has_index,
     has_member,
+    has_video_index,
     make_frame_stamp,
     make_video_stamp,
     read_cached_frame,
-    read_frame,
+    read_encoded_frame,
     read_video_times,
 )
 from app.media.images import JPEG
@@ -205,7 +205,7 @@ class FrameProvider:
         return self._submit_fetch(media, bounded=True)
 
     def request_picture(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
-        """Have a picture made; its future has it, or the errors of ``read_frame``.
+        """Have a picture made; its future has it, or the errors of ``read_encoded_frame``.
 
         Raises:
             OverloadedError: Too many wait.
@@ -439,14 +439,18 @@ class VideoIndexer:
         It brings the index along that the disk refused.
         """
         unkept = None if media.frame is None else self._unkept.get(media.path)
-        return (work, *arguments) if unkept is None else (with_index, *unkept, work, *arguments)
+        return (
+            (work, *arguments)
+            if unkept is None
+            else (call_with_index_remembered, *unkept, work, *arguments)
+        )
 
     def close(self) -> None:
         """End the process."""
         self.pool.close()
 
     def _is_ready(self, media: Media) -> bool:
-        if has_index(media, self._settings):
+        if has_video_index(media, self._settings):
             return True
         stamp, _ = self._unkept.get(media.path, ("", None))
         return stamp == make_video_stamp(media)
@@ -487,7 +491,7 @@ def make_picture(
     media: Media, width: int | None, flipped: bool, settings: Settings
 ) -> EncodedPicture:
     """A picture, made in this process."""
-    data = read_frame(media, width, flipped, settings)
+    data = read_encoded_frame(media, width, flipped, settings)
     return EncodedPicture.of(guess_content_type(data), data)
 
 
@@ -499,7 +503,9 @@ def index_video(media: Media, settings: Settings) -> tuple[str, Times | None]:
     return stamp, get_remembered_index(stamp)
 
 
-def with_index(stamp: str, times: Times, work: Callable[..., Any], *arguments: Any) -> Any:
+def call_with_index_remembered(
+    stamp: str, times: Times, work: Callable[..., Any], *arguments: Any
+) -> Any:
     """``work(*arguments)`` in this process, which remembers an index from now on."""
     remember_index(stamp, times)
     return work(*arguments)

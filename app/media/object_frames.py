@@ -20,7 +20,7 @@ from app.config import Settings
 from app.db.locks import try_to_lock
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.object_store.path import StoredPath, is_address, split_address, unseal_address
+from app.object_store.path import StoredPath, is_address, split_address, split_pinned_address
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.soccer.group import Media
 from app.zip_file import open_nested, open_zip, split_nested_name
@@ -195,7 +195,7 @@ def read_object(media: Media, settings: Settings) -> bytes:
 
 
 def _fetch_object(media: Media, settings: Settings) -> bytes:
-    address, kind, value = unseal_address(media.path)
+    address, kind, value = split_pinned_address(media.path)
     store_name, key = split_address(address)
     store = open_store(settings, store_name)
     etag = f'"{value}"' if kind == "etag" else ""
@@ -205,7 +205,7 @@ def _fetch_object(media: Media, settings: Settings) -> bytes:
         if etag:
             raise
         # The zip is another than that whose list is known here; its member may be the same.
-        _open_stored_zip.cache_clear()
+        _make_stored_zip_path.cache_clear()
         data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:
         raise ChangedObjectError(
@@ -222,7 +222,7 @@ def _read_object_or_member(
     limit = settings.max_file_bytes
     if member is None:
         return store.read_whole(key, limit, etag)[0]
-    path = _open_stored_zip(store, key, etag)
+    path = _make_stored_zip_path(store, key, etag)
     if etag and path.stored is not None and path.stored.etag != etag:
         raise ChangedObjectError(
             f"{path} was changed in its store since it was imported", hint=CHANGED_HINT
@@ -231,7 +231,7 @@ def _read_object_or_member(
 
 
 @lru_cache(maxsize=256)
-def _open_stored_zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
+def _make_stored_zip_path(store: ObjectStore, key: str, _etag: str) -> StoredPath:
     """A zip in a store, as it was when it was first asked for here."""
     return StoredPath(store.name, store.settings, key, store.head(key))
 

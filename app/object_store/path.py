@@ -48,12 +48,12 @@ def split_address(address: str) -> tuple[str, str]:
     return name, "/".join(parts)
 
 
-def seal_address(address: str, etag: str) -> str:
+def pin_address_to_content(address: str, etag: str) -> str:
     """An address with what the content is called that is meant."""
     return f"{address}#etag={etag.strip(chr(34))}"
 
 
-def unseal_address(sealed: str) -> tuple[str, str, str]:
+def split_pinned_address(sealed: str) -> tuple[str, str, str]:
     """Address, and how its content is known: ``etag`` or ``sha256`` and its value, or empty."""
     found = _SEAL.fullmatch(sealed)
     return (found[1], found[2], found[3]) if found else (sealed, "", "")
@@ -136,7 +136,7 @@ class StoredPath:
     def make_sealed_address(self) -> str:
         """Address of the object with what its content is called: another content is not it."""
         assert self.stored is not None
-        return seal_address(str(self), self.stored.etag)
+        return pin_address_to_content(str(self), self.stored.etag)
 
     def __truediv__(self, inside: str) -> StoredPath:
         key = "/".join(filter(None, (self.key, inside.strip("/"))))

@@ -75,7 +75,7 @@ def measure_agreement(
     )
 
 
-def measure_clear_agreement(
+def measure_agreement_with_clear_paint(
     camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch, paint_strength: float
 ) -> PaintAgreement:
     """As ``measure_agreement``, with what is no paint of a pitch left out of *explained*.
@@ -88,7 +88,7 @@ def measure_clear_agreement(
         field: The field of play, shape (H, W).
         strength: Of ``ridges.line_strength``, shape (H, W).
         pitch: The pitch.
-        paint_strength: Of paint (``measure_explained_strength``); less than half of it is none.
+        paint_strength: Of paint (``measure_strength_near_markings``); less than half of it is none.
     """
     strong = strength >= FAINT_SHARE * paint_strength
     rows, columns = np.nonzero(strong & (strength > 0))
@@ -101,7 +101,7 @@ def measure_clear_agreement(
     return replace(measure_agreement(camera, field, strength > 0, pitch), explained=explained)
 
 
-def measure_explained_strength(
+def measure_strength_near_markings(
     camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch
 ) -> float:
     """Median strength of the line-like paint that lies near a camera's markings; 0 without any."""

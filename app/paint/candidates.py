@@ -36,7 +36,7 @@ SLACK_M = 4.0
 
 
 @dataclass(frozen=True)
-class CameraLibrary:
+class CameraSearchSpace:
     """Where cameras are looked for.
 
     Attributes:
@@ -61,35 +61,35 @@ class CameraLibrary:
         return focals
 
 
-def _make_orientation_grid(*axes: tuple[float, ...]) -> FloatArray:
+def _make_position_grid(*axes: tuple[float, ...]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-MAIN = CameraLibrary(
+MAIN = CameraSearchSpace(
     "main stand",
-    _make_orientation_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
+    _make_position_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
     (0.6, 5.0),
     np.array([6.0, 12.0, 6.0]),
 )
 """Main cameras: near the middle line, on the side that is y > 0 by convention."""
 
-WIDE = CameraLibrary(
+WIDE = CameraSearchSpace(
     "around the pitch",
     np.vstack(
         [
             # Beside the penalty areas and towards the corners, high and low.
-            _make_orientation_grid(
+            _make_position_grid(
                 (-52.0, -38.0, -24.0, 24.0, 38.0, 52.0), (44.0, 56.0, 74.0), (-6.0, -12.0, -20.0)
             ),
             # At the touchline.
-            _make_orientation_grid(
+            _make_position_grid(
                 (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)
             ),
             # Behind the goals.
-            _make_orientation_grid(
+            _make_position_grid(
                 (-96.0, -78.0, -62.0, 62.0, 78.0, 96.0), (0.0, 14.0), (-5.0, -11.0, -20.0)
             ),
-            _make_orientation_grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
+            _make_position_grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
         ]
     ),
     (0.45, 3.6),
@@ -98,7 +98,7 @@ WIDE = CameraLibrary(
 """Replays: any side; the half turn of the pitch makes y >= 0 of every stand."""
 
 
-def make_library_of_known_cameras(known: Sequence[Camera]) -> CameraLibrary:
+def make_search_space_of_known_cameras(known: Sequence[Camera]) -> CameraSearchSpace:
     """Where cameras of the same match stand, and with which lenses.
 
     Args:
@@ -113,7 +113,7 @@ def make_library_of_known_cameras(known: Sequence[Camera]) -> CameraLibrary:
         focals.append(camera.focal_length[0] / width)
         kappas.append(parameters_from_camera(camera, float(np.hypot(width, height)) / 2)[KAPPA])
     low, high = min(focals) / ZOOM, max(focals) * ZOOM
-    return CameraLibrary(
+    return CameraSearchSpace(
         KNOWN,
         np.array(stands),
         (min(max(low, KNOWN_FOCAL[0]), high), max(min(high, KNOWN_FOCAL[1]), low)),
@@ -123,7 +123,7 @@ def make_library_of_known_cameras(known: Sequence[Camera]) -> CameraLibrary:
 
 
 def find_candidate_cameras(
-    pieces: FloatArray, library: CameraLibrary, pitch: Pitch, width: float
+    pieces: FloatArray, library: CameraSearchSpace, pitch: Pitch, width: float
 ) -> FloatArray:
     """The cameras of a library that lay a marking on one of the pieces.
 

@@ -121,7 +121,7 @@ class DetectedPaint:
         return replace(self, traced=traced, offsets=offsets, sigmas=sigmas)
 
 
-def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> PreparedPicture:
+def prepare_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> PreparedPicture:
     """A picture prepared for reading paint.
 
     Args:

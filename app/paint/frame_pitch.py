@@ -13,7 +13,7 @@ from app.geometry.resection import CurvePoints, parameters_from_camera
 from app.paint.evidence import (
     Image,
     find_paint,
-    read_picture,
+    prepare_picture,
     to_paint_evidence,
     trace_visible_markings,
 )
@@ -22,7 +22,7 @@ from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.pitch_size import PitchFrame, estimate_pitch
+from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 from app.solving.tripod_pitch import (
     PaintSightings,
     TripodPitch,
@@ -38,7 +38,7 @@ NEAR_M = 3.0
 """Cameras that stand so near each other, in pictures of one size, may be one."""
 
 
-def make_pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
+def collect_pitch_size_evidence(image: Image, camera: Camera, pitch: Pitch) -> PitchSizeFrameLines:
     """Places of paint on and beside the markings of a proposed camera.
 
     Args:
@@ -47,10 +47,12 @@ def make_pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
         pitch: On which the camera was found.
     """
     height, width = image.shape[:2]
-    reading = read_picture(image, find_field_of_play(image))
+    reading = prepare_picture(image, find_field_of_play(image))
     window = WINDOW_PX * max(width / 960, 0.6)
     evidence = find_paint(reading, trace_visible_markings(reading, camera, pitch), window)
-    return PitchFrame(to_paint_evidence(evidence, camera).thin_points(), ImageSize(width, height))
+    return PitchSizeFrameLines(
+        to_paint_evidence(evidence, camera).thin_points(), ImageSize(width, height)
+    )
 
 
 def group_by_position(
@@ -71,7 +73,7 @@ def group_by_position(
     return found
 
 
-def find_agreed_pitch(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
+def find_agreed_pitch(frames: Sequence[PitchSizeFrameLines], pitch: Pitch) -> Pitch | None:
     """The size that all frames certainly show where it is another one; None otherwise.
 
     Args:

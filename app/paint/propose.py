@@ -33,14 +33,20 @@ from app.geometry.resection import (
 from app.paint.agreement import (
     PaintAgreement,
     measure_agreement,
-    measure_clear_agreement,
-    measure_explained_strength,
+    measure_agreement_with_clear_paint,
+    measure_strength_near_markings,
 )
-from app.paint.candidates import KNOWN, MAIN, WIDE, CameraLibrary, make_library_of_known_cameras
+from app.paint.candidates import (
+    KNOWN,
+    MAIN,
+    WIDE,
+    CameraSearchSpace,
+    make_search_space_of_known_cameras,
+)
 from app.paint.evidence import (
     PreparedPicture,
     has_grass_beside,
-    read_picture,
+    prepare_picture,
     trace_visible_markings,
 )
 from app.paint.goal import measure_goal_height
@@ -50,7 +56,7 @@ from app.paint.search import (
     KAPPA_MEAN,
     SCOUTED,
     SEARCHED,
-    ScoredPicture,
+    PictureToScore,
     VisiblePaint,
     find_visible_paint,
     is_same_view,
@@ -141,7 +147,7 @@ class SearchedFrame:
     field: BoolArray
     strength: Strength
     pieces: FloatArray
-    picture: ScoredPicture
+    picture: PictureToScore
     reading: PreparedPicture
 
     @property
@@ -214,7 +220,7 @@ def propose_for_frame(
     pitch: Pitch,
     known: Sequence[Camera],
     policy: CalibrationPolicy,
-    libraries: Sequence[CameraLibrary],
+    libraries: Sequence[CameraSearchSpace],
 ) -> FrameProposal:
     """As ``propose_camera``, for a frame that is read already.
 
@@ -224,7 +230,7 @@ def propose_for_frame(
         libraries: Where it is looked for after the positions of ``known``.
     """
     ranked: list[RankedCamera] = []
-    match = make_library_of_known_cameras(known) if known else None
+    match = make_search_space_of_known_cameras(known) if known else None
     for library in [*([match] if match else []), *libraries]:
         found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
@@ -233,7 +239,7 @@ def propose_for_frame(
         if explain_uncertain_camera(ranked) is None:
             break
     else:
-        closer = _rank_in_own_size(image, frame, ranked, pitch)
+        closer = _rank_at_full_resolution(image, frame, ranked, pitch)
         if explain_uncertain_camera(closer) is None:
             return _choose_proposal(image, frame, closer, pitch)
     return _choose_proposal(image, frame, ranked, pitch)
@@ -268,7 +274,7 @@ def read_and_prepare_frame(image: Image) -> SearchedFrame | str:
     if reason is not None:
         return reason
     return prepare_frame_to_search(
-        image, field, line_strength(image, field), read_picture(image, field)
+        image, field, line_strength(image, field), prepare_picture(image, field)
     )
 
 
@@ -287,7 +293,7 @@ def prepare_frame_to_search(
     if not len(pieces):
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
-    picture = ScoredPicture.of(strength > 0, field, center)
+    picture = PictureToScore.of(strength > 0, field, center)
     return SearchedFrame(image, field, strength, pieces, picture, reading)
 
 
@@ -299,7 +305,7 @@ def line_strength(image: Image, field: BoolArray) -> Strength:
     return strength
 
 
-def _rank_in_own_size(
+def _rank_at_full_resolution(
     image: Image, frame: SearchedFrame, ranked: Sequence[RankedCamera], pitch: Pitch
 ) -> list[RankedCamera]:
     """The best cameras of a frame once more, in the picture's own size and by clear paint alone.
@@ -319,18 +325,18 @@ def _rank_in_own_size(
             image=image,
             field=field,
             strength=line_strength(image, field),
-            reading=read_picture(image, field),
+            reading=prepare_picture(image, field),
         )
         drawn = get_kernel_executor().map(
-            lambda item: _snap_in_own_size(looked, item, factor, pitch), again
+            lambda item: _snap_at_full_resolution(looked, item, factor, pitch), again
         )
         again = [item for item in drawn if item is not None]
     if not again:
         return []
     best = max(again, key=lambda item: item.score).snapped.camera
-    paint = measure_explained_strength(best, looked.field, looked.strength, pitch)
+    paint = measure_strength_near_markings(best, looked.field, looked.strength, pitch)
     seen = get_kernel_executor().map(
-        lambda item: measure_clear_agreement(
+        lambda item: measure_agreement_with_clear_paint(
             item.snapped.camera, looked.field, looked.strength, pitch, paint
         ),
         again,
@@ -339,7 +345,7 @@ def _rank_in_own_size(
     return merge_ranked_cameras(frame, [], clear)
 
 
-def _snap_in_own_size(
+def _snap_at_full_resolution(
     looked: SearchedFrame, item: RankedCamera, factor: float, pitch: Pitch
 ) -> RankedCamera | None:
     """A camera drawn onto the paint of the picture in its own size, from near and from afar; the
@@ -365,7 +371,7 @@ def _resize_field(frame: SearchedFrame, width: int, height: int) -> BoolArray:
 
 
 def rank_cameras(
-    frame: SearchedFrame, library: CameraLibrary, pitch: Pitch, policy: CalibrationPolicy
+    frame: SearchedFrame, library: CameraSearchSpace, pitch: Pitch, policy: CalibrationPolicy
 ) -> list[RankedCamera]:
     """The cameras of a library that lie on the paint of a frame, best first."""
     amount = (SNAPPED, SCOUTED, SEARCHED)
@@ -410,7 +416,7 @@ def _rank_snapped(
 def _snap_from_search(
     frame: SearchedFrame,
     start: Camera,
-    library: CameraLibrary,
+    library: CameraSearchSpace,
     pitch: Pitch,
     policy: CalibrationPolicy,
 ) -> SnappedCamera:
@@ -429,7 +435,7 @@ def _snap_from_search(
 
 
 def _move_to_known_position(
-    frame: SearchedFrame, item: RankedCamera, match: CameraLibrary, pitch: Pitch
+    frame: SearchedFrame, item: RankedCamera, match: CameraSearchSpace, pitch: Pitch
 ) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
     the markings there as well."""
@@ -452,7 +458,7 @@ def _move_to_known_position(
 
 
 def _move_to_nearest_stand(
-    reading: PreparedPicture, camera: Camera, library: CameraLibrary, pitch: Pitch
+    reading: PreparedPicture, camera: Camera, library: CameraSearchSpace, pitch: Pitch
 ) -> Camera:
     """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
     away = np.linalg.norm(library.stands - camera.position, axis=1)
@@ -469,7 +475,7 @@ def _move_to_nearest_stand(
     return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
 
 
-def _make_start_covariance(library: CameraLibrary) -> FloatArray:
+def _make_start_covariance(library: CameraSearchSpace) -> FloatArray:
     """Covariance of a start of the search, shape (8, 8)."""
     sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
     return np.diag(sigma**2)
@@ -618,7 +624,7 @@ def _snap_at_full_size(
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""
     height, width = image.shape[:2]
-    reading = read_picture(image, _resize_field(frame, width, height))
+    reading = prepare_picture(image, _resize_field(frame, width, height))
     found = scale_snapped_camera(best.snapped, height, width)
     last = _snap_with_known_position(
         reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known

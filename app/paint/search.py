@@ -20,7 +20,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PARAMETERS, ROLL, X, Z, camera_from_parameters
 from app.paint import scoring_kernels as kernels
-from app.paint.candidates import CameraLibrary, find_candidate_cameras
+from app.paint.candidates import CameraSearchSpace, find_candidate_cameras
 from app.soccer.pitch import MARKINGS, Arc, Pitch
 
 CELL_M = 0.25
@@ -91,7 +91,7 @@ def _append_tangents(points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class ScoredPicture:
+class PictureToScore:
     """What scoring reads of one frame.
 
     Attributes:
@@ -121,14 +121,14 @@ class ScoredPicture:
         return float(np.hypot(*self.field.shape)) / 2
 
     @staticmethod
-    def of(line_like: BoolArray, field: BoolArray, center: tuple[float, float]) -> ScoredPicture:
+    def of(line_like: BoolArray, field: BoolArray, center: tuple[float, float]) -> PictureToScore:
         """The picture of a frame's line-like paint."""
         missing = np.logical_not(line_like).astype(np.uint8)
         distance = np.asarray(cv2.distanceTransform(missing, cv2.DIST_L2, 3), np.float32)
         rows, columns = np.nonzero(line_like)
         pixels = np.column_stack([columns - center[0], rows - center[1]]).astype(np.float64)
         spread = _sample_evenly(pixels, POINTS)
-        return ScoredPicture(
+        return PictureToScore(
             spread[:POINTS], spread[:SOME], spread[:FEW], distance, field, np.array(center)
         )
 
@@ -142,8 +142,8 @@ def _sample_evenly(pixels: FloatArray, count: int) -> FloatArray:
     return np.ascontiguousarray(pixels[chosen])
 
 
-def score_coarsely(
-    parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
+def compute_coarse_costs(
+    parameters: FloatArray, picture: PictureToScore, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Mean truncated distance of some of the paint to the markings, 0 to 1, shape (B,)."""
     return _compute_unexplained_paint(parameters, picture.few, picture, pitch, reach, executor)
@@ -152,7 +152,7 @@ def score_coarsely(
 def _compute_unexplained_paint(
     parameters: FloatArray,
     points: FloatArray,
-    picture: ScoredPicture,
+    picture: PictureToScore,
     pitch: Pitch,
     reach: float,
     executor: Executor,
@@ -170,8 +170,8 @@ def _compute_unexplained_paint(
     return cost
 
 
-def score_fully(
-    parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
+def compute_cost_terms(
+    parameters: FloatArray, picture: PictureToScore, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Unexplained paint, unsupported markings (0 to 1), length on and off the field, pixels.
 
@@ -195,7 +195,7 @@ def refine_cameras(
     parameters: FloatArray,
     mean: FloatArray,
     sigma: FloatArray,
-    picture: ScoredPicture,
+    picture: PictureToScore,
     points: FloatArray,
     pitch: Pitch,
     scales: Sequence[float],
@@ -260,9 +260,9 @@ class FoundCamera:
 
 
 def search_cameras(
-    picture: ScoredPicture,
+    picture: PictureToScore,
     pieces: FloatArray,
-    library: CameraLibrary,
+    library: CameraSearchSpace,
     pitch: Pitch,
     executor: Executor,
     most: int,
@@ -287,31 +287,35 @@ def search_cameras(
     rows = find_candidate_cameras(pieces - np.tile(picture.center, 2), library, pitch, width)
     if not len(rows):
         return []
-    cost = score_coarsely(rows, picture, pitch, FIRST_REACH_PX, executor)
+    cost = compute_coarse_costs(rows, picture, pitch, FIRST_REACH_PX, executor)
     rows = rows[_find_smallest_indices(cost, scouted)]
     rows[:, KAPPA] = kappa
     sigma = _prior_sigma_of_library(library)
     start = rows.copy()
     start[:, ROLL] = 0.0
     rows = refine_cameras(rows, start, sigma, picture, picture.some, pitch, SCOUT_SCALES, executor)
-    score = _combine_scores(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    score = _combine_scores(
+        compute_cost_terms(rows, picture, pitch, SECOND_REACH_PX, executor), picture
+    )
     chosen = _find_smallest_indices(-score, searched)
     rows, start = rows[chosen], start[chosen]
     rows = refine_cameras(
         rows, start, sigma, picture, picture.points, pitch, SEARCH_SCALES, executor
     )
-    score = _combine_scores(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    score = _combine_scores(
+        compute_cost_terms(rows, picture, pitch, SECOND_REACH_PX, executor), picture
+    )
     return _select_distinct_cameras(rows, score, picture, most)
 
 
-def _prior_sigma_of_library(library: CameraLibrary) -> FloatArray:
+def _prior_sigma_of_library(library: CameraSearchSpace) -> FloatArray:
     sigma = np.full(PARAMETERS, np.inf)
     sigma[ROLL], sigma[X : Z + 1] = ROLL_SIGMA, library.position_sigma
     sigma[Z + 1], sigma[KAPPA] = FOCAL_SIGMA, KAPPA_SIGMA
     return sigma
 
 
-def _combine_scores(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
+def _combine_scores(looked: FloatArray, picture: PictureToScore) -> FloatArray:
     """Explained times supported; markings drawn where no grass is count half."""
     unexplained, unsupported, on, off = looked.T
     score = (1 - unexplained) * (1 - unsupported) * (1 - 0.5 * off / (on + off + 1))
@@ -324,7 +328,7 @@ def _find_smallest_indices(cost: FloatArray, count: int) -> npt.NDArray[np.int64
 
 
 def _select_distinct_cameras(
-    rows: FloatArray, score: FloatArray, picture: ScoredPicture, most: int
+    rows: FloatArray, score: FloatArray, picture: PictureToScore, most: int
 ) -> list[FoundCamera]:
     found: list[FoundCamera] = []
     shown: list[VisiblePaint] = []
@@ -352,7 +356,7 @@ class VisiblePaint:
     pixels: FloatArray
 
 
-def find_visible_paint(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
+def find_visible_paint(camera: Camera, picture: PictureToScore) -> VisiblePaint:
     """Where a camera sees some of the paint; what it sees above the horizon is left out."""
     pixels = picture.few[:COMPARED] + picture.center
     rays = camera.rays(pixels)
@@ -361,7 +365,7 @@ def find_visible_paint(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
     return VisiblePaint(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def is_same_view(shown: VisiblePaint, other: Camera, picture: ScoredPicture) -> bool:
+def is_same_view(shown: VisiblePaint, other: Camera, picture: PictureToScore) -> bool:
     """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
     if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
         return False

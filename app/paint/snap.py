@@ -21,7 +21,7 @@ from app.paint.evidence import (
     Image,
     PreparedPicture,
     find_paint,
-    read_picture,
+    prepare_picture,
     trace_visible_markings,
 )
 from app.soccer.frames import Box, ImageSize
@@ -105,7 +105,7 @@ def snap_camera(
         policy: Prior of the distortion.
         start_covariance: How well the start is known, where it is known, shape (8, 8).
     """
-    reading = read_picture(image, field, hidden)
+    reading = prepare_picture(image, field, hidden)
     return snap_to_prepared_picture(
         reading, start, pitch or Pitch(), WINDOWS, policy or CalibrationPolicy(), start_covariance
     )

@@ -73,7 +73,7 @@ def trace_places(
     places, pixels, normals = (np.empty((most, n)) for n in (3, 2, 2))
     widths, marking, rows = np.empty(most), np.empty(most, np.int64), np.empty((most, 8))
     count = trace_markings(
-        parameters_from_camera(camera, half), curves.kinds, curves.shapes, painted_marking_mask(),
+        parameters_from_camera(camera, half), curves.kinds, curves.shapes, which_markings_are_painted(),
         np.array(camera.principal_point), half, width, height, spacing_px,
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
@@ -85,7 +85,7 @@ def trace_places(
 
 
 @lru_cache(maxsize=1)
-def painted_marking_mask() -> BoolArray:
+def which_markings_are_painted() -> BoolArray:
     return np.array([name in PAINTED for name in MARKINGS])
 
 

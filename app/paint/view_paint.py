@@ -168,7 +168,7 @@ def read_paint_of_image(
     if why is not None:
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
-    hidden = [scale.box(box) for box in choose_hiding_boxes(people, size)]
+    hidden = [scale.box(box) for box in drop_boxes_larger_than_a_person(people, size)]
     seen_grass = exclude_hidden_boxes(grass, hidden)
     paint = find_line_like_pixels(image, grass) & seen_grass
     nothing = ViewPaint("nothing", line_like=scale.to_annotation_line_points(paint))
@@ -202,7 +202,7 @@ def read_paint_of_image(
     )
 
 
-def choose_hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
+def drop_boxes_larger_than_a_person(people: Sequence[Box], size: ImageSize) -> list[Box]:
     """Those that can be of somebody on the field, and not of the field or a goal."""
     largest = LARGEST_PERSON * size.width * size.height
     return [box for box in people if box.width * box.height <= largest]

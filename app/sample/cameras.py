@@ -152,7 +152,7 @@ POINTS_PER_MARKING = 5
 
 
 @dataclass(frozen=True)
-class CameraCertainty:
+class BallCertainty:
     """Standard deviations that follow from clicks with 1 px noise.
 
     ``ball_sigma_m``: of the ray to the ball, metres at the ball, its longest axis.
@@ -163,7 +163,7 @@ class CameraCertainty:
     size_sigma: float
 
 
-def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> CameraCertainty:
+def estimate_ball_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> BallCertainty:
     """What a calibration from the visible markings would know about a ball.
 
     Args:
@@ -192,7 +192,7 @@ def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> CameraCe
     sigma = float(np.sqrt(max(float(np.linalg.eigvalsh(spread)[-1]), 0.0)))
     size = _ball_size_gradient(camera, x[-1])
     size_sigma = float(np.sqrt(max(float(size @ covariance @ size), 0.0)))
-    return CameraCertainty(sigma * float(x[-1, 2]) / focal, size_sigma)
+    return BallCertainty(sigma * float(x[-1, 2]) / focal, size_sigma)
 
 
 def _project_normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
@@ -346,12 +346,12 @@ def find_camera(
         )
         for index in np.flatnonzero(good):
             camera = _make_camera_of_trial(trials, int(index))
-            if _is_good_certainty(estimate_certainty(camera, ball, seen[index])):
+            if _is_good_certainty(estimate_ball_certainty(camera, ball, seen[index])):
                 return camera
     return None
 
 
-def _is_good_certainty(known: CameraCertainty) -> bool:
+def _is_good_certainty(known: BallCertainty) -> bool:
     return known.ball_sigma_m < 0.06 and known.size_sigma < 0.04
 
 

@@ -150,7 +150,7 @@ _TURNS = np.radians(np.arange(-90, 91, 15.0))
 
 
 @dataclass(frozen=True)
-class DrawnPerson:
+class ProjectedPerson:
     """One person as seen in one view: joints in pixels and how large a metre is there."""
 
     index: int
@@ -167,7 +167,7 @@ class DrawnPerson:
 
 def list_people_in_view(
     camera: Camera, instant: Instant, pose: Pose, image: Image
-) -> list[DrawnPerson]:
+) -> list[ProjectedPerson]:
     """Everybody who is at least partly in the frame."""
     count, joints = pose.joints.shape[:2]
     flat = pose.joints.reshape(-1, 3)
@@ -186,7 +186,7 @@ def list_people_in_view(
         toward = camera.position[:2] - instant.feet[index]
         turn = float(instant.heading[index] - np.arctan2(toward[1], toward[0]))
         people.append(
-            DrawnPerson(
+            ProjectedPerson(
                 index, pixels[index], depths[index], scale, turn, float(instant.height[index])
             )
         )
@@ -203,7 +203,12 @@ def choose_outfit(look: MatchLook, index: int) -> Outfit:
 
 
 def draw_person(
-    image: Image, person: DrawnPerson, look: MatchLook, number: int, gain: Colour, lit_from: float
+    image: Image,
+    person: ProjectedPerson,
+    look: MatchLook,
+    number: int,
+    gain: Colour,
+    lit_from: float,
 ) -> None:
     """Draw one person.
 
@@ -239,7 +244,9 @@ _DISTANT = (
 """Joint, joint, radius as a share of body height, and what covers it: what is left of people far away."""
 
 
-def draw_distant_person(image: Image, person: DrawnPerson, look: MatchLook, gain: Colour) -> None:
+def draw_distant_person(
+    image: Image, person: ProjectedPerson, look: MatchLook, gain: Colour
+) -> None:
     """Draw somebody who is too small for more than the colours of the kit.
 
     Args:
@@ -265,7 +272,7 @@ def _apply_light(colour: Colour, gain: Colour) -> Colour:
 @dataclass
 class _PersonPainter:
     patch: Patch
-    person: DrawnPerson
+    person: ProjectedPerson
     kit: Outfit
     skin: Colour
     hair: Colour

@@ -126,8 +126,10 @@ def make_look(index: int, seed: int, evening: bool) -> MatchLook:
     """The look of match ``index``: neighbours differ in kits, grass and light."""
     rng = np.random.default_rng([seed, index, 0x100C])
     home, away = _PAIRS[(index + seed) % len(_PAIRS)]
-    keepers = [_choose_distant_colour(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
-    referee = _choose_distant_colour(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
+    keepers = [
+        _choose_contrasting_colour(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)
+    ]
+    referee = _choose_contrasting_colour(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
     return MatchLook(
         seed=int(rng.integers(1 << 31)),
         home=home,
@@ -145,7 +147,7 @@ def _make_plain_outfit(colour: Colour) -> Outfit:
     return Outfit(colour, _BLACK, colour, colour)
 
 
-def _choose_distant_colour(
+def _choose_contrasting_colour(
     choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int
 ) -> Colour:
     distances = [min(float(np.linalg.norm(np.subtract(c, t))) for t in taken) for c in choices]

@@ -141,7 +141,7 @@ def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     """The net of the goal at x = ``sign`` * 52.5 m."""
     strands = _list_net_cords(sign)
     everything = camera.project(np.vstack(strands))
-    scale = _pixels_per_metre(camera, sign)
+    scale = _pixels_per_metre_at_goal(camera, sign)
     if scale is None or np.isnan(everything).any() or not _is_in_frame(everything, image):
         return
     patch = Patch(everything.min(axis=0) - 2, everything.max(axis=0) + 2, 2, image)
@@ -286,7 +286,7 @@ def _shade_ball(
     return np.asarray(base * shade[:, None], dtype=np.float64)
 
 
-def _pixels_per_metre(camera: Camera, sign: float) -> float | None:
+def _pixels_per_metre_at_goal(camera: Camera, sign: float) -> float | None:
     depth = float(camera.pitch_to_camera(np.array([[sign * HALF_LENGTH, 0.0, -1.2]]))[0, 2])
     return camera.focal_length[0] / depth if depth > 0.5 else None
 

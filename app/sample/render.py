@@ -17,8 +17,8 @@ from app.sample.cameras import HEIGHT, WIDTH
 from app.sample.figures import (
     INDEX,
     LIMBS,
-    DrawnPerson,
     Pose,
+    ProjectedPerson,
     draw_person,
     list_people_in_view,
     pose_people,
@@ -133,7 +133,7 @@ _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _SHIFT = 4
 
 
-def make_shadow_mask(
+def make_grass_light_mask(
     camera: Camera, instant: Instant, pose: Pose, light: Light, height: int, width: int
 ) -> Image:
     """Light left on the grass, 255 is all, shape (height, width)."""
@@ -245,7 +245,7 @@ def render_view(scene: Scene, view_key: str) -> Image:
 def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
-    shadow = make_shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
+    shadow = make_grass_light_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
     exposure = np.array(look.light.exposure)
     shade_frame(
         image,
@@ -314,19 +314,19 @@ def _draw_people_ball_and_goals(
         if sign not in near_goals:
             draw_net(image, camera, sign, gain)
             draw_goal_posts(image, camera, sign, gain)
-    _draw_play(image, camera, instant, look, side)
+    _draw_people_and_ball(image, camera, instant, look, side)
     for sign in near_goals:
         draw_goal_posts(image, camera, sign, gain)
         draw_net(image, camera, sign, gain)
 
 
-def _draw_play(
+def _draw_people_and_ball(
     image: Image, camera: Camera, instant: Instant, look: MatchLook, side: float
 ) -> None:
     """People and the ball, far ones first."""
     people = list_people_in_view(camera, instant, pose_people(instant), image)
     ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
-    order: list[tuple[float, DrawnPerson | None]] = [(ball_depth, None)]
+    order: list[tuple[float, ProjectedPerson | None]] = [(ball_depth, None)]
     order += [(float(person.depths.mean()), person) for person in people]
     for depth, person in sorted(order, key=lambda item: -item[0]):
         if depth < 0.5:

@@ -242,7 +242,7 @@ REPLAY_COUNT_SHARE = (0.50, 0.3374, 0.1626)
 
 
 @dataclass(frozen=True)
-class CameraShot:
+class CameraAtInstant:
     """One camera at one moment."""
 
     camera: Camera
@@ -250,7 +250,7 @@ class CameraShot:
 
 
 @dataclass(frozen=True)
-class MatchStage:
+class MatchSetup:
     """What all groups of a match share."""
 
     fixture: Fixture
@@ -260,7 +260,7 @@ class MatchStage:
     groups: int
 
 
-def make_match(
+def make_match_scenes(
     match: int, groups: int, seed: int, faults: bool = True, numbers: Iterable[int] | None = None
 ) -> list[Scene]:
     """The scenes of one match, or some of them.
@@ -270,27 +270,27 @@ def make_match(
         groups: How many groups it has.
         numbers: Which groups to make, all when None.
     """
-    stage = make_stage(match, groups, seed)
+    stage = make_match_setup(match, groups, seed)
     wanted = range(groups) if numbers is None else numbers
     return [_make_scene(stage, number, faults) for number in wanted]
 
 
-def make_stage(match: int, groups: int, seed: int) -> MatchStage:
+def make_match_setup(match: int, groups: int, seed: int) -> MatchSetup:
     """What the groups of a match share: the same for the same seed."""
     rng = np.random.default_rng([seed, match, 0x21])
-    return MatchStage(
+    return MatchSetup(
         make_fixture(match, seed), place_cameras(rng), choose_shirt_numbers(rng), seed, groups
     )
 
 
-def _make_scene(stage: MatchStage, number: int, faults: bool) -> Scene:
+def _make_scene(stage: MatchSetup, number: int, faults: bool) -> Scene:
     # Faults draw from their own stream, so that a scene without them is else the same.
     fault_rng = np.random.default_rng([stage.seed, stage.fixture.index, number, 0xFA])
     plan = plan_fault(fault_rng, _draw_replay_count(_scene_rng(stage, number)) + 1)
     return make_scene(stage, number, plan if faults else None)
 
 
-def _scene_rng(stage: MatchStage, number: int) -> np.random.Generator:
+def _scene_rng(stage: MatchSetup, number: int) -> np.random.Generator:
     return np.random.default_rng([stage.seed, stage.fixture.index, number])
 
 
@@ -298,7 +298,7 @@ def _draw_replay_count(rng: np.random.Generator) -> int:
     return 1 + int(rng.choice(3, p=REPLAY_COUNT_SHARE))
 
 
-def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
+def make_scene(stage: MatchSetup, number: int, plan: FaultPlan | None) -> Scene:
     """One scene of a match, with the fault that somebody planned for it, or none.
 
     Args:
@@ -308,7 +308,7 @@ def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
     """
     rng = _scene_rng(stage, number)
     replays = _draw_replay_count(rng)
-    shots, planted = _film_moment(rng, stage, replays, plan)
+    shots, planted = _make_cameras_at_new_instant(rng, stage, replays, plan)
     keys = [f"{number}.png"] + [f"{number}_{index}.png" for index in range(1, replays + 1)]
     tags = make_person_tags(rng, shots[0].instant)
     metadata = {IMAGE: _make_image_metadata(rng, stage, number)}
@@ -342,30 +342,34 @@ def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
     return Scene(group, truth, stage.fixture, MappingProxyType(instants))
 
 
-def _film_moment(
-    rng: np.random.Generator, stage: MatchStage, replays: int, plan: FaultPlan | None
-) -> tuple[list[CameraShot], float | None]:
+def _make_cameras_at_new_instant(
+    rng: np.random.Generator, stage: MatchSetup, replays: int, plan: FaultPlan | None
+) -> tuple[list[CameraAtInstant], float | None]:
     """Main camera and replays of a new moment, and the size of a fault of filming."""
-    instant, main = _make_main_shot(rng, stage)
-    cameras = [main] + [_aim_replay(rng, stage, main, instant.ball) for _ in range(replays)]
+    instant, main = _make_instant_and_main_camera(rng, stage)
+    cameras = [main] + [_make_replay_camera(rng, stage, main, instant.ball) for _ in range(replays)]
     instants = [instant] * len(cameras)
     amount: float | None = None
     if plan is not None and plan.kind in ("tiny_baseline", "not_synchronous"):
         own = np.random.default_rng([plan.seed, 0xBAD])
         index = plan.view_index
         if plan.kind == "tiny_baseline":
-            cameras[index], amount = _aim_neighbour(own, stage, main, instant.ball)
+            cameras[index], amount = _make_camera_beside_main(own, stage, main, instant.ball)
         else:
-            cameras[index], instants[index], amount = _film_other_moment(own, stage, main, instant)
+            cameras[index], instants[index], amount = _make_camera_at_other_instant(
+                own, stage, main, instant
+            )
     positions = np.array([camera.position for camera in cameras])
     cleared = clear_lines_of_sight(instant, positions)
     instants = [
         cleared if one is instant else clear_lines_of_sight(one, positions) for one in instants
     ]
-    return [CameraShot(c, i) for c, i in zip(cameras, instants, strict=True)], amount
+    return [CameraAtInstant(c, i) for c, i in zip(cameras, instants, strict=True)], amount
 
 
-def _make_main_shot(rng: np.random.Generator, stage: MatchStage) -> tuple[Instant, Camera]:
+def _make_instant_and_main_camera(
+    rng: np.random.Generator, stage: MatchSetup
+) -> tuple[Instant, Camera]:
     while True:
         instant = make_instant(rng, stage.numbers)
         # The main camera turns about its tripod; its lens moves a little with it.
@@ -375,8 +379,8 @@ def _make_main_shot(rng: np.random.Generator, stage: MatchStage) -> tuple[Instan
             return instant, camera
 
 
-def _aim_replay(
-    rng: np.random.Generator, stage: MatchStage, main: Camera, ball: FloatArray
+def _make_replay_camera(
+    rng: np.random.Generator, stage: MatchSetup, main: Camera, ball: FloatArray
 ) -> Camera:
     while True:
         _, seat = choose_replay_position(rng, stage.rig, ball)
@@ -387,8 +391,8 @@ def _aim_replay(
             return camera
 
 
-def _aim_neighbour(
-    rng: np.random.Generator, stage: MatchStage, main: Camera, ball: FloatArray
+def _make_camera_beside_main(
+    rng: np.random.Generator, stage: MatchSetup, main: Camera, ball: FloatArray
 ) -> tuple[Camera, float]:
     while True:
         position, distance = choose_position_beside_main(rng, main.position)
@@ -397,8 +401,8 @@ def _aim_neighbour(
             return camera, distance
 
 
-def _film_other_moment(
-    rng: np.random.Generator, stage: MatchStage, main: Camera, instant: Instant
+def _make_camera_at_other_instant(
+    rng: np.random.Generator, stage: MatchSetup, main: Camera, instant: Instant
 ) -> tuple[Camera, Instant, float]:
     while True:
         _, seat = choose_replay_position(rng, stage.rig, instant.ball)
@@ -417,7 +421,7 @@ def _record_fault(
 
 
 def _make_image_metadata(
-    rng: np.random.Generator, stage: MatchStage, number: int
+    rng: np.random.Generator, stage: MatchSetup, number: int
 ) -> dict[str, Any]:
     """What SoccerNet-v3 says of each image; a replay carries the time of its action."""
     seconds = (number + float(rng.uniform(0.1, 0.9))) / stage.groups * 2 * 45 * 60

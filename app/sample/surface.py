@@ -319,7 +319,7 @@ def _shade_grass(
 
 
 @_jit
-def _shade_lawn(
+def _shade_grass_with_lines(
     out: np.ndarray, gx: float, gy: float, ray: np.ndarray, t: float,
     R: np.ndarray, focal: float, turf: ShadingGrass, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
@@ -442,7 +442,7 @@ def shade_frame(
                 if far:
                     _set_colour(colour, wall, 0.9)
                 else:
-                    _shade_lawn(colour, x, y, ray, t, R, eye.focal, turf, coarse, fine)
+                    _shade_grass_with_lines(colour, x, y, ray, t, R, eye.focal, turf, coarse, fine)
                 _dim_colour(colour, shadow[row, column] / 255.0)
             elif part == _GROUND:
                 _shade_sky(colour, ray, sky)

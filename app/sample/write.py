@@ -26,7 +26,7 @@ from app.sample import GROUPS, SEED
 from app.sample.fixture import group_counts_by_match, make_fixture
 from app.sample.render import render_view
 from app.sample.scene import TRUTH, TruthWriter, truth_to_json
-from app.sample.scenes import make_match
+from app.sample.scenes import make_match_scenes
 from app.worker_process import open_spawned_pool
 
 JPEG_QUALITY = 85
@@ -103,7 +103,7 @@ def write_sample(
     counts = group_counts_by_match(groups)
     with _open_staging_folder(out) as folder:
         whole = [_GroupsJob(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
-        with _open_job_map(workers, len(whole) if labels_only else groups) as run:
+        with _open_job_runner(workers, len(whole) if labels_only else groups) as run:
             # With frames, drawing them is nearly all of the work, so it alone is reported.
             report = _write_labels(folder, whole, run, groups, progress if labels_only else None)
             if not labels_only:
@@ -159,7 +159,7 @@ def _write_labels(
 
 
 def _label_match(job: _GroupsJob) -> _LabelledMatch:
-    scenes = make_match(job.match, job.groups, job.seed, job.faults)
+    scenes = make_match_scenes(job.match, job.groups, job.seed, job.faults)
     write_soccernet_v3(job.out, [scene.group for scene in scenes])
     truths = [
         (scene.truth.key, json_text(truth_to_json(scene.truth), ascii_=True, compact=True))
@@ -181,7 +181,7 @@ def _write_frames(
 ) -> None:
     done = 0
     jobs = [part for match in matches for part in _split_job(match)]
-    drawn = zip(jobs, run(_draw_groups, jobs), strict=True)
+    drawn = zip(jobs, run(_render_frames_of_groups, jobs), strict=True)
     for match, parts in groupby(drawn, key=lambda pair: pair[0].match):
         archive = out / make_fixture(match, jobs[0].seed).folder / ARCHIVE
         temporary = archive.with_suffix(".part")
@@ -201,11 +201,11 @@ def _split_job(job: _GroupsJob) -> Iterator[_GroupsJob]:
         yield _GroupsJob(job.match, job.groups, first, last, job.seed, job.faults, job.out)
 
 
-def _draw_groups(job: _GroupsJob) -> list[tuple[str, bytes]]:
+def _render_frames_of_groups(job: _GroupsJob) -> list[tuple[str, bytes]]:
     """Name and JPEG of every frame of the job's groups."""
     numbers = range(job.first, job.last)
     members = []
-    for scene in make_match(job.match, job.groups, job.seed, job.faults, numbers):
+    for scene in make_match_scenes(job.match, job.groups, job.seed, job.faults, numbers):
         for view in scene.group.views:
             image = render_view(scene, view.key)
             _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
@@ -224,7 +224,7 @@ class _OrderedJobRunner:
 
 
 @contextmanager
-def _open_job_map(workers: int | None, jobs: int) -> Iterator[_OrderedJobRunner]:
+def _open_job_runner(workers: int | None, jobs: int) -> Iterator[_OrderedJobRunner]:
     count = min(workers or os.cpu_count() or 1, jobs)
     if count == 1:
         yield _OrderedJobRunner(None)

@@ -19,7 +19,7 @@ from app.soccer.solution import BallFit, Solution
 BOX_KINDS: tuple[str, ...] = get_args(BoxKind)
 
 
-def has_ball_3d(solution: Solution | None, view: View) -> bool:
+def is_ball_3d_valid_in_view(solution: Solution | None, view: View) -> bool:
     """Whether the 3D ball holds in a view: there is one, and the view is in a valid pair.
 
     That there is a fit says nothing: it is computed for other views, too.
@@ -32,7 +32,7 @@ def collect_ball_boxes(solution: Solution | None, view: View) -> dict[str, Box]:
     """The boxes that a view has, by kind of ``BOX_KINDS``."""
     boxes = {"annotated": view.ball.box if view.ball else None}
     solved = solution.view(view.key) if solution else None
-    if solved is not None and solved.ball is not None and has_ball_3d(solution, view):
+    if solved is not None and solved.ball is not None and is_ball_3d_valid_in_view(solution, view):
         boxes |= {"optimized": solved.ball.optimized_box, "exact": solved.ball.exact_box}
     return {kind: box for kind, box in boxes.items() if box is not None and _is_finite(box)}
 
@@ -50,7 +50,7 @@ def find_ball_fit(solution: Solution | None, view: View, everything: bool) -> Ba
     solved = solution.view(view.key) if solution else None
     if solution is None or solution.ball is None or solved is None or solved.ball is None:
         return None
-    if has_ball_3d(solution, view):
+    if is_ball_3d_valid_in_view(solution, view):
         return solved.ball
     if view.ball is None or not everything:
         return None

@@ -20,7 +20,7 @@ from app.json_text import canonical_json_text, digest_content, prepare_msgspec_t
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View, ViewExclusion
-from app.soccer.paint_evidence import PaintReading, reading_from_text
+from app.soccer.paint_evidence import PaintReading, reading_from_canonical_json
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
@@ -153,7 +153,7 @@ def _covariance_entry(station: Station, name: str) -> dict[str, Json]:
     return {} if covariance is None else {name: covariance}
 
 
-def picture_to_json(picture: PictureGeometry | None) -> Json:
+def picture_geometry_to_json(picture: PictureGeometry | None) -> Json:
     """``{"aspect": a, "shift": [x, y], "sigma": [a, x, y]}``, or None."""
     if picture is None:
         return None
@@ -164,8 +164,8 @@ def picture_to_json(picture: PictureGeometry | None) -> Json:
     }
 
 
-def picture_from_json(value: Mapping[str, Any] | None) -> PictureGeometry | None:
-    """Back from ``picture_to_json``."""
+def picture_geometry_from_json(value: Mapping[str, Any] | None) -> PictureGeometry | None:
+    """Back from ``picture_geometry_to_json``."""
     if value is None:
         return None
     (right, down), (aspect, x, y) = value["shift"], value["sigma"]
@@ -187,7 +187,11 @@ def station_to_json(station: Station) -> Json:
         "calibration": station.calibration,
         "flipped": station.flipped,
         **_covariance_entry(station, "given_covariance"),
-        **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
+        **(
+            {}
+            if station.picture is None
+            else {"picture": picture_geometry_to_json(station.picture)}
+        ),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
     }
 
@@ -210,7 +214,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         calibration=value["calibration"],
         flipped=value["flipped"],
         given_covariance=covariance_from_json(covariance),
-        picture=picture_from_json(value.get("picture")),
+        picture=picture_geometry_from_json(value.get("picture")),
         proposed=tuple(value.get("proposed", ())),
         not_visible=not_visible_from_json(value["lines"]),
     )
@@ -297,11 +301,13 @@ def group_from_json(value: Mapping[str, Any]) -> Group:
         split=value["split"],
         label=value["label"],
         positions=positions_from_json(value.get("positions")),
-        paint={view: reading_from_text(read) for view, read in value.get("paint", {}).items()},
+        paint={
+            view: reading_from_canonical_json(read) for view, read in value.get("paint", {}).items()
+        },
     )
 
 
-def paint_to_json(paint: Mapping[str, PaintReading]) -> dict[str, Json]:
+def paint_digests_to_json(paint: Mapping[str, PaintReading]) -> dict[str, Json]:
     """Digest of what was read by view; the reading itself is kept once, under it."""
     return {view: reading.digest for view, reading in paint.items()}
 
@@ -327,7 +333,7 @@ def group_without_views_to_json(group: Group) -> dict[str, Json]:
     ``positions`` and ``paint`` stand there only where there are any, so that digests of all other
     groups are what they always were.
     """
-    shared, read = positions_to_json(group.positions), paint_to_json(group.paint)
+    shared, read = positions_to_json(group.positions), paint_digests_to_json(group.paint)
     return {
         "key": group.key,
         "match": group.match,
@@ -435,7 +441,7 @@ def hash_group_inputs(
         views: As there, where they are known.
     """
     pairs = views or ((view_digest(view), station_digest(view.station)) for view in group.views)
-    read = paint_to_json(group.paint) if paint is None else paint
+    read = paint_digests_to_json(group.paint) if paint is None else paint
     return hash_solver_inputs(group.pitch, pairs, group.positions, read, group.noise)
 
 

@@ -80,7 +80,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class PlacedFinding(Finding):
+class FindingWithBallPlace(Finding):
     """A finding that knows where its ball would be.
 
     It is no part of a solution: tracks make it, of many groups together.

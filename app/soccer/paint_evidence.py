@@ -66,7 +66,7 @@ class PaintEvidence:
 PROPOSAL_OUTCOMES: tuple[ProposalOutcome, ...] = get_args(ProposalOutcome)
 
 
-class TripodCamera(NamedTuple):
+class TripodPitchCamera(NamedTuple):
     """The camera of a frame on the pitch that the frames of its tripod show together.
 
     Attributes:
@@ -104,7 +104,7 @@ class PaintReading:
     supported: float | None = None
     explained: float | None = None
     people: str = ""
-    tripod: TripodCamera | None = None
+    tripod: TripodPitchCamera | None = None
 
     @cached_property
     def text(self) -> str:
@@ -165,17 +165,17 @@ def reading_from_json(value: Any) -> PaintReading:
         raise InputError(f"this is not a valid paint measurement: {error}") from error
 
 
-def _tripod_from_json(value: Any) -> TripodCamera | None:
+def _tripod_from_json(value: Any) -> TripodPitchCamera | None:
     if value is None:
         return None
     parameters, covariance = (tuple(map(float, numbers)) for numbers in value)
     finite = all(map(math.isfinite, parameters + covariance))
     if not finite or (len(parameters), len(covariance)) != (8, 64):
         raise ValueError("the camera of a tripod must have 8 numbers, and its covariance 64")
-    return TripodCamera(parameters, covariance)
+    return TripodPitchCamera(parameters, covariance)
 
 
-def reading_from_text(text: str) -> PaintReading:
+def reading_from_canonical_json(text: str) -> PaintReading:
     """The reading whose text this is; its digest is that of the text.
 
     Raises:

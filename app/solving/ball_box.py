@@ -14,7 +14,7 @@ from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
 from app.solving.ball_covariance import calibration_covariance
 
 
-def fit_ball(
+def measure_ball_fit(
     camera: Camera,
     size: ImageSize,
     ball: BallAnnotation,

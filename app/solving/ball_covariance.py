@@ -14,7 +14,7 @@ from app.soccer.picture import camera_aspect
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.facts import STEP_PX, GroupFacts
-from app.solving.triangulate import WHOLE, BallObservation, CameraNumbers
+from app.solving.triangulate import WHOLE, BallObservation, UncertainCameraParameters
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
@@ -175,7 +175,7 @@ def calibration_covariance(
         size: Annotated size.
         point: In front of the camera, pitch frame, metres, shape (3,).
     """
-    numbers, camera = CameraNumbers.of(calibration, size.diagonal), calibration.camera
+    numbers, camera = UncertainCameraParameters.of(calibration, size.diagonal), calibration.camera
     if numbers is None or camera is None:
         return np.zeros((2, 2))
     known = numbers.parameters[None], numbers.covariance[None]
@@ -219,7 +219,7 @@ def ray_covariances(
         np.array([observation.noise for observation in observations]),
     )
     found: FloatArray = noise[:, None, None] * np.eye(2)
-    plain: dict[int, CameraNumbers] = {}
+    plain: dict[int, UncertainCameraParameters] = {}
     for row, observation in enumerate(observations):
         if observation.camera_numbers is not None and observation.camera_numbers.picture is None:
             plain[row] = observation.camera_numbers

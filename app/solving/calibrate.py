@@ -38,14 +38,14 @@ from app.solving.jaccard import (
     project_markings_like_evaluator,
 )
 from app.solving.labels import find_suspects
-from app.solving.lone_frame import LoneFrame, estimate_lone_frame
+from app.solving.lone_frame import LoneFrameUncertainty, estimate_lone_frame_uncertainty
 from app.solving.observations import Observations, make_observations
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import (
     WIDTH,
     PictureProblem,
     estimate_picture,
-    find_picture,
+    find_picture_distortion,
     picture_to_warp,
 )
 from app.solving.resect import (
@@ -100,7 +100,7 @@ def calibrate(
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_with_main_prior(fit, observations)
-    picture = find_picture(problem, fit.parameters, observations)
+    picture = find_picture_distortion(problem, fit.parameters, observations)
     found = replace(
         _make_calibration(problem, fit, observations), suspects=suspects, picture=picture
     )
@@ -168,7 +168,9 @@ def calibrate_picture(
         return Calibration("lines", None, reason=error.message)
     if alone.camera is None:
         return alone
-    covariance, whole = _picture_covariance(problem, observations, picture, found, alone.camera)
+    covariance, whole = _covariances_with_picture(
+        problem, observations, picture, found, alone.camera
+    )
     return measure_calibration(
         replace(
             alone,
@@ -187,7 +189,7 @@ def calibrate_picture(
 
 def analyse_lone_frame(
     found: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
-) -> LoneFrame | None:
+) -> LoneFrameUncertainty | None:
     """What nobody says of the pitch and the picture of a frame that was calibrated from its lines.
 
     Args:
@@ -204,17 +206,21 @@ def analyse_lone_frame(
     pitch = policy.with_fitted_goal(pitch)
     observations = make_observations(lines, pitch, size)
     parameters = problem.parameters(found.camera)
-    return estimate_lone_frame(problem, parameters, observations, pitch, policy, left_out)
+    return estimate_lone_frame_uncertainty(
+        problem, parameters, observations, pitch, policy, left_out
+    )
 
 
-def add_lone_frame_covariance(found: Calibration, alone: LoneFrame | None) -> Calibration:
+def add_lone_frame_covariance(
+    found: Calibration, alone: LoneFrameUncertainty | None
+) -> Calibration:
     """The calibration with that in its covariance; what the lines determine they still do."""
     return (
         found if alone is None else replace(found, covariance=flatten_covariance(alone.covariance))
     )
 
 
-def _picture_covariance(
+def _covariances_with_picture(
     problem: ResectionProblem,
     observations: Observations,
     prior: PictureGeometry,
@@ -258,13 +264,13 @@ def calibrate_station(
 
     ``shared`` is what other pictures of the match say of its position.
     """
-    found = _calibrate_all_markings(station, pitch, policy, shared)
+    found = _calibrate_counting_all_markings(station, pitch, policy, shared)
     if not station.not_visible:
         return found
     return _measure_against_station(found, station, pitch, policy)
 
 
-def _calibrate_all_markings(
+def _calibrate_counting_all_markings(
     station: Station, pitch: Pitch, policy: CalibrationPolicy, shared: SharedPosition | None
 ) -> Calibration:
     """``calibrate_station`` as if every visible marking was one that people draw."""
@@ -369,12 +375,14 @@ def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -
     )
 
 
-def compute_view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+def compute_view_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """Key of what ``calibrate_view`` makes."""
-    return compute_view_keys(group, view, policy)[0]
+    return compute_view_calibration_keys(group, view, policy)[0]
 
 
-def compute_view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str, ...]:
+def compute_view_calibration_keys(
+    group: Group, view: View, policy: CalibrationPolicy
+) -> tuple[str, ...]:
     """The same, and after it the key of the clicks that it starts from where it is another."""
     key = compute_click_calibration_key(group, view, policy)
     reading = find_usable_paint_reading(group, view, policy)

@@ -15,7 +15,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, ViewSolution
 from app.solving.calibrate import MAX_POSITION_SIGMA_M, find_usable_paint_reading
-from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrame
+from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrameUncertainty
 from app.solving.picture_camera import BELIEVED, MIN_SHIFT, MIN_STRETCH
 from app.wording import format_metres, format_pixels
 
@@ -200,7 +200,9 @@ def _find_picture_distortions(
     )
 
 
-def find_pitch_findings_of_lone_frame(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
+def find_pitch_findings_of_lone_frame(
+    alone: LoneFrameUncertainty | None, pitch: Pitch
+) -> Iterator[Finding]:
     """What the lines of a frame alone say of its pitch.
 
     Args:

@@ -105,7 +105,7 @@ def _make_resection_problem(
 
 
 @dataclass(frozen=True)
-class NoiseView:
+class ViewNoiseInputs:
     """A view of a solved group as far as noise asks.
 
     Attributes:
@@ -122,21 +122,21 @@ class NoiseView:
 
 
 @dataclass(frozen=True)
-class NoiseGroup:
+class GroupNoiseInputs:
     """A solved group as far as noise asks."""
 
     group: Group
     ball: Ball3D | None
-    views: tuple[NoiseView, ...]
+    views: tuple[ViewNoiseInputs, ...]
 
     @staticmethod
-    def of(group: Group, solution: Solution, policy: Policy) -> NoiseGroup:
+    def of(group: Group, solution: Solution, policy: Policy) -> GroupNoiseInputs:
         """What a group and its solution under a policy say."""
         views = (
-            _make_noise_view(group, view, solved.calibration_key, solved.calibration, policy)
+            _make_view_noise_inputs(group, view, solved.calibration_key, solved.calibration, policy)
             for view, solved in zip(group.views, solution.views, strict=True)
         )
-        return NoiseGroup(group, solution.ball, tuple(views))
+        return GroupNoiseInputs(group, solution.ball, tuple(views))
 
     def ray_residuals(self, policy: Policy) -> tuple[RayResidual, ...]:
         """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
@@ -150,7 +150,7 @@ class NoiseGroup:
         found = [self._recompute_calibration(view, policy) for view in self.views]
         return collect_ball_observations(self.group.views, found)
 
-    def _recompute_calibration(self, seen: NoiseView, policy: Policy) -> Calibration:
+    def _recompute_calibration(self, seen: ViewNoiseInputs, policy: Policy) -> Calibration:
         # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.
         if seen.evidence is None or seen.calibration.source != "lines":
             return seen.calibration
@@ -175,7 +175,7 @@ class DatasetNoise:
     misses: tuple[tuple[RayResidual, ...], ...]
 
 
-def estimate_noise(groups: Sequence[NoiseGroup], policy: Policy) -> DatasetNoise:
+def estimate_noise(groups: Sequence[GroupNoiseInputs], policy: Policy) -> DatasetNoise:
     """The noise that many groups show.
 
     Args:
@@ -202,9 +202,9 @@ def _replace_line_noise(policy: Policy, lines: LineEstimate) -> Policy:
     return replace(policy, calibration=known)
 
 
-def _make_noise_view(
+def _make_view_noise_inputs(
     group: Group, view: View, key: str, calibration: Calibration, policy: Policy
-) -> NoiseView:
+) -> ViewNoiseInputs:
     left_out = {suspect.marking for suspect in calibration.suspects}
     lines = make_lines({k: at for k, at in view.station.lines.items() if k not in left_out})
     evidence = None
@@ -214,7 +214,7 @@ def _make_noise_view(
         # Lines that leave the camera open say nothing of their noise.
         with suppress(DegenerateGeometryError, np.linalg.LinAlgError):
             evidence = collect_view_line_evidence(*arguments)
-    return NoiseView(key, view, replace(calibration, markings=()), lines, evidence)
+    return ViewNoiseInputs(key, view, replace(calibration, markings=()), lines, evidence)
 
 
 SPREAD = 0.5
@@ -257,7 +257,7 @@ class SourceNoise:
 
 
 @dataclass(frozen=True)
-class SourceFactors:
+class SourceNoiseFactors:
     """The factors of the sources of which enough is seen.
 
     Attributes:
@@ -300,7 +300,7 @@ class SourceFactors:
         return round(math.exp(log), DECIMALS)
 
 
-NOBODY = SourceFactors(1.0, (), np.zeros(0), np.zeros((0, 0)), np.zeros(0))
+NOBODY = SourceNoiseFactors(1.0, (), np.zeros(0), np.zeros((0, 0)), np.zeros(0))
 """Nothing is known of any source."""
 
 
@@ -350,12 +350,12 @@ class _SourceVariances:
         return 2 * self.variances_by_source(own) / variance[:, None], variance
 
 
-def estimate_sources(
+def estimate_source_noise(
     misses: Sequence[tuple[RayResidual, Mapping[str, Sequence[BallSource]]]],
     click: float,
     share: float,
     given: float,
-) -> SourceFactors:
+) -> SourceNoiseFactors:
     """The noise of each source of which enough is seen, cameras and people together.
 
     Args:
@@ -372,7 +372,7 @@ def estimate_sources(
     parts = _make_source_variances(misses, sources, np.array([click**2, share**2, given**2]))
     logs, covariance, numbers = _fit_factors(parts)
     seen = np.flatnonzero(numbers >= MIN_NUMBERS)
-    return SourceFactors(
+    return SourceNoiseFactors(
         math.hypot(click, given) if given and not click else click,
         tuple(sources[at] for at in seen.tolist()),
         logs[seen],

@@ -27,8 +27,8 @@ from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
 from app.solving.triangulate import (
     WHOLE,
-    CameraNumbers,
     PairPoint,
+    UncertainCameraParameters,
     collect_ball_observations,
     stack_pair_arrays,
     triangulate_observation_pairs,
@@ -267,7 +267,7 @@ def collect_facts(
     balls = [None if view.ball is None or view.ball.inferred else view.ball for view in views]
     boxes = [ball.box if ball is not None else None for ball in balls]
     diagonals = [view.size.diagonal for view in views]
-    numbers = list(map(CameraNumbers.of, calibrations, diagonals))
+    numbers = list(map(UncertainCameraParameters.of, calibrations, diagonals))
     parameters, covariances, pictures = (
         np.zeros((len(views), *shape))
         for shape in ((PARAMETERS,), (PARAMETERS, PARAMETERS), (3, WHOLE))
@@ -307,7 +307,7 @@ def collect_facts(
         pair_baseline=np.array([item.baseline_m for item in pair_points], float),
         pair_parallax=np.array([item.parallax_degrees for item in pair_points], float),
         pair_point=_to_table([item.point for item in pair_points], 3),
-        pair_moved=_perturb_pair_points(pair_points),
+        pair_moved=_compute_pair_point_shifts(pair_points),
         view_picture=pictures,
         view_stretch=_collect_view_stretches(views, calibrations, numbers),
         view_noise=np.array([view.noise for view in views], float),
@@ -317,7 +317,7 @@ def collect_facts(
 def _collect_view_stretches(
     views: Sequence[View],
     calibrations: Sequence[Calibration],
-    numbers: Sequence[CameraNumbers | None],
+    numbers: Sequence[UncertainCameraParameters | None],
 ) -> FloatArray:
     """``view_stretch``: one and nothing where the picture is as it was taken."""
     stretches = np.tile((1.0, 0.0), (len(views), 1))
@@ -349,7 +349,7 @@ def _camera_position(calibration: Calibration) -> Sequence[float] | FloatArray:
     return (np.nan,) * 3 if calibration.camera is None else calibration.camera.position
 
 
-def _perturb_pair_points(pair_points: Sequence[PairPoint]) -> FloatArray:
+def _compute_pair_point_shifts(pair_points: Sequence[PairPoint]) -> FloatArray:
     if not pair_points:
         return NOTHING.pair_moved
     a, b = [item.a for item in pair_points], [item.b for item in pair_points]
@@ -417,7 +417,7 @@ def _facts_from_numbers(groups: Sequence[FloatArray]) -> GroupFacts:
     starts = dict(zip(_ROWS, (ends - heads[:, 1:]).T, strict=True))
     totals = dict(zip(_ROWS, ends[-1].tolist(), strict=True))
     arrays: dict[str, Any] = {
-        name: np.empty((totals[_column_owner(name)], *shape), kind)
+        name: np.empty((totals[_column_row_kind(name)], *shape), kind)
         for name, (kind, shape) in COLUMNS.items()
     }
     sizes, size_of = np.unique(heads, axis=0, return_inverse=True)
@@ -448,18 +448,18 @@ def _scatter_columns(
     """Put the columns of groups of one size, a row of ``numbers`` each, where they belong."""
     at = len(_ROWS)
     for name, (_, shape) in COLUMNS.items():
-        target = targets[_column_owner(name)]
+        target = targets[_column_row_kind(name)]
         if name in LATER and at == length:
             arrays[name][target] = LATER[name] if shape else LATER[name][0]
             continue
-        end = at + rows[_column_owner(name)] * int(np.prod(shape))
+        end = at + rows[_column_row_kind(name)] * int(np.prod(shape))
         arrays[name][target] = numbers[:, at:end].reshape(len(target), *shape)
         at = end
     if at != length:
         raise ValueError("there are more numbers than the columns can store")
 
 
-def _column_owner(name: str) -> str:
+def _column_row_kind(name: str) -> str:
     """What a column has a row for."""
     return name.partition("_")[0]
 

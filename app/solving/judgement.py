@@ -92,12 +92,12 @@ def judge_groups(
     """
     if jac is None:
         jac = compute_view_jac(facts, policy.jac_gamma_percent)
-    return judge_known_failures(
+    return judge_with_known_view_failures(
         facts, policy, uncertainty, jac, find_first_failed_gates(facts, jac, policy)
     )
 
 
-def judge_known_failures(
+def judge_with_known_view_failures(
     facts: GroupFacts,
     policy: Policy,
     uncertainty: MeanCovariance,

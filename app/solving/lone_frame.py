@@ -85,7 +85,7 @@ _LENS = [PAN, TILT, ROLL, LOG_FOCAL, KAPPA]
 
 
 @dataclass(frozen=True)
-class LoneFrame:
+class LoneFrameUncertainty:
     """What the lines of a frame leave open once nobody says its pitch and picture.
 
     Attributes:
@@ -112,14 +112,14 @@ class LoneFrame:
         return replace(pitch, length=length, width=width)
 
 
-def estimate_lone_frame(
+def estimate_lone_frame_uncertainty(
     problem: ResectionProblem,
     parameters: FloatArray,
     observations: Observations,
     pitch: Pitch,
     policy: CalibrationPolicy,
     left_out: Collection[str] = (),
-) -> LoneFrame | None:
+) -> LoneFrameUncertainty | None:
     """What nobody knows of a frame's pitch and picture, as its camera's uncertainty.
 
     Args:
@@ -175,14 +175,14 @@ class _LoneFrameFit:
         seen = np.isin(self.frame.observations.marking, [MARKINGS.index(name) for name in markings])
         return float(self.rows.distance[seen].max(initial=0.0))
 
-    def to_lone_frame(self) -> LoneFrame:
+    def to_lone_frame(self) -> LoneFrameUncertainty:
         """As it is used."""
         carry = _camera_jacobian(self.rows)
         spread, off = self.frame.compute_covariance(self.rows), carry @ self.off
         covariance = carry @ spread @ carry.T + np.outer(off, off)
         if not np.isfinite(covariance).all():
             raise np.linalg.LinAlgError("the lines do not determine the camera")
-        return LoneFrame(
+        return LoneFrameUncertainty(
             covariance,
             self.frame.pitch_at_unknowns(self.unknowns),
             np.sqrt(np.diag(spread)[SIZES]),

@@ -46,7 +46,7 @@ _LONGEST = np.array([0.15, 0.25, 0.25])
 
 
 @dataclass(frozen=True)
-class PictureFrame:
+class PictureFrameLines:
     """Annotated points by marking, pixels of ``size``."""
 
     lines: Lines
@@ -79,7 +79,7 @@ class PictureEstimate:
 
 
 def estimate_match_picture(
-    frames: Sequence[PictureFrame], policy: CalibrationPolicy
+    frames: Sequence[PictureFrameLines], policy: CalibrationPolicy
 ) -> PictureEstimate:
     """The picture that explains the lines of many frames best.
 
@@ -102,7 +102,7 @@ def estimate_match_picture(
     return PictureEstimate(warp_to_picture(warp, (aspect, right, down)), len(seen))
 
 
-def select_informative_frames(frames: Sequence[PictureFrame]) -> list[int]:
+def select_informative_frames(frames: Sequence[PictureFrameLines]) -> list[int]:
     """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
     order = find_frames_with_enough_measurements(
         make_observations(frame.lines, frame.pitch, frame.size) for frame in frames
@@ -119,7 +119,7 @@ class _FittedFrame:
     camera: FloatArray
 
     @staticmethod
-    def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
+    def of(frame: PictureFrameLines, policy: CalibrationPolicy) -> _FittedFrame:
         # What markings have in common is in FRAME_SIGMA.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
         observations = make_observations(

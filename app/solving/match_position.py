@@ -33,7 +33,7 @@ _ROUNDS = 6
 
 
 @dataclass(frozen=True)
-class FramePlace:
+class FrameCameraPlace:
     """Where one frame alone puts its camera.
 
     Attributes:
@@ -48,7 +48,7 @@ class FramePlace:
 
 
 @dataclass(frozen=True)
-class MatchModel:
+class CameraPlaceModel:
     """The model that explains some places best.
 
     Attributes:
@@ -73,7 +73,7 @@ class MatchModel:
 class PlaceEquations:
     """Normal equations of each of some places, to fit one model to many choices of them."""
 
-    def __init__(self, places: Sequence[FramePlace], wander_m: FloatArray):
+    def __init__(self, places: Sequence[FrameCameraPlace], wander_m: FloatArray):
         """``wander_m``: what a place differs from the model by itself, each axis, shape (3,)."""
         positions = np.array([place.position for place in places]).reshape(-1, 3)
         covariances = np.array([place.covariance for place in places]).reshape(-1, 3, 3)
@@ -92,7 +92,7 @@ class PlaceEquations:
     def __len__(self) -> int:
         return len(self._squares)
 
-    def fit(self, rows: slice | FloatArray) -> MatchModel:
+    def fit(self, rows: slice | FloatArray) -> CameraPlaceModel:
         """The model of some of the places, one at least."""
         information, pulls, squares = (
             self._information[rows],
@@ -112,7 +112,9 @@ class PlaceEquations:
         # What a model of its own costs: the share of the prior that the places leave of it.
         narrowed = np.linalg.slogdet(normal)[1] + 2 * np.log(SIGMA).sum()
         cost = np.minimum(losses, FARTHEST).sum() + 0.5 * ((found / SIGMA) ** 2).sum()
-        return MatchModel(MEAN + found, np.linalg.inv(normal), chi, float(cost + 0.5 * narrowed))
+        return CameraPlaceModel(
+            MEAN + found, np.linalg.inv(normal), chi, float(cost + 0.5 * narrowed)
+        )
 
 
 def _chi_square(
@@ -132,7 +134,7 @@ SCATTER, GIVE_UP = 3.0, 12.0
 frames are not of one match."""
 
 
-def find_camera_place(calibration: Calibration, size: ImageSize) -> FramePlace | None:
+def find_camera_place(calibration: Calibration, size: ImageSize) -> FrameCameraPlace | None:
     """The place of a main camera; None for other cameras, and where the lines leave it open."""
     if calibration.camera is None or calibration.covariance is None:
         return None
@@ -142,7 +144,7 @@ def find_camera_place(calibration: Calibration, size: ImageSize) -> FramePlace |
     covariance = covariance[X : Z + 1, X : Z + 1]
     if not is_main_position(position) or not np.trace(covariance) <= MAX_SIGMA_M**2:
         return None
-    return FramePlace(position, covariance, float(parameters[PAN]))
+    return FrameCameraPlace(position, covariance, float(parameters[PAN]))
 
 
 def find_pan(calibration: Calibration) -> float | None:
@@ -153,14 +155,14 @@ def find_pan(calibration: Calibration) -> float | None:
     return float(parameters_from_camera(calibration.camera, 1.0)[PAN])
 
 
-class FramePlaces:
+class FrameCameraPlaces:
     """Places of some frames, side by side, to take one out and look at the others."""
 
-    def __init__(self, places: Sequence[FramePlace]):
+    def __init__(self, places: Sequence[FrameCameraPlace]):
         self._equations = PlaceEquations(places, WANDER_M)
         self._left_out: int | None = None
 
-    def without_frame(self, index: int) -> FramePlaces:
+    def without_frame(self, index: int) -> FrameCameraPlaces:
         """The same but for one of them; what they hold is shared, so a match costs it once."""
         rest = copy(self)
         rest._left_out = index
@@ -181,17 +183,17 @@ class FramePlaces:
         )
 
     @cached_property
-    def _fitted_model(self) -> MatchModel | None:
+    def _fitted_model(self) -> CameraPlaceModel | None:
         rest = np.arange(len(self._equations)) != self._left_out
         return self._equations.fit(rest) if rest.sum() >= MIN_OTHERS else None
 
 
-NO_PLACES = FramePlaces(())
+NO_PLACES = FrameCameraPlaces(())
 
 
 def calibrate_with_match_position(
     alone: Calibration,
-    others: FramePlaces,
+    others: FrameCameraPlaces,
     lines: Lines,
     pitch: Pitch,
     size: ImageSize,
@@ -216,7 +218,7 @@ WANDER_IN_RUN_M = np.array([0.3, 0.3, 0.18])
 """What frames of one match are allowed to differ by, each axis, beyond their own sigmas."""
 
 
-def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
+def guess_matches(places: Sequence[FrameCameraPlace | None]) -> list[int]:
     """A match for each frame, from 0, where nobody names them: runs whose places agree.
 
     Args:
@@ -233,7 +235,7 @@ def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
 class _MatchRuns:
     """Runs of places side by side, each known by its first place."""
 
-    def __init__(self, places: Sequence[FramePlace]):
+    def __init__(self, places: Sequence[FrameCameraPlace]):
         self._equations = PlaceEquations(places, WANDER_IN_RUN_M)
         self._end = {at: at + 1 for at in range(len(places))}
         self._begin = {at + 1: at for at in range(len(places))}

@@ -15,7 +15,7 @@ from app.geometry.arrays import FloatArray, flatten_covariance
 from app.geometry.resection import X, Z
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
-from app.soccer.paint_evidence import PaintReading, TripodCamera
+from app.soccer.paint_evidence import PaintReading, TripodPitchCamera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import (
@@ -88,7 +88,7 @@ def solve_match_tripod(
 
 def _solve_tripod_cameras(
     some: Mapping[int, _MainFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
-) -> dict[int, TripodCamera]:
+) -> dict[int, TripodPitchCamera]:
     if len(some) < LEAST_FRAMES:
         return {}
     middle = np.median([one.position for one in some.values()], axis=0)
@@ -108,7 +108,9 @@ def _solve_tripod_cameras(
         ]
         if len(fitting) == len(left):
             return {
-                number: TripodCamera(tuple(parameters.tolist()), flatten_covariance(covariance))
+                number: TripodPitchCamera(
+                    tuple(parameters.tolist()), flatten_covariance(covariance)
+                )
                 for number, (parameters, covariance) in cameras.items()
             }
         left = fitting

@@ -30,8 +30,8 @@ from app.solving.paint_noise import (
     PaintNoise,
     PaintOffsets,
     estimate_paint_noise,
-    marking_weights,
-    pitch_terms,
+    paint_derivatives_by_pitch,
+    point_weights_by_marking,
 )
 from app.solving.resect import ResectionProblem
 
@@ -100,7 +100,9 @@ class PaintProblem:
         if self.information is not None:
             information = information + self.information
             pull = pull + self.information @ (self.first - parameters)
-        base = np.ascontiguousarray(marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2)
+        base = np.ascontiguousarray(
+            point_weights_by_marking(seen.marking, seen.sigmas) / seen.sigmas**2
+        )
         moved: FloatArray = np.empty(PARAMETERS)
         # In one layout: the kernel would be compiled for each, which takes ten seconds.
         offsets, sigmas = np.ascontiguousarray(seen.offsets), np.ascontiguousarray(seen.sigmas)
@@ -135,7 +137,7 @@ class PaintProblem:
         """
         robust = self.robust_weights(seen.offsets, seen.sigmas)
         prior = self.prior(parameters).sigma ** -2.0
-        terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
+        terms = paint_derivatives_by_pitch(places, seen.marking, seen.jacobian, pitch)
         return estimate_paint_noise(seen, robust, prior, self.information, terms)
 
     def prior(self, parameters: FloatArray) -> GaussianPrior:

@@ -78,7 +78,7 @@ class PaintNoise:
     pitch: FloatArray
 
 
-def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
+def point_weights_by_marking(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     """Weight of each point, shape (N,): many points of one marking say less than of several.
 
     The mean of n points that share rho of their variance is worth n / (1 + rho (n - 1)) of them
@@ -93,8 +93,8 @@ def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     return weights
 
 
-def cautious_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
-    """``marking_weights`` with at least what the points of a marking share where covariances are told."""
+def cautious_point_weights_by_marking(marking: IntArray, sigmas: FloatArray) -> FloatArray:
+    """``point_weights_by_marking`` with at least what the points of a marking share where covariances are told."""
     counts = np.bincount(marking)
     shares = np.maximum(_common_variance_fractions(sigmas), LEAST_SHARE)
     weights: FloatArray = 1 / (1 + shares * (counts[marking] - 1))
@@ -132,7 +132,7 @@ def estimate_paint_noise(
         noise = compute_line_noise(rest, rows, seen.marking, prior, LinePrior(EXPECTED, LEAST))
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         return None
-    weighted = rows * marking_weights(seen.marking, seen.sigmas)[:, None]
+    weighted = rows * point_weights_by_marking(seen.marking, seen.sigmas)[:, None]
     bread = np.linalg.inv(weighted.T @ rows + known)
     shares = np.maximum(_common_variance_fractions(seen.sigmas), max(noise.share, LEAST_SHARE))[
         :, None
@@ -152,16 +152,16 @@ def estimate_paint_noise(
 CROWN, INWARD, LINES = 0, 1, slice(2, 2 + len(MARKINGS))
 SIZES = slice(2 + len(MARKINGS), 4 + len(MARKINGS))
 TERMS = 4 + len(MARKINGS)
-"""Columns of ``pitch_and_marking_terms``: crown, inward, each marking, length and width."""
+"""Columns of ``paint_derivatives_by_pitch_and_marking``: crown, inward, each marking, length and width."""
 
 
-def pitch_and_marking_terms(
+def paint_derivatives_by_pitch_and_marking(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:
-    """``pitch_terms`` with a column for each marking, seen or not, shape (N, TERMS)."""
+    """``paint_derivatives_by_pitch`` with a column for each marking, seen or not, shape (N, TERMS)."""
     terms = np.zeros((len(marking), TERMS))
     columns = [CROWN, INWARD, *(LINES.start + np.unique(marking)), SIZES.start, SIZES.stop - 1]
-    terms[:, columns] = pitch_terms(places, marking, jacobian, pitch)
+    terms[:, columns] = paint_derivatives_by_pitch(places, marking, jacobian, pitch)
     return terms
 
 
@@ -173,7 +173,7 @@ def compute_paint_shift(
     Args:
         places: Of the paint, pitch frame, metres, shape (N, 2).
         marking: Index into ``MARKINGS``, shape (N,).
-        values: Of the columns of ``pitch_and_marking_terms``, in their standard deviations, shape (TERMS,).
+        values: Of the columns of ``paint_derivatives_by_pitch_and_marking``, in their standard deviations, shape (TERMS,).
         pitch: The pitch, of the size that it has.
     """
     inside = INWARD_SIGMA_M * values[INWARD] * (marking != _MIDDLE)
@@ -193,15 +193,15 @@ def shift_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray) 
     return np.asarray(offsets - (_derivatives_by_place(jacobian) * shift).sum(axis=1))
 
 
-def pitch_terms(
+def paint_derivatives_by_pitch(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:
-    """``painted_terms`` and ``size_terms`` side by side, shape (N, K + 2)."""
-    painted = painted_terms(places, marking, jacobian, pitch)
-    return np.column_stack([painted, size_terms(marking, jacobian, pitch)])
+    """``paint_derivatives_by_layout`` and ``paint_derivatives_by_size`` side by side, shape (N, K + 2)."""
+    painted = paint_derivatives_by_layout(places, marking, jacobian, pitch)
+    return np.column_stack([painted, paint_derivatives_by_size(marking, jacobian, pitch)])
 
 
-def painted_terms(
+def paint_derivatives_by_layout(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:
     """How far paint moves with each number of how a pitch is laid and painted, shape (N, K).
@@ -229,8 +229,8 @@ def painted_terms(
     )
 
 
-def size_terms(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatArray:
-    """How far paint moves with length and width of the pitch, as ``painted_terms``, shape (N, 2).
+def paint_derivatives_by_size(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatArray:
+    """How far paint moves with length and width of the pitch, as ``paint_derivatives_by_layout``, shape (N, 2).
 
     A pitch that is not the usual one is one that somebody measured: zeros.
     """

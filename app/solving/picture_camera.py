@@ -320,7 +320,7 @@ class _LinearizedProblem:
         return step
 
 
-def find_picture(
+def find_picture_distortion(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
 ) -> PictureDistortion | None:
     """How the picture was stretched or cropped; None where its lines do not say so.
@@ -331,12 +331,12 @@ def find_picture(
         observations: What that camera was found from.
     """
     try:
-        return _fit_picture(problem, parameters, observations)
+        return _fit_picture_distortion(problem, parameters, observations)
     except np.linalg.LinAlgError:
         return None
 
 
-def _fit_picture(
+def _fit_picture_distortion(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
 ) -> PictureDistortion | None:
     warp = np.zeros(3)

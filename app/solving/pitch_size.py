@@ -139,7 +139,7 @@ _CROSSING = np.array([name.startswith(("Side line", "Middle line")) for name in 
 
 
 @dataclass(frozen=True)
-class PitchFrame:
+class PitchSizeFrameLines:
     """Annotated points by marking, pixels of ``size``."""
 
     lines: Lines
@@ -176,7 +176,7 @@ class PitchEstimate:
 
 
 def estimate_pitch(
-    frames: Sequence[PitchFrame],
+    frames: Sequence[PitchSizeFrameLines],
     policy: CalibrationPolicy,
     *,
     one_match: bool = True,
@@ -226,7 +226,7 @@ def estimate_pitch(
     )
 
 
-def select_informative_frames(frames: Sequence[PitchFrame]) -> list[int]:
+def select_informative_frames(frames: Sequence[PitchSizeFrameLines]) -> list[int]:
     """Indices of the ``MAX_FRAMES`` frames that say most of length and width, half of them for each.
 
     A frame tells the length when it shows something of the middle and something of an end, and
@@ -264,7 +264,7 @@ class _FittedFrame:
     fit: Resection
 
     @staticmethod
-    def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
+    def of(frame: PitchSizeFrameLines, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
         # What markings have in common is in FRAME_SIGMA_M.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
         observations = make_observations(frame.lines, pitch, frame.size)

@@ -37,9 +37,9 @@ from app.soccer.solution import (
     ViewSolution,
 )
 from app.solving.ball_3d import choose_exported_ball, compute_mean_ball, find_best_ball, judge_pairs
-from app.solving.ball_box import fit_ball, predict_ball_in_view
+from app.solving.ball_box import measure_ball_fit, predict_ball_in_view
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.calibrate import calibrate, calibrate_view, compute_view_key
+from app.solving.calibrate import calibrate, calibrate_view, compute_view_calibration_key
 from app.solving.contradiction import compute_chi_square, find_contradiction
 from app.solving.facts import GroupFacts, collect_facts
 from app.solving.findings import (
@@ -82,7 +82,7 @@ def solve_with_facts(
 ) -> tuple[Solution, GroupFacts]:
     """``solve_group``, and the facts that its gates were judged by."""
     known = dict(calibrations)
-    keys = [_compute_view_calibration_key(view, group, policy, known) for view in group.views]
+    keys = [_calibrate_view_unless_known(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
     observations = collect_ball_observations(group.views, found)
     pair_points = triangulate_observation_pairs(combinations(observations, 2))
@@ -122,11 +122,11 @@ def solve_with_facts(
     return solution, facts
 
 
-def _compute_view_calibration_key(
+def _calibrate_view_unless_known(
     view: View, group: Group, policy: Policy, known: dict[str, Calibration]
 ) -> str:
     """Key of a view's calibration, which is known then."""
-    key = compute_view_key(group, view, policy.calibration)
+    key = compute_view_calibration_key(group, view, policy.calibration)
     if key not in known:
         known[key] = calibrate_view(group, view, policy.calibration, known)
     return key
@@ -152,7 +152,7 @@ def _add_ball_to_view(
     )
     if solved.calibration.camera is None or view.ball is None:
         return solved
-    fit = fit_ball(
+    fit = measure_ball_fit(
         solved.calibration.camera,
         view.size,
         view.ball,

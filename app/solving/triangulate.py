@@ -23,7 +23,7 @@ WHOLE = PARAMETERS + 3
 
 
 @dataclass(frozen=True)
-class CameraNumbers:
+class UncertainCameraParameters:
     """The numbers of a camera, those of the picture as it was taken where it has been changed.
 
     Attributes:
@@ -38,7 +38,7 @@ class CameraNumbers:
     picture: FloatArray | None = None
 
     @staticmethod
-    def of(calibration: Calibration, diagonal: float) -> CameraNumbers | None:
+    def of(calibration: Calibration, diagonal: float) -> UncertainCameraParameters | None:
         """None without a camera, and where nobody says how exact it is.
 
         Args:
@@ -50,10 +50,14 @@ class CameraNumbers:
             return None
         if calibration.picture_covariance is None:
             covariance = np.reshape(calibration.covariance, (PARAMETERS, PARAMETERS))
-            return CameraNumbers(parameters_from_camera(camera, diagonal / 2), covariance)
+            return UncertainCameraParameters(
+                parameters_from_camera(camera, diagonal / 2), covariance
+            )
         whole = np.reshape(calibration.picture_covariance, (WHOLE, WHOLE))
         parameters = parameters_from_camera(camera_of_original_picture(camera), diagonal / 2)
-        return CameraNumbers(parameters, whole[:PARAMETERS, :PARAMETERS], whole[PARAMETERS:])
+        return UncertainCameraParameters(
+            parameters, whole[:PARAMETERS, :PARAMETERS], whole[PARAMETERS:]
+        )
 
 
 @dataclass(frozen=True)
@@ -109,9 +113,9 @@ class BallObservation:
         return self.camera.undistort_jacobian(np.array(self.center))
 
     @cached_property
-    def camera_numbers(self) -> CameraNumbers | None:
+    def camera_numbers(self) -> UncertainCameraParameters | None:
         """The camera as numbers; None where nobody says how exact it is."""
-        return CameraNumbers.of(self.calibration, self.size.diagonal)
+        return UncertainCameraParameters.of(self.calibration, self.size.diagonal)
 
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""

@@ -45,9 +45,9 @@ from app.solving.paint_noise import (
     SIZES,
     TERMS,
     PaintOffsets,
-    cautious_weights,
+    cautious_point_weights_by_marking,
     compute_paint_shift,
-    pitch_and_marking_terms,
+    paint_derivatives_by_pitch_and_marking,
     shift_offsets,
 )
 from app.solving.pitch_size import CERTAIN_SIGMAS, LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
@@ -337,11 +337,15 @@ class _TripodProblem:
         level = MAIN_SIGMA[0] ** -2.0
         for at in range(count):
             seen = self.seen(at)
-            terms = pitch_and_marking_terms(
+            terms = paint_derivatives_by_pitch_and_marking(
                 self._grass[at], seen.marking, seen.jacobian, self._plan
             )
             robust = self._problem.robust_weights(seen.offsets, seen.sigmas)
-            each = robust * cautious_weights(seen.marking, seen.sigmas) / seen.sigmas**2
+            each = (
+                robust
+                * cautious_point_weights_by_marking(seen.marking, seen.sigmas)
+                / seen.sigmas**2
+            )
             weighted = seen.jacobian * (each / known.noise)[:, None]
             weighted_terms = terms * (each / known.noise)[:, None]
             own[at] += weighted.T @ seen.jacobian

@@ -47,7 +47,7 @@ def parse_frame_offset(text: str) -> int | dict[int, int]:
     return dict(found)
 
 
-def parse_place(text: str) -> str:
+def parse_path_or_store_address(text: str) -> str:
     """A folder or file that is there, or an address in an object store."""
     from pathlib import Path
 

@@ -24,7 +24,7 @@ from app.formats.safe_path import resolve_inside
 from app.object_store.path import is_address
 
 if TYPE_CHECKING:
-    from app.features.predictions.evaluation_run import SourcesRequest
+    from app.features.predictions.evaluation_run import SourcesEvaluationRequest
     from app.features.predictions.reader import PredictionFiles
     from touchline.client import Client
 
@@ -197,7 +197,7 @@ def fetch_batches(client: Client, dataset: str) -> list[dict[str, Any]]:
     return [_select_batch_values(item) for item in items]
 
 
-def assign_batch(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
+def create_batch_on_server(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
     """Let the server give a batch out; as ``batch give`` has it."""
     return _select_batch_values(
         client.post(f"datasets/{quote_address_part(dataset)}/batches", dict(body))
@@ -214,12 +214,14 @@ def close_batch(client: Client, number: int) -> dict[str, Any]:
     return _select_batch_values(client.patch(f"batches/{number}", {"state": "closed"}))
 
 
-def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
+def make_gold_groups_on_server(
+    client: Client, dataset: str, body: Mapping[str, Any]
+) -> dict[str, Any]:
     """Let the server make gold groups; as ``batch gold`` has it."""
     return dict(client.post(f"datasets/{quote_address_part(dataset)}/gold", dict(body)))
 
 
-def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str, Any]:
+def change_gold_frequency(client: Client, number: int, gold_every: int | None) -> dict[str, Any]:
     """Let the server mix other many gold groups into a batch."""
     return _select_batch_values(client.patch(f"batches/{number}", {"gold_every": gold_every}))
 
@@ -297,19 +299,21 @@ def import_on_server(
             hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
         )
     more: dict[str, Any] = (
-        {} if lines is None else {"lines": {"upload": upload_file(client, lines)}}
+        {} if lines is None else {"lines": {"upload": upload_file_or_folder(client, lines)}}
     )
     if frames is not None:
         stored = is_address(frames)
         more["frames"] = (
-            {"folder": frames} if stored else {"upload": upload_file(client, Path(frames))}
+            {"folder": frames}
+            if stored
+            else {"upload": upload_file_or_folder(client, Path(frames))}
         )
     body = {
         "dataset": dataset,
         "format": format_,
         "source": {"folder": path}
         if isinstance(path, str)
-        else {"upload": upload_file(client, path)},
+        else {"upload": upload_file_or_folder(client, path)},
         "options": {**options, **more},
         "policy": policy,
         "dry_run": dry_run,
@@ -361,7 +365,7 @@ def _select_export_values(found: Mapping[str, Any]) -> dict[str, Any]:
 def evaluate_on_server(
     client: Client,
     dataset: str,
-    request: SourcesRequest,
+    request: SourcesEvaluationRequest,
     progress: ReportProgress,
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Send predictions, and let the server measure them.
@@ -391,7 +395,7 @@ def evaluate_on_server(
     return {**values, "dataset_id": dataset_id, "created": created}, list(sets.values())
 
 
-def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> None:
+def download_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> None:
     """Fetch everything of an evaluation into a folder.
 
     Raises:
@@ -424,7 +428,11 @@ def _find_or_send_prediction_set(
     files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
     sizes = {"size": source.size, "cameras_size": source.cameras_size}
     body: dict[str, Any] = {
-        **{field: upload_file(client, file) for field, file in files.items() if file is not None},
+        **{
+            field: upload_file_or_folder(client, file)
+            for field, file in files.items()
+            if file is not None
+        },
         **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
         "format": source.format,
         "category": source.category,
@@ -432,12 +440,12 @@ def _find_or_send_prediction_set(
     return dict(client.post(place, body))
 
 
-def upload_file(client: Client, path: Path) -> str:
+def upload_file_or_folder(client: Client, path: Path) -> str:
     """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
     from app.features.imports.upload_queries import upload_id
     from touchline.errors import NotFoundError as NotThere
 
-    with zip_folder(path) as file:
+    with zip_if_folder(path) as file:
         try:
             return str(client.get(f"uploads/{upload_id(file)}")["id"])
         except NotThere:
@@ -450,7 +458,7 @@ _CHUNK = 1 << 20
 
 
 @contextmanager
-def zip_folder(path: Path) -> Iterator[Path]:
+def zip_if_folder(path: Path) -> Iterator[Path]:
     """A file itself, or all files of a folder as a zip of its name, there until the block ends.
 
     The same files make the same zip, so that it is known again.

@@ -88,7 +88,7 @@ def get_current_server() -> ServerPlace | None:
     return _SERVER.get()
 
 
-def require_home() -> None:
+def require_no_server() -> None:
     """Raise InputError in what cannot be asked of the server that was named."""
     if get_current_server() is not None:
         raise InputError(
@@ -195,7 +195,7 @@ def _translate_client_error(server: ServerPlace, error: Exception) -> ReviewErro
 @contextmanager
 def open_store(settings: Settings | None = None) -> Iterator[Store]:
     """The database of a home; by default the one that the environment names."""
-    require_home()
+    require_no_server()
     from app.db.store import Store
 
     with closing(Store.open(settings or read_settings())) as store:

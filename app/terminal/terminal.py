@@ -105,7 +105,7 @@ def hold_interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def allow_any_text() -> None:
+def escape_unencodable_output() -> None:
     """Let no letter be too much for the terminal's encoding: it is spelt as JSON spells it."""
     codecs.register_error("spelt", _escape_unencodable)
     for stream in (sys.stdout, sys.stderr):

@@ -31,7 +31,7 @@ from app.tracking.ball_frames import (
     invert_homography,
 )
 from app.tracking.ball_picture import (
-    BallColour,
+    BallGreyConversion,
     BallSpot,
     Image,
     find_ball,
@@ -174,11 +174,11 @@ def _list_lead_in_frames(
 
 def _find_ball_by_appearance(
     other: Image, image: Image, click: BallClick, expected: float | None, hints: FollowHints
-) -> tuple[BallSpot, BallColour]:
+) -> tuple[BallSpot, BallGreyConversion]:
     """The ball at a click by how it looks in another frame, and at the click itself where it does not."""
     seen = hints.seen
     assert seen is not None
-    colour, size = BallColour.of(other, seen.x, seen.y, seen.diameter), seen.diameter
+    colour, size = BallGreyConversion.of(other, seen.x, seen.y, seen.diameter), seen.diameter
     camera = hints.cameras.get(seen.frame)
     there = None if camera is None else expected_ball_diameter(camera, seen.x, seen.y)
     if expected is not None and there is not None:
@@ -228,7 +228,7 @@ class _BallFollower:
         self._earlier: deque[tuple[BallFrame, FloatArray]] = deque(maxlen=longest)
         self._steps: list[_FrameHistories] = []
 
-    def step(self, number: int, image: Image | None, colour: BallColour) -> End | None:
+    def step(self, number: int, image: Image | None, colour: BallGreyConversion) -> End | None:
         """Look at the next frame, or pass one that nobody has; returns why the way ends there."""
         still = self._hints.still or image is None
         if image is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.tracking.ball_picture import BallColour, Grey, Image
+from app.tracking.ball_picture import BallGreyConversion, Grey, Image
 from app.tracking.motion import match_background
 
 BACKGROUND_WIDTH = 640
@@ -29,11 +29,11 @@ class BallFrame:
 
     number: int
     image: Image
-    colour: BallColour
+    colour: BallGreyConversion
     small: Grey
 
     @staticmethod
-    def of(number: int, image: Image, colour: BallColour) -> BallFrame:
+    def of(number: int, image: Image, colour: BallGreyConversion) -> BallFrame:
         scale = min(1.0, BACKGROUND_WIDTH / image.shape[1])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), np.uint8)

@@ -60,7 +60,7 @@ class BallSpot:
 
 
 @dataclass(frozen=True)
-class BallColour:
+class BallGreyConversion:
     """How colours become grey so that a ball stands out, as an even disc.
 
     Attributes:
@@ -70,7 +70,7 @@ class BallColour:
     weights: FloatArray
 
     @staticmethod
-    def of(image: Image, x: float, y: float, diameter: float) -> BallColour:
+    def of(image: Image, x: float, y: float, diameter: float) -> BallGreyConversion:
         """What tells a ball from what is around it.
 
         Args:
@@ -95,7 +95,7 @@ class BallColour:
         if np.linalg.norm(tinted) > 0.35 * np.linalg.norm(apart):
             apart = tinted
         slope = apart / (SHADED * float(apart @ (ball - ground))) * CONTRAST
-        return BallColour(np.append(slope, BACKGROUND_LEVEL - float(slope @ ground)))
+        return BallGreyConversion(np.append(slope, BACKGROUND_LEVEL - float(slope @ ground)))
 
     def to_grey(self, image: Image) -> Grey:
         """The grey picture, shape (H, W)."""
@@ -231,7 +231,7 @@ def fit_disc(
 
 def find_ball(
     image: Image, x: float, y: float, expected: float | None = None
-) -> tuple[BallSpot, BallColour] | None:
+) -> tuple[BallSpot, BallGreyConversion] | None:
     """The ball near a click: the spot that looks most like one, with its centre and size.
 
     Args:
@@ -285,11 +285,11 @@ def find_ball(
         size *= SIZES
     if best is None or best[0] < LEAST_LIKE:
         return None
-    colour = BallColour.of(image, *best[1:])
+    colour = BallGreyConversion.of(image, *best[1:])
     spot = fit_disc(colour.to_grey(image), *best[1:])
     if spot is None:
         return None
-    colour = BallColour.of(image, spot.x, spot.y, spot.diameter)
+    colour = BallGreyConversion.of(image, spot.x, spot.y, spot.diameter)
     return fit_disc(colour.to_grey(image), spot.x, spot.y, spot.diameter) or spot, colour
 
 

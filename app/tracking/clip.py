@@ -21,7 +21,7 @@ from app.paint.propose import (
 from app.soccer.frames import ImageSize
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex
-from app.video.indexing import index_times
+from app.video.indexing import index_without_measuring
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Clip:
         Raises:
             ImageError: It is not a video that can be read, or it is too small to follow a line in.
         """
-        index = index or index_times(path)
+        index = index or index_without_measuring(path)
         _, image = next(read_frames(path, index, [first]))
         if (small := explain_too_small_picture(image)) is not None:
             raise ImageError(f"{path.name}: {small}")

@@ -29,14 +29,14 @@ from app.geometry.resection import (
     projection_jacobians,
 )
 from app.paint.agreement import PaintAgreement, measure_agreement
-from app.paint.candidates import MAIN, WIDE, CameraLibrary
+from app.paint.candidates import MAIN, WIDE, CameraSearchSpace
 from app.paint.propose import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.missing_marking import propose_missing_marking_cameras
 from app.tracking.motion import BackgroundMatches, apply_background_motion
-from app.tracking.picture import FramePicture, propose_in_picture
+from app.tracking.picture import FramePicture, propose_camera_in_picture
 
 Outcome = Literal["tracked", "bridged", "lost"]
 TRACKED: Outcome = "tracked"
@@ -242,7 +242,9 @@ class CameraFollower:
         libraries = self._choose_camera_libraries()
         self.in_vain += 1
         try:
-            found = propose_in_picture(picture, self.pitch, self.known[-1:], self.policy, libraries)
+            found = propose_camera_in_picture(
+                picture, self.pitch, self.known[-1:], self.policy, libraries
+            )
         except (GeometryError, np.linalg.LinAlgError):
             return None
         if found.camera is None or found.snapped is None or found.agreement is None:
@@ -263,7 +265,7 @@ class CameraFollower:
             is_key=True,
         )  # fmt: skip
 
-    def _choose_camera_libraries(self) -> tuple[CameraLibrary, ...]:
+    def _choose_camera_libraries(self) -> tuple[CameraSearchSpace, ...]:
         """Where a camera is sought besides the positions that are known: a tripod stays where it is.
 
         The farther off, the more seldom: to look everywhere costs ten times what a frame may.

@@ -39,7 +39,7 @@ def find_time_map(
             a frame. Two say a map where the ball says none.
     """
     given = np.array(hints, dtype=float).reshape(-1, 2)
-    made = check_half_turn(fit_time_map(live, replay, given), live, replay, given)
+    made = explain_by_half_turn(fit_time_map(live, replay, given), live, replay, given)
     if made.pieces:
         return made
     if made.reason is not None and len(given) > 1 and np.ptp(given[:, 1]) > 0:
@@ -67,7 +67,9 @@ def fit_time_map(
     return _split_into_pieces(fit, made, best, found) if whole else made
 
 
-def check_half_turn(made: TimeMap, live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
+def explain_by_half_turn(
+    made: TimeMap, live: BallRays, replay: BallRays, hints: FloatArray
+) -> TimeMap:
     """What ``fit_time_map`` made; where it says nothing, and would once the replay's cameras are turned, that is said."""
     if made.reason is None or made.pieces:
         return made

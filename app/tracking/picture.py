@@ -13,8 +13,8 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.paint.candidates import CameraLibrary
-from app.paint.evidence import Image, PreparedPicture, read_picture
+from app.paint.candidates import CameraSearchSpace
+from app.paint.evidence import Image, PreparedPicture, prepare_picture
 from app.paint.grass import find_field_of_play
 from app.paint.propose import (
     FrameProposal,
@@ -77,7 +77,7 @@ class FramePicture:
     def reading(self) -> PreparedPicture:
         """Ready for paint to be read along markings."""
         if self._reading is None:
-            self._reading = read_picture(self.image, self.field)
+            self._reading = prepare_picture(self.image, self.field)
         return self._reading
 
     @property
@@ -121,12 +121,12 @@ def _compute_grey(picture: FramePicture) -> FramePicture:
     return picture
 
 
-def propose_in_picture(
+def propose_camera_in_picture(
     picture: FramePicture,
     pitch: Pitch,
     known: Sequence[Camera],
     policy: CalibrationPolicy,
-    libraries: Sequence[CameraLibrary],
+    libraries: Sequence[CameraSearchSpace],
 ) -> FrameProposal:
     """As ``propose_for_frame``, for a picture of a clip."""
     frame = prepare_frame_to_search(picture.image, picture.field, picture.strength, picture.reading)

@@ -37,7 +37,7 @@ from app.tracking.picture import (
     FramePicture,
     make_frame_picture,
     make_frame_pictures,
-    propose_in_picture,
+    propose_camera_in_picture,
 )
 
 TRIALS, ASKED = 2, 4
@@ -147,7 +147,9 @@ def _is_uncertain_camera_confirmed(
         return False
     for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
         picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
-        found = propose_in_picture(picture, follower.pitch, [start], follower.policy, (MAIN, WIDE))
+        found = propose_camera_in_picture(
+            picture, follower.pitch, [start], follower.policy, (MAIN, WIDE)
+        )
         if found.outcome == "proposed" and _shows_same_grass(found.camera, frame.camera, 0):
             return True
     return False

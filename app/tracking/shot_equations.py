@@ -67,7 +67,7 @@ class ShotEquations:
         shared = np.linalg.inv(rest)
         below = shared @ -np.einsum("nis,nik->sk", self.border, moved)
         moved = moved - border @ below
-        inverses = invert_diagonal(diagonal, beside) * (SCALE[:, None] * SCALE)
+        inverses = compute_inverse_diagonal_blocks(diagonal, beside) * (SCALE[:, None] * SCALE)
         covariances = inverses + border @ shared @ border.transpose(0, 2, 1)
         covariances += moved @ moved.transpose(0, 2, 1)
         return [0.5 * (each + each.T) for each in covariances]
@@ -101,7 +101,7 @@ def solve_tridiagonal(diagonal: FloatArray, beside: FloatArray, right: FloatArra
     return found
 
 
-def invert_diagonal(diagonal: FloatArray, beside: FloatArray) -> FloatArray:
+def compute_inverse_diagonal_blocks(diagonal: FloatArray, beside: FloatArray) -> FloatArray:
     """Diagonal blocks of the inverse of such a system, shape (N, B, B)."""
     count = len(diagonal)
     before, after = diagonal.copy(), diagonal.copy()

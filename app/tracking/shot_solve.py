@@ -46,9 +46,9 @@ from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import (
     TERMS,
     PaintOffsets,
-    cautious_weights,
-    marking_weights,
-    pitch_and_marking_terms,
+    cautious_point_weights_by_marking,
+    paint_derivatives_by_pitch_and_marking,
+    point_weights_by_marking,
     shift_offsets,
 )
 from app.solving.resect import ResectionProblem
@@ -109,7 +109,7 @@ def solve_shot(
     """
     chosen = [index for index, frame in enumerate(frames) if frame.outcome != LOST]
     if sum(frames[index].outcome == TRACKED for index in chosen) < LEAST_FRAMES:
-        alone = [_solve_frame_alone(frame) for frame in frames]
+        alone = [_take_own_paint_uncertainty(frame) for frame in frames]
         return SolvedShot(alone, None, alone)
     shot = _ShotProblem([frames[index] for index in chosen], chosen, matches, size, pitch, policy)
     painted = shot.painted()
@@ -153,7 +153,7 @@ def _replace_cameras(
     return solved
 
 
-def _solve_frame_alone(frame: TrackedFrame) -> TrackedFrame:
+def _take_own_paint_uncertainty(frame: TrackedFrame) -> TrackedFrame:
     """A frame with what its own paint says."""
     if frame.snapped is None:
         return frame
@@ -281,7 +281,7 @@ class _ShotProblem:
 
     def _compute_paint_weights(self, seen: PaintOffsets) -> FloatArray:
         robust = self._problem.robust_weights(seen.offsets, seen.sigmas)
-        weigh = cautious_weights if self._shifts else marking_weights
+        weigh = cautious_point_weights_by_marking if self._shifts else point_weights_by_marking
         weights: FloatArray = robust * weigh(seen.marking, seen.sigmas) / seen.sigmas**2
         return weights / self._noise
 
@@ -382,7 +382,9 @@ class _ShotProblem:
             seen = self._measure_all_offsets()[place]
             assert seen is not None
             grass = project_paint_to_grass(frame, self._size)
-            own = pitch_and_marking_terms(grass, seen.marking, seen.jacobian, self._pitch)
+            own = paint_derivatives_by_pitch_and_marking(
+                grass, seen.marking, seen.jacobian, self._pitch
+            )
             weighted = seen.jacobian * self._compute_paint_weights(seen)[:, None]
             terms[place] = weighted.T @ own
         return equations.covariances(terms)

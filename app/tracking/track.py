@@ -113,13 +113,13 @@ def track_clip(
     shot = follow_shot(clip, given, pitch, policy, tell)
     solved = solve_shot(shot.frames, shot.matches, clip.work, pitch, policy)
     return CameraTrack(
-        [_to_video_frame(frame, clip) for frame in solved.frames],
+        [_make_video_frame_camera(frame, clip) for frame in solved.frames],
         solved.shown,
-        [_to_video_frame(frame, clip) for frame in solved.shown_frames],
+        [_make_video_frame_camera(frame, clip) for frame in solved.shown_frames],
     )
 
 
-def _to_video_frame(frame: TrackedFrame, clip: Clip) -> FrameCamera:
+def _make_video_frame_camera(frame: TrackedFrame, clip: Clip) -> FrameCamera:
     """A frame in pixels and numbers of the video."""
     scale = clip.size.width / clip.work.width
     seen, covariance, error = frame.seen, frame.covariance, frame.error_px

@@ -60,7 +60,7 @@ def index_recording(
     return _build_index(path, _hash_file(path), settings, tell)
 
 
-def index_times(path: Path) -> RecordingIndex:
+def index_without_measuring(path: Path) -> RecordingIndex:
     """The index of a video whose pictures are not measured and whose content has no digest: enough to read its
     frames exactly. Decodes it all, in this process.
 

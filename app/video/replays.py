@@ -38,7 +38,7 @@ def cluster_logos(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[
     clusters: list[list[int]] = []
     for at in range(len(intervals)):
         for number, members in enumerate(clusters):
-            if any(_show_same_logo(rows, intervals[at], intervals[other]) for other in members):
+            if any(_have_same_logo(rows, intervals[at], intervals[other]) for other in members):
                 members.append(at)
                 found[at] = number
                 break
@@ -50,7 +50,7 @@ def cluster_logos(rows: Measured, intervals: Sequence[tuple[int, int]]) -> list[
     ]
 
 
-def _show_same_logo(rows: Measured, one: tuple[int, int], other: tuple[int, int]) -> bool:
+def _have_same_logo(rows: Measured, one: tuple[int, int], other: tuple[int, int]) -> bool:
     """Whether some frames within two transitions are pictures of one thing, in the same order."""
     ours, theirs = (rows[first : last + 1] for first, last in (one, other))
     bits = hash_distance(ours["hash"][:, None], theirs["hash"][None, :])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.soccer.policy import Policy
-from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
+from app.solving.dataset_noise import BallSource, SourceNoiseFactors, estimate_source_noise
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.table import print_table
 from tests.bench.truth import GROUPS, SEED, judge, misses_in, with_noise
@@ -62,7 +62,7 @@ def _mixed() -> Placed:
     return mixed
 
 
-def _factors(placed: Placed, policy: Policy) -> SourceFactors:
+def _factors(placed: Placed, policy: Policy) -> SourceNoiseFactors:
     seen = [
         (
             miss,
@@ -74,10 +74,10 @@ def _factors(placed: Placed, policy: Policy) -> SourceFactors:
         for made, people in placed
         for miss in misses_in(made, policy)
     ]
-    return estimate_sources(seen, policy.click_sigma_px, policy.box_sigma_share, 0.0)
+    return estimate_source_noise(seen, policy.click_sigma_px, policy.box_sigma_share, 0.0)
 
 
-def _with_own(made: Made, people: tuple[str, ...], factors: SourceFactors) -> Made:
+def _with_own(made: Made, people: tuple[str, ...], factors: SourceNoiseFactors) -> Made:
     views = tuple(
         replace(view, noise=factors.noise_factor([BallSource("person", of)]))
         for view, of in zip(made.group.views, people, strict=False)

@@ -27,7 +27,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
-from app.features.paint.service import read_paint
+from app.features.paint.service import read_paint_of_pictures
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.formats.report import ReaderReport
@@ -170,7 +170,7 @@ def in_a_dataset(
             groups.append(Group(key, (view,), match=clip))
         import_groups(store, "clips", groups, source="frames", actor="bench")
         change_policy(store, "clips", TOUCHLINE, if_match=None, actor="bench")
-        read_paint(store, "clips", actor="bench", workers=1)
+        read_paint_of_pictures(store, "clips", actor="bench", workers=1)
         solve_dataset(store, "clips")
         found: dict[str, list[Known]] = {}
         for number, (clip, image, _) in enumerate(names, start=1):

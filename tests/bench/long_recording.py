@@ -21,7 +21,7 @@ import cv2
 import httpx
 import numpy as np
 
-from app.video.indexing import index_times
+from app.video.indexing import index_without_measuring
 from tests.bench.table import print_table
 from tests.films import rendered
 from tests.videos import replace_boxes, write_pictures
@@ -209,7 +209,7 @@ def write_long(path: Path, minutes: float, size: tuple[int, int]) -> Path:
         path.write_bytes(CLIP.read_bytes())
     else:
         write_pictures(path, "mp4v", rendered(3, SECONDS * RATE, size), RATE)
-    lap = index_times(path)
+    lap = index_without_measuring(path)
     seconds = float(lap.seconds[-1] + lap.seconds[1])
     times, chunks = max(round(60 * minutes / seconds), 1), _chunks(path)
 

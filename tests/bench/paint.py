@@ -18,7 +18,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
-from app.features.paint.service import get_paint, read_paint
+from app.features.paint.service import read_paint_of_pictures, summarize_paint_readings
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.formats.report import ReaderReport
@@ -101,11 +101,11 @@ def _through_a_dataset(scenes: Sequence[Scene]) -> list[Solution]:
         import_groups(store, "bench", groups, source="sample", actor="bench")
         change_policy(store, "bench", TOUCHLINE, if_match=None, actor="bench")
         began = time.perf_counter()
-        read_paint(store, "bench", actor="bench")
+        read_paint_of_pictures(store, "bench", actor="bench")
         between = time.perf_counter()
         solve_dataset(store, "bench")
         spent = [between - began, time.perf_counter() - between]
-        (item,) = get_paint(store, "bench").items or (None,)
+        (item,) = summarize_paint_readings(store, "bench").items or (None,)
         print(f"\nThrough a dataset: {item.sentence if item else 'nothing'}")
         print(f"{spent[0]:.1f} s to read, {spent[1]:.1f} s to solve {len(groups)} groups")
         return [

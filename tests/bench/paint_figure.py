@@ -7,7 +7,7 @@ import sys
 import cv2
 import numpy as np
 
-from app.paint.evidence import find_paint, read_picture, trace_visible_markings
+from app.paint.evidence import find_paint, prepare_picture, trace_visible_markings
 from app.paint.grass import find_field_of_play
 from app.paint.ridges import find_line_like_pixels
 from app.sample.render import render_view
@@ -27,7 +27,7 @@ def main(out: str) -> None:
     field = find_field_of_play(picture)
     truth = scene.truth.view(key)
     assert truth is not None
-    reading = read_picture(picture, field)
+    reading = prepare_picture(picture, field)
     evidence = find_paint(
         reading, trace_visible_markings(reading, truth.camera, Pitch(), 14.0), 3.0
     )

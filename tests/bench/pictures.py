@@ -7,7 +7,7 @@ import numpy as np
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.match_picture import (
-    PictureFrame,
+    PictureFrameLines,
     estimate_match_picture,
     select_informative_frames,
 )
@@ -60,17 +60,17 @@ def bench_pictures() -> None:
     print_table("Stretched and cropped pictures, over the frames of a match", header, rows)
 
 
-def _match(case: Case, seed: int, count: int) -> list[PictureFrame]:
+def _match(case: Case, seed: int, count: int) -> list[PictureFrameLines]:
     """Frames of a main camera that turns and zooms, and shows enough each time."""
     rng = np.random.default_rng([seed, 7])
     place = np.array([rng.normal(0, 3), rng.uniform(50, 85), -rng.uniform(11, 24)])
-    frames: list[PictureFrame] = []
+    frames: list[PictureFrameLines] = []
     while len(frames) < count:
         target = np.array([rng.uniform(-48, 48), rng.uniform(-30, 30), -0.1])
         camera = _aimed(rng, place, target)
         if not _shows_enough(camera, case.pitch):
             continue
-        frame = PictureFrame(_clicks(rng, _deformed(camera, case), case), SIZE, Pitch())
+        frame = PictureFrameLines(_clicks(rng, _deformed(camera, case), case), SIZE, Pitch())
         frames += [frame] if select_informative_frames([frame]) else []
     return frames
 

@@ -11,7 +11,7 @@ from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
+from app.solving.pitch_size import PitchEstimate, PitchSizeFrameLines, estimate_pitch
 from tests.bench.cases import SIZE, Case, _aimed, _clicks, _shows_enough
 from tests.bench.table import print_table
 
@@ -74,16 +74,16 @@ def estimate_match(case: Case, seed: int) -> PitchEstimate | None:
         return None
 
 
-def _frames(case: Case, seed: int) -> list[PitchFrame]:
+def _frames(case: Case, seed: int) -> list[PitchSizeFrameLines]:
     """Frames of a main camera that turns and zooms, and shows enough each time."""
     rng = np.random.default_rng([seed, 7])
     place = np.array([rng.normal(0, 3), rng.uniform(50, 85), -rng.uniform(11, 24)])
-    frames: list[PitchFrame] = []
+    frames: list[PitchSizeFrameLines] = []
     while len(frames) < FRAMES:
         target = np.array([rng.uniform(-48, 48), rng.uniform(-30, 30), -0.1])
         camera = _aimed(rng, place, target)
         if _shows_enough(camera, case.pitch):
-            frames.append(PitchFrame(_clicks(rng, camera, case), SIZE))
+            frames.append(PitchSizeFrameLines(_clicks(rng, camera, case), SIZE))
     return frames
 
 

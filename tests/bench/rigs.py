@@ -21,7 +21,7 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.solving.ball_noise import RayResidual, compute_ray_residuals, estimate_ball_noise
-from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
+from app.solving.dataset_noise import BallSource, SourceNoiseFactors, estimate_source_noise
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve_group
@@ -97,7 +97,7 @@ def with_cameras(group: Group, cameras: Mapping[str, tuple[Camera, tuple[float, 
     return _with_stations(group, change)
 
 
-def with_factors(group: Group, factors: SourceFactors) -> Group:
+def with_factors(group: Group, factors: SourceNoiseFactors) -> Group:
     """The group with each camera's own noise."""
     views = tuple(
         replace(view, noise=factors.noise_factor([BallSource("camera", view.station.key)]))
@@ -106,13 +106,13 @@ def with_factors(group: Group, factors: SourceFactors) -> Group:
     return replace(group, views=views)
 
 
-def learn_noise(groups: Sequence[Group]) -> tuple[Policy, SourceFactors]:
+def learn_noise(groups: Sequence[Group]) -> tuple[Policy, SourceNoiseFactors]:
     """The policy ``paper`` with the noise of given cameras that groups show, and each camera's."""
     seen = [(miss, _cameras(group)) for group in groups for miss in _misses(group)]
     found = estimate_ball_noise([miss for miss, _ in seen], PAPER)
     assert found.given is not None
     given = found.given.value
-    factors = estimate_sources(seen, PAPER.click_sigma_px, PAPER.box_sigma_share, given)
+    factors = estimate_source_noise(seen, PAPER.click_sigma_px, PAPER.box_sigma_share, given)
     return replace(PAPER, given_sigma_px=given), factors
 
 

@@ -15,7 +15,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
 from app.solving.ball_noise import RayResidual
-from app.solving.dataset_noise import DatasetNoise, NoiseGroup, estimate_noise
+from app.solving.dataset_noise import DatasetNoise, GroupNoiseInputs, estimate_noise
 from app.solving.solve import solve_group
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
@@ -179,7 +179,7 @@ def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
 
 def with_noise(made: list[Made]) -> Policy:
     """The policy ``paper`` with the noise that the groups themselves show."""
-    seen = [NoiseGroup.of(one.group, solve_group(one.group, PAPER), PAPER) for one in made]
+    seen = [GroupNoiseInputs.of(one.group, solve_group(one.group, PAPER), PAPER) for one in made]
     return noise_used(estimate_noise(seen, PAPER), replace(PAPER, name="estimated"))
 
 
@@ -201,7 +201,9 @@ def noise_used(noise: DatasetNoise, policy: Policy) -> Policy:
 
 def misses_in(made: Made, policy: Policy) -> tuple[RayResidual, ...]:
     """What the rays to the ball of a group leave unexplained."""
-    return NoiseGroup.of(made.group, solve_group(made.group, policy), policy).ray_residuals(policy)
+    return GroupNoiseInputs.of(made.group, solve_group(made.group, policy), policy).ray_residuals(
+        policy
+    )
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

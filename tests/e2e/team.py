@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from app.config import Settings
 from app.db.store import Store
 from app.features.agreement.service import compare_or_adopt_submission
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.independent_annotations.service import begin_annotation
 from app.features.people import links
@@ -76,7 +76,7 @@ def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
     if moved and view.ball and view.ball.box:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
         state = submit_edit(
-            store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person
+            store, copy, make_set_ball_edit(view.key, ball), if_match=state.etag, actor=person
         )
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return compare_or_adopt_submission(store, copy)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from app.features.practice.lessons import LESSONS, Lesson, make_practice_scenes
+from app.features.practice.lessons import LESSONS, LessonRecipe, make_practice_scenes
 from app.sample.scene import Scene
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -320,7 +320,7 @@ class TestFiveKeys:
         left = page.request.get("/api/v1/practice").json()["lessons"]
         assert [(one["number"], one["feedback"]) for one in left if one["state"] != "right"] == []
 
-    def answer(self, screen: Screen, lesson: Lesson, scene: Scene) -> int:
+    def answer(self, screen: Screen, lesson: LessonRecipe, scene: Scene) -> int:
         """Do what the card offers; how many keys and clicks the first fault took."""
         card = screen.page.locator(".verdict-card")
         if lesson.kind in ("not_synchronous", "tiny_baseline"):
@@ -335,7 +335,7 @@ class TestFiveKeys:
         return max(used, 1)
 
     @staticmethod
-    def mend(screen: Screen, lesson: Lesson, scene: Scene) -> int:
+    def mend(screen: Screen, lesson: LessonRecipe, scene: Scene) -> int:
         page = screen.page
         before = screen.document()["etag"]
         expect(page.locator(".suggestion .button--fix")).to_be_visible()

@@ -230,7 +230,9 @@ class TestWork:
         accept = page.get_by_role("button", name="Accept A")
         expect(accept).to_have_attribute("title", re.compile("ute has submitted this"))
         page.keyboard.press("Shift+R")
-        expect(page.get_by_role("dialog", name="Apply ute’s annotation to the group")).to_be_visible()
+        expect(
+            page.get_by_role("dialog", name="Apply ute’s annotation to the group")
+        ).to_be_visible()
         expect(page.get_by_role("button", name="Apply Enter")).to_be_focused()
         page.keyboard.press("Enter")
         until(page, lambda: "/review/8" in page.url)

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.evaluation.frame import Detection, iou
 from app.features.datasets.tables import ViewModel
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.sources import ImportSource, import_source
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
@@ -146,7 +146,7 @@ class TestDetect:
         state = _states(store)[0]
         view = state.group.views[0].key
         cleared = submit_edit(
-            store, state.id, set_ball(view, None), if_match=state.etag, actor="ann"
+            store, state.id, make_set_ball_edit(view, None), if_match=state.etag, actor="ann"
         )
         assert cleared.solution.ball is None or len(cleared.solution.ball.views) < len(
             state.group.views
@@ -157,7 +157,7 @@ class TestDetect:
         assert after.group.view(view).ball.predicted_by == "tiny"
         assert after.solution is not None
         undone = submit_edit(
-            store, state.id, set_ball(view, state.group.view(view).ball), if_match=after.etag,
+            store, state.id, make_set_ball_edit(view, state.group.view(view).ball), if_match=after.etag,
             actor="ann",
         )  # fmt: skip
         assert undone.group == state.group

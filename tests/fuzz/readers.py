@@ -26,7 +26,7 @@ from app.evaluation.prediction_files import read_predicted_cameras, read_predict
 from app.features.imports.sources import (
     STATIC,
     ImportSource,
-    _open_static_folder,
+    _open_issia_folder,
     _read_groups,
     import_source,
 )
@@ -39,7 +39,7 @@ from app.formats.guess_format import guess_format
 from app.formats.output import open_output_folder
 from app.formats.report import ReaderReport
 from app.json_text import json_text
-from app.media.files import read_frame
+from app.media.files import read_encoded_frame
 from app.soccer.choices import ImportFormat
 from app.soccer.group import Group, Media
 from app.soccer.policy import PAPER
@@ -141,7 +141,7 @@ class Readers:
         else:
             frame = 1 if kind == "video" else None
             for width in (None, 20):
-                read_frame(Media(str(path), frame=frame), width, False, self.settings)
+                read_encoded_frame(Media(str(path), frame=frame), width, False, self.settings)
 
     def _import(self, kind: str, path: Path, whole: bool) -> None:
         source = ImportSource(kind, path, name="upload")
@@ -156,7 +156,7 @@ class Readers:
 def _groups_of(source: ImportSource, settings: Settings) -> Iterator[Group]:
     report = ReaderReport()
     if source.format in STATIC:
-        return _open_static_folder(source, report, LIMITS).groups()
+        return _open_issia_folder(source, report, LIMITS).groups()
     return _read_groups(source, settings, report, LIMITS)
 
 

@@ -19,7 +19,12 @@ from app.features.exports.source import ExportImages
 from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _read_frame
 from app.formats.report import ReaderReport
-from app.media.files import decode_frame, read_frame, read_picture_header, read_pixels
+from app.media.files import (
+    decode_frame,
+    read_digest_and_pixels,
+    read_encoded_frame,
+    read_picture_header,
+)
 from app.media.frames import FrameProvider, make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -79,17 +84,21 @@ def served(path: Path, settings: Settings) -> np.ndarray:
 
 
 USERS: dict[str, Callable[[Path, Settings], np.ndarray]] = {
-    "the frame as it is": lambda path, to: plain(read_frame(Media(str(path)), None, False, to)),
-    "the frame made narrow": lambda path, to: plain(read_frame(Media(str(path)), 4000, False, to)),
+    "the frame as it is": lambda path, to: plain(
+        read_encoded_frame(Media(str(path)), None, False, to)
+    ),
+    "the frame made narrow": lambda path, to: plain(
+        read_encoded_frame(Media(str(path)), 4000, False, to)
+    ),
     "the same from the cache": lambda path, to: [
-        plain(read_frame(Media(str(path)), 4000, False, to)) for _ in range(2)
+        plain(read_encoded_frame(Media(str(path)), 4000, False, to)) for _ in range(2)
     ][1],
     "a process of the server": served,
     "a mirrored camera": lambda path, to: np.fliplr(
-        plain(read_frame(Media(str(path)), None, True, to))
+        plain(read_encoded_frame(Media(str(path)), None, True, to))
     ),
     "paint of a view": lambda path, to: decode_frame(Media(str(path)), False, to),
-    "paint of a dataset": lambda path, to: read_pixels(Media(str(path)), False, to)[1],
+    "paint of a dataset": lambda path, to: read_digest_and_pixels(Media(str(path)), False, to)[1],
     "pictures of a folder": of_files,
     "a detector": lambda path, to: _read_frame(
         SimpleNamespace(media=Media(str(path)), flipped=False), to
@@ -134,7 +143,7 @@ class TestOneOrientation:
         path = tmp_path / "7.webp"
         Image.fromarray(STORED).save(path, exif=exif(6), lossless=True)
         assert (decode_frame(Media(str(path)), False, settings) == STORED).all()
-        assert read_frame(Media(str(path)), None, False, settings) == path.read_bytes()
+        assert read_encoded_frame(Media(str(path)), None, False, settings) == path.read_bytes()
 
     @pytest.mark.parametrize("orientation", [0, 9, 65535])
     def test_an_orientation_that_does_not_exist_turns_nothing(
@@ -159,10 +168,10 @@ class TestOneOrientation:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         path = write(tmp_path / "7.jpg", 6)
-        digest, _ = read_pixels(Media(str(path)), False, settings)
-        assert read_pixels(Media(str(path)), False, settings, digest) == (digest, None)
+        digest, _ = read_digest_and_pixels(Media(str(path)), False, settings)
+        assert read_digest_and_pixels(Media(str(path)), False, settings, digest) == (digest, None)
         write(tmp_path / "8.jpg", 1)
-        upright, _ = read_pixels(Media(str(tmp_path / "8.jpg")), False, settings)
+        upright, _ = read_digest_and_pixels(Media(str(tmp_path / "8.jpg")), False, settings)
         assert digest != upright
 
     def test_nothing_else_in_the_product_decodes_pictures(self) -> None:

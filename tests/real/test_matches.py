@@ -17,7 +17,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.match_position import NO_PLACES, find_camera_place
-from app.solving.pitch_size import PitchFrame, estimate_pitch
+from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LINES = DATA / "sn22-dev" / "lines.zip"
@@ -65,7 +65,7 @@ class TestShares:
         """The frames of the second match show either end and hardly ever the middle with it."""
         names = [share.match for share in shares]
         second = [file for file, name in zip(files, names, strict=True) if name == names[10]]
-        found = estimate_pitch([PitchFrame(file.lines, SIZE) for file in second], POLICY)
+        found = estimate_pitch([PitchSizeFrameLines(file.lines, SIZE) for file in second], POLICY)
         assert found.length is None
         assert found.width == pytest.approx(68.0, abs=1.5)
 
@@ -73,7 +73,7 @@ class TestShares:
         """At its size the middle that both show is predicted from the rest, at 105 m it is not."""
         names = [share.match for share in shares]
         match = [file for file, name in zip(files, names, strict=True) if name == names[110]]
-        found = estimate_pitch([PitchFrame(file.lines, SIZE) for file in match], POLICY)
+        found = estimate_pitch([PitchSizeFrameLines(file.lines, SIZE) for file in match], POLICY)
         proposed = found.proposal(Pitch())
         assert proposed is not None and proposed.length == pytest.approx(101.2, abs=0.5)
         middle = [(it, name) for it in match for name in it.lines if name in MIDDLE]

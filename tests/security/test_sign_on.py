@@ -11,7 +11,7 @@ import pyotp
 import pytest
 
 from app.features.people.devices import AttemptWindow
-from app.features.people.links import make_first_link
+from app.features.people.links import make_first_admin_link
 from app.features.people.logins import LoginMethod
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
@@ -80,7 +80,7 @@ class TestComingIn:
 
     def test_the_first_admin_may_come_by_it(self, visitor: SignOnVisitor, monkeypatch: Any) -> None:
         monkeypatch.setattr("app.features.people.links.count_people_who_can_log_in", lambda *_: 0)
-        link = make_first_link(visitor.team.store, actor="local")
+        link = make_first_admin_link(visitor.team.store, actor="local")
         assert link is not None
         visitor.provider.who = {"sub": "s-root"}
         assert_refused(visitor.team.ask("POST", BEGIN, {"link": link.token}), 400, "/name")

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.db.log import read_log, verify_chain
 from app.db.store import Store
 from app.features.datasets.service import list_datasets
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.integrity.checks import examine_database
 from app.features.verdicts.queries import read_verdicts
@@ -35,7 +35,7 @@ def people_work(settings: Settings, *, freezes: bool = True) -> None:
             freeze_dataset(store, dataset.id, FreezeRequest("first", groups="passing"), actor="ann")
         for group_id in _ids(store):
             state = load_group_state(store, group_id)
-            edit = set_ball(state.group.views[0].key, BALL)
+            edit = make_set_ball_edit(state.group.views[0].key, BALL)
             state = submit_edit(store, group_id, edit, if_match=state.etag, actor="ann")
             set_verdict(
                 store, group_id, "rejected", "other", "no ball", if_match=state.etag, actor="ben"

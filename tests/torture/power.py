@@ -18,7 +18,7 @@ from app.config import Settings
 from app.db.log import verify_chain
 from app.db.store import Store
 from app.errors import NotFoundError, StorageError
-from app.features.imports.upload_queries import upload_path
+from app.features.imports.upload_queries import find_complete_upload_path
 from tests.torture.recording import (
     SHARED_MEMORY,
     Acknowledge,
@@ -185,7 +185,7 @@ def _entries(settings: Settings) -> int:
 def _is_whole(settings: Settings, upload: str) -> bool:
     """Whether an upload is there with the name and content that its id is the digest of."""
     try:
-        path = upload_path(settings, upload)
+        path = find_complete_upload_path(settings, upload)
         content = path.read_bytes()
     except (NotFoundError, FileNotFoundError):
         return False

@@ -266,7 +266,7 @@ def make_engine(settings: Settings, *, lasting: bool = True) -> Engine:
 
 
 @contextmanager
-def report_storage_errors(settings: Settings) -> Iterator[None]:
+def translate_storage_errors(settings: Settings) -> Iterator[None]:
     """Turn what the disk or the database refuses into a ``StorageError`` with a sentence.
 
     A text that no database of its kind can hold is the caller's: an ``InputError``.

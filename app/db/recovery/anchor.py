@@ -108,13 +108,13 @@ def overwrite_anchor(database: Path, anchor: DatabaseAnchor) -> None:
         os.close(handle)
 
 
-def sync_anchor(database: Path) -> None:
+def flush_anchor_to_disk(database: Path) -> None:
     """Wait until the anchor is on the disk."""
     with suppress(FileNotFoundError):
         sync_to_disk(find_anchor_file(database))
 
 
-def read_anchor_of_database(connection: Connection) -> DatabaseAnchor | None:
+def compute_anchor_from_database(connection: Connection) -> DatabaseAnchor | None:
     """The anchor that a database should have; None before it had an installation id."""
     tables = inspect(connection).get_table_names()
     if "installation" not in tables:
@@ -155,7 +155,7 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
     Beside others (not ``alone``) the length of the log is left to whoever writes it.
     """
     with engine.connect() as connection:
-        anchor = read_anchor_of_database(connection)
+        anchor = compute_anchor_from_database(connection)
     stored = read_anchor(settings.database_file)
     if anchor is None or anchor == stored:
         return

@@ -29,7 +29,7 @@ import pysqlite3.dbapi2
 from numpy.typing import NDArray
 
 from app.config import Settings
-from app.db.dialects.dialect import make_engine, report_storage_errors
+from app.db.dialects.dialect import make_engine, translate_storage_errors
 from app.db.home import ASIDE, KEYS
 from app.db.recovery.anchor import read_anchor, require_own_database
 from app.errors import DamagedError, StorageError
@@ -263,7 +263,7 @@ def _require_log_reaches_anchor(settings: Settings) -> None:
     url = f"sqlite+pysqlite:///file:{file}?mode=ro&uri=true"
     engine = make_engine(settings.model_copy(update={"database_url": url}))
     try:
-        with report_storage_errors(settings):
+        with translate_storage_errors(settings):
             require_own_database(engine, settings)
     finally:
         engine.dispose()

@@ -126,12 +126,12 @@ def put_agreement(session: Session, values: Mapping[str, Any]) -> None:
     session.execute(insert(table), [dict(values)])
 
 
-def select_groups_in_state(state: str) -> Select[int]:
+def select_groups_in_agreement_state(state: str) -> Select[int]:
     """Ids of the groups whose annotations came to a state, in any batch."""
     return select(AgreementModel.group_id).where(AgreementModel.state == state)
 
 
-def read_group_states(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
+def read_agreement_states(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """What groups came to, what waits for a decision first; those that were not compared are left out."""
     rows = session.execute(
         select(AgreementModel.group_id, AgreementModel.state)
@@ -201,7 +201,7 @@ def list_submitted_copies_to_take_over(session: Session) -> list[int]:
     return list(session.scalars(statement.where(*ready, BatchModel.verdicts == 1)))
 
 
-def read_required_verdicts(session: Session, batch_id: int) -> int | None:
+def read_required_annotation_count(session: Session, batch_id: int) -> int | None:
     """How many annotations of each group a batch asks for; None where there is no such batch."""
     verdicts: int | None = session.scalar(
         select(BatchModel.verdicts).where(BatchModel.id == batch_id)

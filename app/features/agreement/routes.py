@@ -173,7 +173,7 @@ class AgreementDocument(Document):
     groups: list[GroupAgreementDocument] = Field(description="The worst first.")
 
 
-class WaitingList(ListDocument[OpenCase]):
+class UndecidedGroupList(ListDocument[OpenCase]):
     """Groups that wait for a decision, those that disagree most first."""
 
 
@@ -295,9 +295,9 @@ def put_limits(
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
+def list_undecided_groups(dataset: DatasetPath, store: AppStore) -> UndecidedGroupList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
-    return WaitingList.model_validate({"items": adjudicate.list_open_cases(store, dataset)})
+    return UndecidedGroupList.model_validate({"items": adjudicate.list_open_cases(store, dataset)})
 
 
 @router.get(

@@ -28,7 +28,7 @@ from app.features.agreement.queries import (
     list_submitted_copies_to_take_over,
     put_agreement,
     put_limits,
-    read_required_verdicts,
+    read_required_annotation_count,
     save_adjudication,
 )
 from app.features.batches.completion_queries import complete_group_in_batch
@@ -228,7 +228,9 @@ def compare_submitted_annotations(
     annotations = list_undecided_annotations(store, group_id, batch_id)
     with store.read() as session:
         required = (
-            REQUIRED if batch_id is None else read_required_verdicts(session, batch_id) or REQUIRED
+            REQUIRED
+            if batch_id is None
+            else read_required_annotation_count(session, batch_id) or REQUIRED
         )
         known = _find_stored_agreement(session, group_id, batch_id)
     if len(annotations) < max(REQUIRED, required) or (known and known.state != OPEN):

@@ -15,9 +15,9 @@ from app.evaluation.rater_agreement import (
     AgreementLimits,
     MedianAndTail,
     cohen_kappa,
+    compute_medians_and_tails,
     fleiss_kappa,
     krippendorff_alpha,
-    measure_spreads,
 )
 from app.features.agreement.queries import AGREED, DECIDED, OPEN, AgreementRow, list_agreements
 from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits
@@ -187,7 +187,9 @@ def _summarize_pair_agreement(
     both = [(one[two[0]], one[two[1]]) for one in verdicts]
     both = [(a, b) for a, b in both if a is not None and b is not None]
     kappa = cohen_kappa([a for a, _ in both], [b for _, b in both])
-    return PeopleAgreement(two, len(found), kappa, measure_spreads(pair.distance for pair in found))
+    return PeopleAgreement(
+        two, len(found), kappa, compute_medians_and_tails(pair.distance for pair in found)
+    )
 
 
 def _summarize_overall_agreement(
@@ -201,7 +203,7 @@ def _summarize_overall_agreement(
         tuple(people),
         len(read),
         kappa,
-        measure_spreads(pair.distance for one in read for pair in one.pairs),
+        compute_medians_and_tails(pair.distance for one in read for pair in one.pairs),
     )
 
 
@@ -220,7 +222,7 @@ def _summarize_group_agreement(one: _ComparedGroup) -> GroupAgreement:
         tuple(one.verdicts.values()),
         row.worst,
         row.disagreements,
-        measure_spreads(pair.distance for pair in one.pairs),
+        compute_medians_and_tails(pair.distance for pair in one.pairs),
         row.outcome,
         None if row.take_id is None else people[row.take_id],
         row.decided,

@@ -14,7 +14,7 @@ from starlette.responses import Response
 
 from app.features.audit import service as audit
 from app.features.audit.queries import AuditQuery
-from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
+from app.features.audit.service import KINDS, AuditEntry, AuditPage, AuditTopic
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.formats.csv_text import format_csv_line
@@ -65,7 +65,7 @@ def parse_audit_query(
     person: Annotated[
         str | None, Query(max_length=120, description="A person, with all of their tokens.")
     ] = None,
-    family: Annotated[Family | None, Query(description="What it is about.")] = None,
+    family: Annotated[AuditTopic | None, Query(description="What it is about.")] = None,
     since: Annotated[datetime | None, Query(description="From this time on.")] = None,
     until: Annotated[datetime | None, Query(description="Before this time.")] = None,
 ) -> AuditQuery:

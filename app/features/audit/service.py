@@ -100,7 +100,7 @@ MOST_LOOKED_AT = 20_000
 _BATCH = 500
 
 
-class Family(StrEnum):
+class AuditTopic(StrEnum):
     """What an entry of the log is about."""
 
     EDIT = "edit"
@@ -115,20 +115,20 @@ class Family(StrEnum):
     OTHER = "other"
 
 
-KINDS: Mapping[Family, tuple[str, ...]] = {
-    Family.EDIT: (
+KINDS: Mapping[AuditTopic, tuple[str, ...]] = {
+    AuditTopic.EDIT: (
         *("edit", "undo", "redo", "pitch", "position", "noise", "paint"),
         *("station_edit", "station_undo", "station_redo"),
     ),
-    Family.VERDICT: ("verdict", "verdict_batch", "verdict_batch_undo", "dismissal"),
-    Family.COMMENT: ("comment",),
-    Family.POLICY: ("policy",),
-    Family.VERSION: ("freeze",),
-    Family.IMPORT: ("dataset", "dataset_deleted", "import", "station", "camera", "spare"),
-    Family.PEOPLE: ("person",),
-    Family.JOB: ("job",),
-    Family.WORK: ("work", "take", "agreement", "gold", "guideline"),
-    Family.OTHER: ("deed",),
+    AuditTopic.VERDICT: ("verdict", "verdict_batch", "verdict_batch_undo", "dismissal"),
+    AuditTopic.COMMENT: ("comment",),
+    AuditTopic.POLICY: ("policy",),
+    AuditTopic.VERSION: ("freeze",),
+    AuditTopic.IMPORT: ("dataset", "dataset_deleted", "import", "station", "camera", "spare"),
+    AuditTopic.PEOPLE: ("person",),
+    AuditTopic.JOB: ("job",),
+    AuditTopic.WORK: ("work", "take", "agreement", "gold", "guideline"),
+    AuditTopic.OTHER: ("deed",),
 }
 """Kinds of the log's entries by what they are about."""
 _FAMILIES = {kind: family for family, kinds in KINDS.items() for kind in kinds}
@@ -151,7 +151,7 @@ class AuditEntry:
     id: int
     at: Moment
     actor: str
-    family: Family
+    family: AuditTopic
     kind: str
     sentence: str
     dataset: str | None
@@ -251,7 +251,7 @@ def _build_audit_entry(row: AuditRow) -> AuditEntry:
         id=row.id,
         at=row.at,
         actor=row.actor,
-        family=_FAMILIES.get(row.kind, Family.OTHER),
+        family=_FAMILIES.get(row.kind, AuditTopic.OTHER),
         kind=row.kind,
         sentence=_SENTENCES.get(row.kind, _describe_kind)(row, body),
         dataset=row.dataset,
@@ -409,8 +409,8 @@ def _make_describer_with_name(verb: str) -> Callable[[AuditRow, Mapping[str, Any
 
 
 _SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
-    **dict.fromkeys(KINDS[Family.EDIT], _describe_edit),
-    **dict.fromkeys(KINDS[Family.WORK], _describe_work),
+    **dict.fromkeys(KINDS[AuditTopic.EDIT], _describe_edit),
+    **dict.fromkeys(KINDS[AuditTopic.WORK], _describe_work),
     "verdict": _describe_verdict,
     "dismissal": _describe_dismissal,
     "verdict_batch": _describe_bulk_verdict,

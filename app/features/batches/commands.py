@@ -73,11 +73,11 @@ def give(
     }
     server = get_current_server()
     if server is not None:
-        from app.terminal.remote import assign_batch
+        from app.terminal.remote import create_batch_on_server
 
         body = {**fields, "q": query, "due": None if day is None else day.isoformat()}
         with connect_to_server(server) as client:
-            print_values(assign_batch(client, dataset, body), json_)
+            print_values(create_batch_on_server(client, dataset, body), json_)
         return
     from app.features.batches.service import NewBatch, make_batch
 
@@ -125,11 +125,11 @@ def gold(
         raise typer.BadParameter("say sample or version", param_hint="--from")
     server = get_current_server()
     if server is not None:
-        from app.terminal.remote import choose_gold
+        from app.terminal.remote import make_gold_groups_on_server
 
         body = {"source": source, "version": version, "q": query, "size": size, "start": start}
         with connect_to_server(server) as client:
-            print_values(choose_gold(client, dataset, body), json_)
+            print_values(make_gold_groups_on_server(client, dataset, body), json_)
         return
     from app.features.independent_annotations.known_truth import (
         GoldChoice,
@@ -154,10 +154,10 @@ def change(
         raise typer.BadParameter("say how many, or --no-gold", param_hint="--gold-every")
     server = get_current_server()
     if server is not None:
-        from app.terminal.remote import change_gold
+        from app.terminal.remote import change_gold_frequency
 
         with connect_to_server(server) as client:
-            print_values(change_gold(client, batch, gold_every), json_)
+            print_values(change_gold_frequency(client, batch, gold_every), json_)
         return
     from app.features.batches.service import change_batch
 

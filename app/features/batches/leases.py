@@ -34,8 +34,8 @@ from app.features.batches.queries import (
     mark_submitted,
     save_lease,
 )
-from app.features.batches.service import WORK, Batch, Part, Presence, read_batch
-from app.features.independent_annotations.adopt import log_return, strip_and_check_reason
+from app.features.batches.service import WORK, Batch, BatchRole, Presence, read_batch
+from app.features.independent_annotations.adopt import log_and_notify_return, strip_and_check_reason
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
 from app.features.people.visibility_queries import has_hidden_groups
@@ -59,14 +59,14 @@ class BatchMember:
     may_review: bool = True
     alone: bool = False
 
-    def parts(self, batch: Batch) -> set[Part]:
+    def parts(self, batch: Batch) -> set[BatchRole]:
         """What they do in a batch."""
         parts = set()
         if self.name in batch.annotators and self.may_annotate:
-            parts.add(Part.ANNOTATOR)
+            parts.add(BatchRole.ANNOTATOR)
         named = self.name in batch.reviewers or not batch.reviewers or self.alone
         if named and self.may_review:
-            parts.add(Part.REVIEWER)
+            parts.add(BatchRole.REVIEWER)
         return parts
 
 
@@ -88,7 +88,7 @@ class Lease:
 
     batch: Batch
     group: int | None
-    part: Part | None = None
+    part: BatchRole | None = None
     until: str | None = None
     here: tuple[Presence, ...] = ()
     submitted_by: str | None = None
@@ -130,10 +130,10 @@ class LeaseService:
             mine = next((group for group in back if group != after), None)
             if mine is not None:
                 row = _require_batch_group(session, batch, mine)
-                return self._renew_lease(session, batch, row, Part.ANNOTATOR, worker)
+                return self._renew_lease(session, batch, row, BatchRole.ANNOTATOR, worker)
         annotation = begin_next_own_annotation(self._store, batch, worker.name)
         if annotation is None:
-            return Lease(batch, None, Part.ANNOTATOR)
+            return Lease(batch, None, BatchRole.ANNOTATOR)
         with self._store.read() as session:
             return _make_lease_of_copy(session, batch, annotation, worker)
 
@@ -170,13 +170,16 @@ class LeaseService:
             if own is not None:
                 return _make_lease_of_copy(session, batch, own, worker)
             _require_group_access(session, batch, group, worker)
-            parts, row = _require_parts(batch, worker), _require_batch_group(session, batch, group)
+            parts, row = (
+                _require_batch_roles(batch, worker),
+                _require_batch_group(session, batch, group),
+            )
             others = _list_blocking_leases(session, batch, group, worker, self._current_time_text())
             if others and not take_over:
                 here = _read_presences(session, batch, group, self._current_time_text())
                 raise HeldGroupError(f"{others[0].person} has this group open", here)
             end_leases(session, [row.id for row in others])
-            return self._renew_lease(session, batch, row, _choose_part(parts, row), worker)
+            return self._renew_lease(session, batch, row, _choose_batch_role(parts, row), worker)
 
     def release_group(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """End a lease; it does not matter whether there is one.
@@ -214,7 +217,7 @@ class LeaseService:
             batch = _read_open_batch(session, batch_id)
             _require_group_access(session, batch, group, worker)
             row = _require_batch_group(session, batch, group)
-            if Part.ANNOTATOR not in worker.parts(batch):
+            if BatchRole.ANNOTATOR not in worker.parts(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
             others = row.submitted is not None and row.submitted_by != worker.name
             if row.settled is not None or others:
@@ -256,7 +259,9 @@ class LeaseService:
                 raise ConflictError("this group is not submitted")
             person = row.submitted_by
             mark_submitted(session, batch_id, group, at=None, by=person, returned=True)
-            log_return(session, WORK, group, person, checked, actor=actor, batch=batch_id)
+            log_and_notify_return(
+                session, WORK, group, person, checked, actor=actor, batch=batch_id
+            )
             return self._end_lease(session, batch_id, group, worker)
 
     def _end_lease(self, session: Session, batch_id: int, group: int, worker: BatchMember) -> Lease:
@@ -270,7 +275,12 @@ class LeaseService:
         return lease
 
     def _renew_lease(
-        self, session: Session, batch: Batch, row: WaitingGroup, part: Part, worker: BatchMember
+        self,
+        session: Session,
+        batch: Batch,
+        row: WaitingGroup,
+        part: BatchRole,
+        worker: BatchMember,
     ) -> Lease:
         at, group = self._clock(), row.group_id
         until = format_utc_time(at + LASTS)
@@ -290,7 +300,7 @@ class LeaseService:
 
 def find_next_open_group(
     session: Session, batch: Batch, worker: BatchMember, at: str, *, after: int | None = None
-) -> tuple[Any, Part] | None:
+) -> tuple[Any, BatchRole] | None:
     """The row of the group that somebody gets next of a batch, and what they do with it.
 
     The one function that decides it, where nobody works on copies of their own. It is called in a
@@ -311,14 +321,14 @@ def find_next_open_group(
     Raises:
         ConflictError: The batch is given to others.
     """
-    parts = _require_parts(batch, worker)
+    parts = _require_batch_roles(batch, worker)
     row = None if after is None else find_batch_group(session, batch.id, after)
     place = 0 if row is None else int(row.place)
-    for part in (Part.ANNOTATOR, Part.REVIEWER):
+    for part in (BatchRole.ANNOTATOR, BatchRole.REVIEWER):
         if part not in parts:
             continue
         # Where nobody annotates, a reviewer gets everything that waits.
-        submitted = (part is Part.REVIEWER) if batch.annotators else None
+        submitted = (part is BatchRole.REVIEWER) if batch.annotators else None
         found = find_next_waiting_group(
             session, batch.id, batch.dataset_id, worker.name, at, submitted=submitted, after=place
         )
@@ -332,7 +342,7 @@ def _make_lease_of_copy(
 ) -> Lease:
     """Of a copy, which nobody else can have open."""
     of = count_own_groups(session, batch, worker.name)
-    return Lease(batch, annotation.copy_id, Part.ANNOTATOR, place=annotation.place, of=of)
+    return Lease(batch, annotation.copy_id, BatchRole.ANNOTATOR, place=annotation.place, of=of)
 
 
 def _list_blocking_leases(
@@ -359,7 +369,7 @@ def _read_open_batch(session: Session, batch_id: int) -> Batch:
     return hide_others_progress(session, batch)
 
 
-def _require_parts(batch: Batch, worker: BatchMember) -> set[Part]:
+def _require_batch_roles(batch: Batch, worker: BatchMember) -> set[BatchRole]:
     parts = worker.parts(batch)
     if not parts:
         raise ConflictError(
@@ -369,11 +379,11 @@ def _require_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     return parts
 
 
-def _choose_part(parts: set[Part], row: WaitingGroup) -> Part:
+def _choose_batch_role(parts: set[BatchRole], row: WaitingGroup) -> BatchRole:
     """What somebody with these parts does with a group of a batch, as far as it is by now."""
-    if Part.ANNOTATOR in parts and (row.submitted is None or Part.REVIEWER not in parts):
-        return Part.ANNOTATOR
-    return Part.REVIEWER
+    if BatchRole.ANNOTATOR in parts and (row.submitted is None or BatchRole.REVIEWER not in parts):
+        return BatchRole.ANNOTATOR
+    return BatchRole.REVIEWER
 
 
 def _require_group_access(session: Session, batch: Batch, group: int, worker: BatchMember) -> None:

@@ -12,7 +12,7 @@ from app.db.store import Store
 from app.errors import ConflictError
 from app.features.batches.queries import list_returned_batch_groups, read_batch_groups
 from app.features.batches.queries import mark_submitted as hand_in_group
-from app.features.batches.service import Batch, Part, get_batch, list_batches
+from app.features.batches.service import Batch, BatchRole, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
     BatchAnnotationTerms,
@@ -23,7 +23,7 @@ from app.features.independent_annotations.known_truth import (
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
-    count_groups_left,
+    count_begun_and_free_groups,
     find_annotation_of_copy,
     list_annotations_of_batch,
 )
@@ -40,11 +40,11 @@ OVER = ("accepted", "rejected")
 """Verdicts after which a group waits for nobody."""
 
 
-def makes_own_annotations(batch: Batch, parts: Collection[Part]) -> bool:
+def makes_own_annotations(batch: Batch, parts: Collection[BatchRole]) -> bool:
     """Whether somebody with these parts makes annotations of their own in a batch."""
     if batch.verdicts == 1 and batch.gold_every is None:
         return False
-    return Part.ANNOTATOR in parts or (Part.REVIEWER in parts and not batch.annotators)
+    return BatchRole.ANNOTATOR in parts or (BatchRole.REVIEWER in parts and not batch.annotators)
 
 
 def begin_next_own_annotation(
@@ -81,7 +81,9 @@ def count_own_groups_left(session: Session, batch: Batch, person: str) -> int:
     """Of how many groups somebody may still make an annotation of their own, begun ones and those
     that they have back included."""
     name = person_of_actor(person)
-    begun, free = count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    begun, free = count_begun_and_free_groups(
+        session, batch.id, batch.dataset_id, name, batch.verdicts
+    )
     left = begun + free + len(list_returned_groups(session, batch, person))
     if batch.gold_every is None:
         return left
@@ -162,7 +164,9 @@ def count_own_groups(session: Session, batch: Batch, person: str) -> int | None:
     name = person_of_actor(person)
     annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     done = len([row for row in annotations if row.person == name and row.submitted is not None])
-    return done + sum(count_groups_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
+    return done + sum(
+        count_begun_and_free_groups(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    )
 
 
 def adopt_submitted_annotations(store: Store, batch: Batch, person: str) -> None:

@@ -28,7 +28,7 @@ from app.features.batches.queries import (
     list_work_entries,
     read_batch_groups,
 )
-from app.features.batches.service import Batch, Part, read_batch, read_batches
+from app.features.batches.service import Batch, BatchRole, read_batch, read_batches
 from app.features.datasets.service import dataset_id
 from app.features.independent_annotations.queries import (
     list_annotations_of_batch,
@@ -98,14 +98,14 @@ def notify_of_stalled_batches(store: Store, at: datetime) -> int:
         datasets = [
             one for one in sorted(wanted) if list_subscribed_webhooks(session, one, STALLED)
         ]
-        found = _find_stalled_groups(session, datasets, at, store.settings.stalled_hours)
+        found = _find_stalled_batches(session, datasets, at, store.settings.stalled_hours)
     if not found:
         return 0
     with store.write() as session:
         return sum(_notify_of_stall(session, batch, stall, at) for batch, stall in found)
 
 
-def _find_stalled_groups(
+def _find_stalled_batches(
     session: Session, datasets: list[int], at: datetime, hours: float
 ) -> list[tuple[Batch, BatchStall]]:
     batches = [read_batch(session, one) for one in list_unfinished_batches(session, datasets)]
@@ -138,7 +138,7 @@ class MyBatch:
     ``returned`` are those that they had submitted and have back."""
 
     batch: Batch
-    parts: list[Part]
+    parts: list[BatchRole]
     left: int
     returned: list[ReturnedGroup] = field(default_factory=list)
 
@@ -229,10 +229,10 @@ def list_team_batches(
         return [_build_team_batch(session, batch, moment, hours) for batch in batches]
 
 
-def _count_groups_left(batch: Batch, parts: Iterable[Part]) -> int:
+def _count_groups_left(batch: Batch, parts: Iterable[BatchRole]) -> int:
     """Groups that somebody with these parts may still get."""
-    left = batch.waiting if Part.ANNOTATOR in parts or not batch.annotators else 0
-    return left + (batch.submitted if Part.REVIEWER in parts else 0)
+    left = batch.waiting if BatchRole.ANNOTATOR in parts or not batch.annotators else 0
+    return left + (batch.submitted if BatchRole.REVIEWER in parts else 0)
 
 
 def _build_team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:

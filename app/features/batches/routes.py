@@ -22,8 +22,8 @@ from app.features.batches.service import (
     Batch,
     BatchGroup,
     BatchKind,
+    BatchRole,
     NewBatch,
-    Part,
 )
 from app.features.datasets.service import MAX_TITLE
 from app.features.independent_annotations.routes import ReturnReason
@@ -151,7 +151,7 @@ class BatchGroupList(ListDocument[BatchGroup]):
     """The groups of a batch in the order in which they are given out."""
 
 
-class NextGroup(BaseModel):
+class NextGroupRequest(BaseModel):
     """Where somebody comes from who asks for the next group."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"after": 12}, {}]})
@@ -178,7 +178,7 @@ class LeaseDocument(Document):
 
     batch: WorkBatchDocument
     group: int | None = Field(description="null: no group waits for them now.")
-    part: Part | None = Field(description="What they do with it.")
+    part: BatchRole | None = Field(description="What they do with it.")
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
     here: list[PresenceDocument] = Field(description="People who have the group open.")
     submitted_by: str | None = Field(description="Person who submitted it; null: not submitted.")
@@ -199,7 +199,7 @@ class MyBatchDocument(Document):
     """A batch of one's own."""
 
     batch: WorkBatchDocument
-    parts: list[Part]
+    parts: list[BatchRole]
     left: int = Field(description="Groups that one may still get.")
     returned: list[ReturnedGroup] = Field(
         description="Submitted groups that were returned to the person, in the order of the batch."
@@ -386,7 +386,9 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members: Members) -> Lease:
+def open_next_group(
+    batch: Id, origin: NextGroupRequest, services: AppServices, members: Members
+) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
     The lease lasts three minutes, and three more each time that it is taken again.
@@ -420,7 +422,7 @@ def open_group(
     responses=responses(404),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
+def leave_group_to_others(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
     worker = members.member_of_batch(services.store, batch)
     _announce_lease(services, LeaseService(services.store).release_group(batch, group, worker))

@@ -61,14 +61,14 @@ WORK = "work"
 """Kind of the log's entries about batches; they change no group."""
 
 
-class Part(StrEnum):
+class BatchRole(StrEnum):
     """What somebody does in a batch."""
 
     ANNOTATOR = "annotator"
     REVIEWER = "reviewer"
 
 
-_NEEDS = {Part.ANNOTATOR: Action.ANNOTATE, Part.REVIEWER: Action.REVIEW}
+_NEEDS = {BatchRole.ANNOTATOR: Action.ANNOTATE, BatchRole.REVIEWER: Action.REVIEW}
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,8 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         _check_track_batch(new)
     number = dataset_id(store, dataset)
     people = {
-        Part.ANNOTATOR: _person_ids(store, number, Part.ANNOTATOR, new.annotators),
-        Part.REVIEWER: _person_ids(store, number, Part.REVIEWER, new.reviewers),
+        BatchRole.ANNOTATOR: _person_ids(store, number, BatchRole.ANNOTATOR, new.annotators),
+        BatchRole.REVIEWER: _person_ids(store, number, BatchRole.REVIEWER, new.reviewers),
     }
     with store.write() as session:
         if len(find_dataset_batches(session, [number])) >= MOST_BATCHES:
@@ -314,7 +314,7 @@ def change_batch(
         values["state"] = state
     if gold_every is not None or no_gold:
         values["gold_every"] = gold_every
-    named = {Part.ANNOTATOR: annotators, Part.REVIEWER: reviewers}
+    named = {BatchRole.ANNOTATOR: annotators, BatchRole.REVIEWER: reviewers}
     people = {
         part: _person_ids(store, before.dataset_id, part, names)
         for part, names in named.items()
@@ -382,8 +382,8 @@ def _build_batches(
         found.append(
             Batch(
                 **row._asdict(),
-                annotators=names[row.id, Part.ANNOTATOR],
-                reviewers=names[row.id, Part.REVIEWER],
+                annotators=names[row.id, BatchRole.ANNOTATOR],
+                reviewers=names[row.id, BatchRole.REVIEWER],
                 # A dataset that begins again leaves a batch without groups.
                 groups=count.groups if count else 0,
                 submitted=count.submitted if count else 0,
@@ -395,7 +395,7 @@ def _build_batches(
     return found
 
 
-def _person_ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[int]:
+def _person_ids(store: Store, dataset: int, part: BatchRole, names: Iterable[str]) -> list[int]:
     """Ids of people who may do a part in a dataset."""
     wanted = {name.strip().lower() for name in names}
     if not wanted:

@@ -33,7 +33,7 @@ Text = Annotated[str, Field(min_length=1, max_length=LONGEST, description="Plain
 router = APIRouter(prefix="/groups/{group}", tags=["comments"], route_class=Route)
 
 
-class Spot(BaseModel):
+class PlaceInView(BaseModel):
     """A place in a view, pixels of its annotated size."""
 
     model_config = ConfigDict(extra="forbid", from_attributes=True)
@@ -66,7 +66,7 @@ class NewThread(NewComment):
     )
 
     view: str | None = Field(default=None, max_length=500, description="Key of the view.")
-    at: Spot | None = None
+    at: PlaceInView | None = None
 
 
 class ThreadEdit(BaseModel):
@@ -99,7 +99,7 @@ class ThreadDocument(Document):
 
     id: int
     view: str | None = Field(description="Key of the view that it is about; null: the group.")
-    at: Spot | None = Field(description="Where in the view, pixels of its annotated size.")
+    at: PlaceInView | None = Field(description="Where in the view, pixels of its annotated size.")
     created: datetime
     resolved: datetime | None = Field(description="When it was settled; null: it is open.")
     resolved_by: str | None
@@ -109,7 +109,7 @@ class ThreadDocument(Document):
     def of(cls, thread: StoredThread, actor: str) -> Self:
         """The document of a thread, for whom it is shown to."""
         comments = [CommentDocument.of(comment, actor) for comment in thread.comments]
-        at = None if thread.x is None or thread.y is None else Spot(x=thread.x, y=thread.y)
+        at = None if thread.x is None or thread.y is None else PlaceInView(x=thread.x, y=thread.y)
         return cls(**{**vars(thread), "at": at, "comments": comments})
 
 
@@ -117,7 +117,7 @@ class ThreadList(ListDocument[ThreadDocument]):
     """Everything that people say to each other about a group."""
 
 
-class PeopleOfGroup(Document):
+class MentionablePeople(Document):
     """Who sees a group, and can be mentioned there; nobody where people do not log in."""
 
     names: list[str]
@@ -125,9 +125,9 @@ class PeopleOfGroup(Document):
 
 @router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
+def list_people_to_mention(group: Id, store: AppStore) -> MentionablePeople:
     """Who can be mentioned in comments on the group: everybody who sees it."""
-    return PeopleOfGroup(names=comments.list_mentionable_people(store, group))
+    return MentionablePeople(names=comments.list_mentionable_people(store, group))
 
 
 @router.get("/threads", operation_id="listThreads", responses=responses(404))

@@ -11,7 +11,7 @@ from typing import Any
 
 from app.db.check import CheckResult, summarize_faulty_records
 from app.db.dialects.dialect import get_session_dialect
-from app.db.json_columns import report_damaged_values
+from app.db.json_columns import translate_shape_errors_to_damage
 from app.db.log import LogEntry, NewLogEntry, append_entries, iterate_entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
@@ -333,7 +333,7 @@ def examine_threads(store: Store) -> CheckResult:
 
 def _compare_threads_with_log(session: Session, restore: str) -> CheckResult:
     try:
-        with report_damaged_values():
+        with translate_shape_errors_to_damage():
             logged = rebuild_threads_from_log(
                 iterate_entries_of_kinds(session, (COMMENT, "dataset_deleted"))
             )

@@ -36,7 +36,7 @@ from app.db.dialects.dialect import (
     select_json_array_items,
 )
 from app.db.home import DAY, find_last_write_time
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
@@ -104,7 +104,7 @@ _UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
 @lru_cache(maxsize=64)
 def parse_stored_policy(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return policy_from_json(parse_json_column(text))
 
 

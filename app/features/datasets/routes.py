@@ -94,7 +94,7 @@ class SummaryDocument(Document):
     )
 
 
-class DatasetDeletion(BaseModel):
+class DatasetDeletionRequest(BaseModel):
     """The name of the dataset, once more: nobody deletes one by a slip."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"confirm": "demo"}]})
@@ -102,7 +102,7 @@ class DatasetDeletion(BaseModel):
     confirm: Annotated[str, Field(max_length=200)] = ""
 
 
-class DeletedDocument(BaseModel):
+class DeletionResultDocument(BaseModel):
     """What was deleted, or, with `dry_run`, what would be."""
 
     dry_run: bool
@@ -159,20 +159,20 @@ def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> 
 
 
 def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
-    return make_document_response(DeletedDocument(dry_run=dry_run, **vars(gone)))
+    return make_document_response(DeletionResultDocument(dry_run=dry_run, **vars(gone)))
 
 
 @router.delete(
     "/{dataset}",
     operation_id="deleteDataset",
-    response_model=DeletedDocument,
+    response_model=DeletionResultDocument,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
 @respond_with(_deleted_response, "dry_run")
 def delete_dataset(
     dataset: DatasetPath,
-    request: DatasetDeletion,
+    request: DatasetDeletionRequest,
     services: AppServices,
     actor: Actor,
     dry_run: Annotated[bool, Query(description="Only report what would be deleted.")] = False,

@@ -43,7 +43,7 @@ from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
 
 
-class MatchState(Protocol):
+class HasMatch(Protocol):
     """Something that is known of one match."""
 
     @property
@@ -51,7 +51,7 @@ class MatchState(Protocol):
         """Its name; empty: groups without a match."""
 
 
-State = TypeVar("State", bound=MatchState)
+State = TypeVar("State", bound=HasMatch)
 
 
 def filter_by_match(states: Iterable[State], match: str | None) -> list[State]:

@@ -26,7 +26,7 @@ from app.terminal.options import (
     get_current_actor,
     parse_cameras,
     parse_frame_offset,
-    parse_place,
+    parse_path_or_store_address,
     parse_size,
     read_settings,
 )
@@ -45,7 +45,7 @@ def import_(
     paths: Annotated[
         list[str],
         typer.Argument(
-            parser=parse_place,
+            parser=parse_path_or_store_address,
             metavar="PATH...",
             help="A folder, a file or s3://NAME/...; of video one file or more.",
         ),
@@ -104,7 +104,9 @@ def import_(
     frames: Annotated[
         str | None,
         typer.Option(
-            parser=parse_place, metavar="LIST", help="JSON list of where frames lie in stores."
+            parser=parse_path_or_store_address,
+            metavar="LIST",
+            help="JSON list of where frames lie in stores.",
         ),
     ] = None,
     dry_run: Annotated[
@@ -194,10 +196,10 @@ def import_(
 def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
     from app.features.jobs.result_sentences import describe_result
-    from app.features.paint.proposals import propose_views
+    from app.features.paint.proposals import propose_cameras_for_views
 
     with open_store(settings) as store, show_progress("Proposing cameras") as progress:
-        run = propose_views(store, dataset, progress=progress)
+        run = propose_cameras_for_views(store, dataset, progress=progress)
     if not silent:
         say(describe_result("proposals", asdict(run)) or "")
 

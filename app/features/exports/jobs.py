@@ -23,12 +23,12 @@ from app.durable import PARTIAL, replace_file
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import get_dataset_head
 from app.features.exports.service import ExportReport, export_dataset, require_exportable
-from app.features.jobs.job_run import JobProgress, report_counts_in_words, run_job_in_worker
+from app.features.jobs.job_run import JobProgress, make_counts_reporter, run_job_in_worker
 from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.service import Jobs
 from app.formats.export_formats import describe_missing_content
 from app.formats.file_tree import Root
-from app.formats.output import require_absent_in_store
+from app.formats.output import require_new_zip_in_store
 from app.formats.safe_path import require_safe_path
 from app.json_text import json_text
 from app.media.frames import EncodedPicture, FrameProvider
@@ -227,7 +227,7 @@ def request_export(
     found = get_dataset_head(store, request["dataset"])
     version = request.get("version")
     if request.get("to") is not None:
-        require_absent_in_store(_parse_store_target(store, request["to"]))
+        require_new_zip_in_store(_parse_store_target(store, request["to"]))
     require_exportable(
         store,
         found.id,
@@ -275,7 +275,7 @@ def run_export_job(
             request,
             dataset_id=progress.dataset_id,
             progress=progress,
-            report=report_counts_in_words(progress, "groups written"),
+            report=make_counts_reporter(progress, "groups written"),
             answer=lambda frame: frames.read(*frame),
         )
     # It is done, also where somebody cancels it now.

@@ -18,7 +18,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.audit.service import record_audit_event
 from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import KIND, ExportEntry, request_export
-from app.features.exports.service import list_formats_with_problems
+from app.features.exports.service import list_format_availability
 from app.features.jobs.queries import DONE, Job
 from app.features.jobs.routes import Cursor, DatasetFilter, Limit
 from app.features.jobs.schemas import ACCEPTED, JobDocument, make_location_header
@@ -46,7 +46,7 @@ from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
-from app.object_store.path import split_address, unseal_address
+from app.object_store.path import split_address, split_pinned_address
 from app.object_store.store import ChangedObjectError, ObjectStore, StoredObject, open_store
 from app.soccer.choices import BoxKind, ExportFormat, JobState, PicturesSent, TrainingViews
 
@@ -103,7 +103,7 @@ class ExportRequest(BaseModel):
     )
 
 
-class FormatDocument(Document):
+class FormatAvailabilityDocument(Document):
     """Whether a dataset can be exported in a format."""
 
     format: ExportFormat
@@ -115,7 +115,7 @@ class FormatDocument(Document):
     )
 
 
-class FormatList(ListDocument[FormatDocument]):
+class FormatList(ListDocument[FormatAvailabilityDocument]):
     """Every export format."""
 
 
@@ -230,10 +230,10 @@ def list_formats(
 ) -> FormatList:
     """In which formats a dataset, or a version of it, can be exported, and why not in the others."""
     found = dataset_id(store, dataset)
-    answers = list_formats_with_problems(store, found, version)
+    answers = list_format_availability(store, found, version)
     return FormatList(
         items=[
-            FormatDocument(
+            FormatAvailabilityDocument(
                 **vars(one), possible=one.reason is None, options=list_options_of_format(one.format)
             )
             for one in answers
@@ -424,7 +424,7 @@ def redirect_or_stream_stored_file(
         NotFoundError: It is gone, or another one now.
         StorageError: The store cannot be asked.
     """
-    address, _, etag = unseal_address(sealed)
+    address, _, etag = split_pinned_address(sealed)
     store_name, key = split_address(address)
     store = open_store(settings, store_name)
     stored = store.head(key)

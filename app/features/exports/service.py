@@ -43,7 +43,7 @@ from app.formats.export_formats import (
     describe_missing_frames,
     describe_view_settings,
     find_frame_path_rule,
-    make_export_names,
+    make_export_key_assigner,
     write_format,
 )
 from app.formats.export_record import ExportRecord
@@ -205,7 +205,7 @@ def export_dataset(
                 read or _make_local_picture_reader(store),
                 find_frame_path_rule(format),
             )
-            names = make_export_names(format, source.outlines())
+            names = make_export_key_assigner(format, source.outlines())
             run = _ExportRun(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
             run.tracks = _open_track_source(session, store.settings, source, options)
@@ -213,7 +213,7 @@ def export_dataset(
                 run.kept = list_frozen_track_records(_read_frozen_tracks(session, source))
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = read_unassigned_persons(session, dataset)
-            with _open_view_files(root, out) as put:
+            with _open_view_file_buffer(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
             if images != "none" and "images_missing" not in counts:
@@ -224,7 +224,7 @@ def export_dataset(
 
 
 @contextmanager
-def _open_view_files(root: Path, out: Root) -> Iterator[PutText | None]:
+def _open_view_file_buffer(root: Path, out: Root) -> Iterator[PutText | None]:
     """Where the files of single views go: on their way into a zip they wait together."""
     if out.suffix.lower() != ".zip":
         yield None
@@ -257,15 +257,15 @@ def require_exportable(
     options = _ExportOptions(format, everything, boxes, images, views)
     options.require_options_apply()
     try:
-        _require_format(store, dataset, options, version)
+        _require_exportable_in_format(store, dataset, options, version)
     except _UnrepresentableError as error:
-        answers = list_formats_with_problems(store, dataset, version)
+        answers = list_format_availability(store, dataset, version)
         fitting = [answer.format for answer in answers if answer.reason is None]
         hint = f"These formats have room for it: {', '.join(fitting)}." if fitting else error.hint
         raise InputError(error.message, hint=hint) from error
 
 
-def list_formats_with_problems(
+def list_format_availability(
     store: Store, dataset: str | int, version: str | None = None
 ) -> list[FormatAvailability]:
     """Every format, and why a dataset, or a version of it, cannot be written in it.
@@ -279,7 +279,7 @@ def list_formats_with_problems(
     for format in FORMATS:  # noqa: A001
         options = _ExportOptions(format, version is None, "optimized", "none", "all")
         try:
-            _require_format(store, dataset, options, version)
+            _require_exportable_in_format(store, dataset, options, version)
         except InputError as error:
             answers.append(FormatAvailability(format, error.message, error.hint))
         else:
@@ -287,7 +287,7 @@ def list_formats_with_problems(
     return answers
 
 
-def _require_format(
+def _require_exportable_in_format(
     store: Store, dataset: str | int, options: _ExportOptions, version: str | None
 ) -> None:
     """``require_exportable`` of one format."""
@@ -303,13 +303,13 @@ def _require_format(
         )
         if format == CARRY:
             return
-        source = _SampleSource(whole)
+        source = _FirstGroupsSource(whole)
         frames = ExportImages(
             Path(folder), "none", _make_local_picture_reader(store), find_frame_path_rule(format)
         )
         with ViewFileBuffer(Path(folder)) as small:
             try:
-                names = make_export_names(format, source.outlines())
+                names = make_export_key_assigner(format, source.outlines())
                 run = _ExportRun(source, options, frames, names, None)
                 run.tracks = _open_track_source(
                     session, store.settings, source, options, try_only=True
@@ -352,7 +352,7 @@ def _require_no_version_conflict(format: str, everything: bool, version: str | N
         )
 
 
-class _SampleSource:
+class _FirstGroupsSource:
     """The first groups of a source."""
 
     def __init__(self, source: LiveSource | VersionSource):
@@ -395,7 +395,7 @@ def _open_source(
 def _open_track_source(
     session: Session,
     settings: Settings,
-    source: LiveSource | VersionSource | _SampleSource,
+    source: LiveSource | VersionSource | _FirstGroupsSource,
     options: _ExportOptions,
     *,
     try_only: bool = False,
@@ -412,7 +412,7 @@ def _open_track_source(
 
 
 def _read_frozen_tracks(
-    session: Session, source: LiveSource | VersionSource | _SampleSource
+    session: Session, source: LiveSource | VersionSource | _FirstGroupsSource
 ) -> dict[str, Json]:
     """The tracks of a version by stretch, as they were frozen."""
     names = source.tracks or {}

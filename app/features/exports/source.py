@@ -20,12 +20,17 @@ from app.features.exports.queries import (
 from app.features.groups.state import GroupState, VerdictState, read_states
 from app.features.groups.view_queries import ViewFileFields, list_view_file_fields
 from app.features.versions.membership import (
+    describe_frozen_version,
     describe_policy_settings,
     describe_version_settings,
-    make_version_stamp,
 )
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
-from app.features.versions.service import FrozenGroup, Version, read_frozen_groups, thaw_outlines
+from app.features.versions.service import (
+    FrozenGroup,
+    Version,
+    read_frozen_groups,
+    thaw_groups_without_annotations,
+)
 from app.formats.export_record import ExportRecord
 from app.formats.frame_names import (
     FrameName,
@@ -36,9 +41,9 @@ from app.formats.frame_names import (
     with_export_key,
 )
 from app.formats.safe_path import resolve_inside
-from app.media.files import read_media_facts, read_picture_header
+from app.media.files import read_media_size_and_crc, read_picture_header
 from app.media.frames import EncodedPicture
-from app.object_store.path import is_address, unseal_address
+from app.object_store.path import is_address, split_pinned_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.policy import Policy
@@ -145,14 +150,14 @@ class LiveSource:
         for start in range(0, self.count, BATCH):
             ids = self._ids[start : start + BATCH]
             for state in read_states(self._session, ids, markings=False):
-                yield _build_live_record(state), None
+                yield _build_current_record(state), None
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
         for start in range(0, self.count, BATCH):
             views = list_view_file_fields(self._session, self._ids[start : start + BATCH])
             for _, run in groupby(views, key=lambda view: view.group_id):
-                yield _make_outline_group(list(run)), {}
+                yield _make_bare_group(list(run)), {}
 
     def require_any_group(self) -> None:
         """Raise InputError where there is nothing to export."""
@@ -177,7 +182,7 @@ class VersionSource:
 
     def stamp(self) -> dict[str, Json]:
         """Hash, note, counts and changelog, and who is not in it and why."""
-        return make_version_stamp(self._session, self._version)
+        return describe_frozen_version(self._session, self._version)
 
     def items(self) -> Iterator[Item]:
         """Groups by match and key."""
@@ -193,7 +198,7 @@ class VersionSource:
         """The same groups with what names their files."""
         rows = read_rows(self._session, self._version.id, members=True)
         while batch := list(islice(rows, BATCH)):
-            groups = thaw_outlines(self._session, self._version, batch)
+            groups = thaw_groups_without_annotations(self._session, self._version, batch)
             for row, group in zip(batch, groups, strict=True):
                 yield replace(group, split=row.split), row.splits or {}
 
@@ -222,7 +227,7 @@ def export_record_of_frozen_group(item: FrozenGroup) -> ExportRecord:
     )
 
 
-def _make_outline_group(views: list[ViewFileFields]) -> Group:
+def _make_bare_group(views: list[ViewFileFields]) -> Group:
     """A group of views without lines and balls."""
     first = views[0]
     return Group(
@@ -236,7 +241,7 @@ def _make_bare_view(item: ViewFileFields) -> View:
     return View(item.key, station, media=item.media)
 
 
-def _build_live_record(state: GroupState) -> ExportRecord:
+def _build_current_record(state: GroupState) -> ExportRecord:
     verdict = state.verdict
     return ExportRecord(
         group=state.group,
@@ -338,17 +343,17 @@ class ExportImages:
     def _add_view(
         self, group: Group, view: View, media: Media, frozen: Mapping[str, int] | None
     ) -> None:
-        facts = read_media_facts(media) if frozen is None else frozen
+        facts = read_media_size_and_crc(media) if frozen is None else frozen
         if facts:
             self.media.append({"group": group.key, "view": view.key, **facts})
         elif is_address(media.path):
-            _, kind, value = unseal_address(media.path)
+            _, kind, value = split_pinned_address(media.path)
             self.media.append(
                 {"group": group.key, "view": view.key, **({kind: value} if kind else {})}
             )
         if self._images == "none":
             return
-        if frozen and frozen != read_media_facts(media):
+        if frozen and frozen != read_media_size_and_crc(media):
             self._note_missing(group, view, "not the file that was frozen")
             return
         try:
@@ -368,7 +373,7 @@ class ExportImages:
 
     def _place_picture(self, group: Group, view: View, media: Media) -> None:
         is_file = media.member is None and media.frame is None and not is_address(media.path)
-        if self._images == "link" and is_file and self._is_upright(view, media):
+        if self._images == "link" and is_file and self._can_link_to_file(view, media):
             if not Path(media.path).is_file():
                 raise NotFoundError(f"the image file {PurePosixPath(media.path).name} is missing")
             target = self._prepare_picture_path(
@@ -382,7 +387,7 @@ class ExportImages:
         if target is not None:
             target.write_bytes(picture.data)
 
-    def _is_upright(self, view: View, media: Media) -> bool:
+    def _can_link_to_file(self, view: View, media: Media) -> bool:
         """Whether a link to its file shows a frame as it was annotated: a mirrored picture is
         turned right, and one that EXIF turns would lie on its side where EXIF is not read."""
         header = read_picture_header(media)

@@ -18,7 +18,7 @@ from app.errors import DatasetFormatError, InputError
 from app.evaluation.cameras import measure_leave_one_out_errors, score_frame, score_frames
 from app.features.file_tools.matches import (
     SharedMatchPlaces,
-    choose_picture,
+    choose_picture_geometry,
     collect_shared_match_places,
     map_points_to_original_pictures,
     read_match_of_each_frame,
@@ -44,10 +44,10 @@ from app.solving.calibration_findings import (
     find_calibration_findings,
     find_pitch_findings_of_lone_frame,
 )
-from app.solving.lone_frame import LoneFrame
+from app.solving.lone_frame import LoneFrameUncertainty
 from app.solving.match_position import (
-    FramePlace,
-    FramePlaces,
+    FrameCameraPlace,
+    FrameCameraPlaces,
     calibrate_with_match_position,
     find_camera_place,
 )
@@ -72,8 +72,8 @@ class CalibratedFrame:
     left_out: tuple[tuple[str, float | None], ...]
     milliseconds: float
     alone: Calibration
-    place: FramePlace | None
-    lone: LoneFrame | None
+    place: FrameCameraPlace | None
+    lone: LoneFrameUncertainty | None
 
 
 def calibrate_files(
@@ -123,7 +123,7 @@ def calibrate_files(
     geometry: PictureGeometry | None = None
     picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
-        geometry, picture_summary = choose_picture(files, size, picture)
+        geometry, picture_summary = choose_picture_geometry(files, size, picture)
         files = map_points_to_original_pictures(files, geometry)
     named = None if matches is None else read_match_of_each_frame(matches)
     sharing = guess or named is not None
@@ -213,7 +213,7 @@ def _calibrate_file(
 def _calibrate_with_shared_position(
     file: LineFile,
     frame: CalibratedFrame,
-    others: FramePlaces,
+    others: FrameCameraPlaces,
     size: ImageSize,
     policy: CalibrationPolicy,
     with_leave_one_out: bool,
@@ -240,7 +240,7 @@ def _make_frame(
     size: ImageSize,
     milliseconds: float,
     left_out: tuple[tuple[str, float | None], ...],
-    lone: LoneFrame | None = None,
+    lone: LoneFrameUncertainty | None = None,
 ) -> CalibratedFrame:
     camera = calibration.camera
     findings = [
@@ -403,7 +403,7 @@ def score_camera_files(
         "fs5": total.challenge,
         "error_median_px": total.error_median_px,
         "error_p95_px": total.error_p95_px,
-        **_read_milliseconds(cameras),
+        **_read_time_per_frame(cameras),
         "problems": [item.message for item in (*report.problems, *camera_report.problems)],
     }
 
@@ -424,7 +424,7 @@ def _read_wrong_labels(findings: Path) -> set[tuple[str, str]]:
     return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
 
 
-def _read_milliseconds(cameras: Path) -> dict[str, Any]:
+def _read_time_per_frame(cameras: Path) -> dict[str, Any]:
     """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
     beside = cameras / "calibrate.json"
     value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}

@@ -59,7 +59,7 @@ def export_cameras(
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
     else:
-        _write_samples(source, out, cameras, key_by_frame_number(sizes), size)
+        _write_opentrackio_samples(source, out, cameras, key_by_frame_number(sizes), size)
     return {
         "cameras": len(cameras),
         "first": min(cameras),
@@ -79,7 +79,7 @@ def key_by_frame_number(values: Mapping[str, T]) -> dict[int, T]:
     return found
 
 
-def _write_samples(
+def _write_opentrackio_samples(
     source: Path,
     out: Path,
     cameras: Mapping[int, Camera],

@@ -30,9 +30,9 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
-from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.solving.match_position import NO_PLACES, FramePlace, FramePlaces, guess_matches
-from app.solving.pitch_size import PitchFrame, estimate_pitch
+from app.solving.match_picture import PictureEstimate, PictureFrameLines, estimate_match_picture
+from app.solving.match_position import NO_PLACES, FrameCameraPlace, FrameCameraPlaces, guess_matches
+from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 
 ONE = "one"
 """Of ``--tripod``: all pictures are of one camera."""
@@ -43,7 +43,7 @@ class SharedMatchPlaces:
     """What a frame gets from the others of its match: their places. ``match`` is its name."""
 
     match: str
-    others: FramePlaces
+    others: FrameCameraPlaces
 
 
 def read_match_of_each_frame(path: Path) -> dict[str, str]:
@@ -70,7 +70,9 @@ def read_match_of_each_frame(path: Path) -> dict[str, str]:
 
 
 def collect_shared_match_places(
-    files: Sequence[LineFile], places: Sequence[FramePlace | None], named: Mapping[str, str] | None
+    files: Sequence[LineFile],
+    places: Sequence[FrameCameraPlace | None],
+    named: Mapping[str, str] | None,
 ) -> list[SharedMatchPlaces]:
     """What each frame gets from the others of its match.
 
@@ -93,7 +95,7 @@ def collect_shared_match_places(
         if not name:
             continue
         known = {index: place for index in indices if (place := places[index]) is not None}
-        all_ = FramePlaces(list(known.values()))
+        all_ = FrameCameraPlaces(list(known.values()))
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
             others = all_.without_frame(row[index]) if index in row else all_
@@ -109,7 +111,9 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
         DegenerateGeometryError: Too few show enough markings.
     """
     report = ReaderReport()
-    frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
+    frames = [
+        PitchSizeFrameLines(file.lines, size) for file in read_line_files(source, size, report)
+    ]
     if not frames:
         raise report.make_refusal_error(f"{source} holds no line files")
     found = estimate_pitch(frames, CLICKED)
@@ -123,7 +127,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
     }
 
 
-def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
+def estimate_picture_geometry_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
     """How the pictures of line files were stretched or cropped, as ``read_picture_geometry`` reads it.
 
     Raises:
@@ -134,12 +138,12 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
     files = list(read_line_files(source, size, report))
     if not files:
         raise report.make_refusal_error(f"{source} holds no line files")
-    found = _estimate_picture(files, size)
+    found = _estimate_picture_geometry(files, size)
     values = _picture_estimate_to_json(found)
     return {**values, "problems": [problem.message for problem in report.problems]}
 
 
-def choose_picture(
+def choose_picture_geometry(
     files: Sequence[LineFile], size: ImageSize, given: Path | None
 ) -> tuple[PictureGeometry | None, dict[str, Any]]:
     """The picture to calibrate line files with, and what ``calibrate.json`` says of it.
@@ -154,7 +158,7 @@ def choose_picture(
         picture = read_picture_geometry(given)
         return picture, {"aspect": picture.aspect, "shift": [*picture.shift]}
     try:
-        found = _estimate_picture(files, size)
+        found = _estimate_picture_geometry(files, size)
     except GeometryError as error:
         return None, {"problem": error.message}
     return found.proposal, _picture_estimate_to_json(found)
@@ -193,8 +197,8 @@ def map_points_to_original_pictures(
     ]
 
 
-def _estimate_picture(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
-    frames = [PictureFrame(file.lines, size) for file in files]
+def _estimate_picture_geometry(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
+    frames = [PictureFrameLines(file.lines, size) for file in files]
     return estimate_match_picture(frames, CLICKED)
 
 

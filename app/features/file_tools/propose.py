@@ -22,13 +22,13 @@ from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.json_text import json_text
-from app.paint.frame_pitch import find_agreed_pitch, group_by_position, make_pitch_frame
+from app.paint.frame_pitch import collect_pitch_size_evidence, find_agreed_pitch, group_by_position
 from app.paint.propose import FrameProposal, propose_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.pitch import Pitch
-from app.solving.pitch_size import PitchFrame
+from app.solving.pitch_size import PitchSizeFrameLines
 
 RESULT = "propose.json"
 LIKELY = 0.6
@@ -71,7 +71,7 @@ def propose_cameras_of_files(
     seen: list[_ProposedCamera | None] = []
     for picture in read_pictures(sources, settings, report):
         frame = names.name(picture.stem)
-        row, proposed = _propose_frame_camera(picture, frame, out, cameras, size, Pitch())
+        row, proposed = _propose_and_write_camera(picture, frame, out, cameras, size, Pitch())
         rows.append(row)
         seen.append(proposed)
         if progress is not None:
@@ -97,7 +97,7 @@ class _ProposedCamera:
 
     camera: Camera
     agreement: float
-    frame: PitchFrame
+    frame: PitchSizeFrameLines
     drawn: SnappedFrame | None = None
 
 
@@ -127,7 +127,7 @@ def _propose_on_other_pitch(
     frame = rows[at]["frame"]
     if picture.image is None or before is None:
         return None
-    row, again = _propose_frame_camera(
+    row, again = _propose_and_write_camera(
         picture, frame, out, [before.camera], size, pitch, before.agreement
     )
     if again is not None:
@@ -135,13 +135,13 @@ def _propose_on_other_pitch(
     return again
 
 
-def count_proposals(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
+def count_proposal_outcomes(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
     """How many frames had which outcome."""
     counts = Counter(row["outcome"] for row in rows)
     return {name: counts[name] for name in PROPOSAL_OUTCOMES}
 
 
-def _propose_frame_camera(
+def _propose_and_write_camera(
     picture: PictureFile,
     frame: str,
     out: Path,
@@ -178,7 +178,7 @@ def _propose_frame_camera(
         covariance = None if spread is None else flatten_covariance(spread)
         shape = size or ImageSize(width, height)
         _write_camera_file(file, format_camera_file(camera, covariance, shape))
-        known_to = make_pitch_frame(picture.image, found.camera, pitch)
+        known_to = collect_pitch_size_evidence(picture.image, found.camera, pitch)
         drawn = (
             SnappedFrame(frame, found.snapped, camera, shape, pitch)
             if found.snapped is not None and found.snapped.reason is None
@@ -189,7 +189,7 @@ def _propose_frame_camera(
     if found.camera is None or picture.image is None or not _may_fit_another_pitch(found):
         return row, None
     return row, _ProposedCamera(
-        found.camera, 0.0, make_pitch_frame(picture.image, found.camera, pitch)
+        found.camera, 0.0, collect_pitch_size_evidence(picture.image, found.camera, pitch)
     )
 
 

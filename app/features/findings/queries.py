@@ -24,7 +24,7 @@ from sqlalchemy import (
 from sqlalchemy import cast as cast_to
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.log import NewLogEntry, append_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
@@ -37,7 +37,7 @@ from app.soccer.finding import (
     TRACK_DISAGREES,
     Dismissal,
     Finding,
-    PlacedFinding,
+    FindingWithBallPlace,
     SuggestedFix,
 )
 
@@ -86,10 +86,10 @@ def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
 def _finding_from_row(row: Any) -> Finding:
     if row.kind != TRACK_DISAGREES:
         return Finding(row.kind, row.sentence, view=row.view)
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         place = None if row.place is None else tuple(parse_json_column(row.place))
     fix = SuggestedFix("move_ball" if place else "exclude_view", row.view)
-    return PlacedFinding(
+    return FindingWithBallPlace(
         row.kind, row.sentence, view=row.view, number=row.number, fix=fix, place=place
     )
 
@@ -150,7 +150,7 @@ def replace_station_finding(
         session.execute(insert(model), [values])
 
 
-def replace_shape_findings(
+def replace_picture_shape_findings(
     session: Session, dataset_id: int, keys: Collection[str], found: Iterable[tuple[str, str, str]]
 ) -> list[int]:
     """Put findings about the shapes of pictures in the place of those that groups have.
@@ -205,7 +205,7 @@ class UnexplainedBall:
     of_inputs: str
 
 
-def replace_track_findings(
+def replace_unexplained_ball_findings(
     session: Session,
     dataset_id: int,
     matches: Collection[str],
@@ -269,7 +269,7 @@ SHOWN = (
     *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),
     shown_actor_column(_TABLE.c.actor, _TABLE.c.at).label("actor"),
 )
-"""What ``group_current_dismissals`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
+"""What ``current_dismissals_by_group`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,7 @@ NOTHING_DISMISSED = GroupDismissals()
 """Of a group in which nobody ever dismissed anything."""
 
 
-def group_current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
+def current_dismissals_by_group(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
     ``rows`` are those of the table, the oldest first (``read_import_findings`` reads them).
@@ -423,7 +423,7 @@ def read_import_findings(
     for row in rows:
         if row.source != _DISMISSED:
             found[row.group].append(row)
-    return found, group_current_dismissals(row for row in rows if row.source == _DISMISSED)
+    return found, current_dismissals_by_group(row for row in rows if row.source == _DISMISSED)
 
 
 def read_import_notices(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:

@@ -17,7 +17,7 @@ from app.features.groups.state import (
     require_unchanged,
     require_unchanged_content,
 )
-from app.features.groups.submit import read_solved_group, require_group_open
+from app.features.groups.submit import ensure_group_solution, require_group_open
 from app.features.queue.queries import (
     Condition,
     GroupListing,
@@ -166,7 +166,7 @@ def set_dismissal(
     """
     note = strip_and_check_note(note)
     while True:
-        record, solution = read_solved_group(store, group_id)
+        record, solution = ensure_group_solution(store, group_id)
         stored, what = record.stored, f"group {record.stored.group.key}"
         before = record.make_state(solution)
         with store.write() as session:

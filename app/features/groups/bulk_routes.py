@@ -20,7 +20,7 @@ from app.features.groups.bulk_edits import (
     edit_views,
     plan_edits,
 )
-from app.features.groups.edit import Edit, SetLines, set_ball
+from app.features.groups.edit import Edit, SetLines, make_set_ball_edit
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.features.solutions.service import solve_and_encode
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
@@ -91,7 +91,7 @@ class ViewEditItem(BaseModel):
         if self.lines:
             edits.append(SetLines(key, points_by_marking(self.lines), tuple(self.proposed)))
         if "ball" in self.model_fields_set:
-            edits.append(set_ball(key, None if self.ball is None else self.ball.ball()))
+            edits.append(make_set_ball_edit(key, None if self.ball is None else self.ball.ball()))
         return edits
 
 
@@ -135,7 +135,7 @@ class BulkEdit(BaseModel):
         return [item.edits() for item in self.items]
 
 
-class EditedItem(Document):
+class ItemOutcomeDocument(Document):
     """What came of one item, or would."""
 
     index: int = Field(description="Place of the item in the request, from 0.")
@@ -159,10 +159,10 @@ class EditedItem(Document):
     pointer: str | None
 
     @staticmethod
-    def of(item: ItemOutcome) -> EditedItem:
+    def of(item: ItemOutcome) -> ItemOutcomeDocument:
         """The document of one outcome."""
         error = item.error
-        return EditedItem(
+        return ItemOutcomeDocument(
             index=item.index,
             group=item.group,
             view=item.view,
@@ -182,7 +182,9 @@ class BulkEditDocument(Document):
     changed: int = Field(description="Items that changed their view.")
     unchanged: int = Field(description="Items that say what their view says already.")
     refused: int = Field(description="Items that were refused; nothing of their group was changed.")
-    items: list[EditedItem] = Field(description="One for each item, in the order of the request.")
+    items: list[ItemOutcomeDocument] = Field(
+        description="One for each item, in the order of the request."
+    )
 
     @staticmethod
     def of(report: BulkEditReport) -> BulkEditDocument:
@@ -193,7 +195,7 @@ class BulkEditDocument(Document):
             changed=counts["changed"],
             unchanged=counts["unchanged"],
             refused=counts["refused"],
-            items=[EditedItem.of(item) for item in report.items],
+            items=[ItemOutcomeDocument.of(item) for item in report.items],
         )
 
 
@@ -206,7 +208,7 @@ class BulkEditDocument(Document):
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_document_responder(BulkEditDocument.of))
-def edit_many(
+def edit_many_views(
     dataset: DatasetPath,
     edit: BulkEdit,
     services: AppServices,

@@ -190,7 +190,7 @@ class SetCalibrationSource:
 
 
 @dataclass(frozen=True)
-class SetPicture:
+class SetPictureGeometry:
     """Say what was done to the picture of a view since it was taken; None: nothing.
 
     Where its sigma is wide, the lines of the view say themselves how much.
@@ -204,9 +204,9 @@ class SetPicture:
         view = require_view(group, self.view)
         return replace_station_in_group(group, view, replace(view.station, picture=self.picture))
 
-    def inverse(self, group: Group) -> SetPicture:
+    def inverse(self, group: Group) -> SetPictureGeometry:
         """The picture as it was."""
-        return SetPicture(self.view, require_view(group, self.view).station.picture)
+        return SetPictureGeometry(self.view, require_view(group, self.view).station.picture)
 
 
 @dataclass(frozen=True)
@@ -231,13 +231,13 @@ class SetBalls:
         return SetBalls(self.view, view.balls, view.noise)
 
 
-def set_ball(view: str, ball: BallAnnotation | None) -> SetBalls:
+def make_set_ball_edit(view: str, ball: BallAnnotation | None) -> SetBalls:
     """Say which one ball a view shows; None: no ball is annotated."""
     return SetBalls(view, () if ball is None else (ball,))
 
 
 @dataclass(frozen=True)
-class IncludeView:
+class SetViewInclusion:
     """Leave a view out of its group, or take it in again."""
 
     view: str
@@ -254,12 +254,12 @@ class IncludeView:
         view = require_view(group, self.view)
         return group.with_view(replace(view, included=self.included, left_out=why))
 
-    def inverse(self, group: Group) -> IncludeView:
+    def inverse(self, group: Group) -> SetViewInclusion:
         """The view as it was."""
         view = require_view(group, self.view)
         if view.included or view.left_out is None:
-            return IncludeView(self.view, view.included)
-        return IncludeView(self.view, False, view.left_out.reason, view.left_out.note)
+            return SetViewInclusion(self.view, view.included)
+        return SetViewInclusion(self.view, False, view.left_out.reason, view.left_out.note)
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,7 @@ class SetPitch:
 
 
 @dataclass(frozen=True)
-class SetPositions:
+class SetCameraPositions:
     """Say where the match's other pictures put the cameras of a group's views, by view."""
 
     positions: Mapping[str, SharedPosition]
@@ -289,13 +289,13 @@ class SetPositions:
         known = {view: at for view, at in self.positions.items() if group.view(view) is not None}
         return replace(group, positions=known)
 
-    def inverse(self, group: Group) -> SetPositions:
+    def inverse(self, group: Group) -> SetCameraPositions:
         """The positions as they were."""
-        return SetPositions(group.positions)
+        return SetCameraPositions(group.positions)
 
 
 @dataclass(frozen=True)
-class SetPaint:
+class SetPaintReadings:
     """Say what was read of the paint in the pictures of a group's views, by view."""
 
     paint: Mapping[str, PaintReading]
@@ -305,13 +305,13 @@ class SetPaint:
         known = {view: read for view, read in self.paint.items() if group.view(view) is not None}
         return replace(group, paint=known)
 
-    def inverse(self, group: Group) -> SetPaint:
+    def inverse(self, group: Group) -> SetPaintReadings:
         """The readings as they were."""
-        return SetPaint(group.paint)
+        return SetPaintReadings(group.paint)
 
 
 @dataclass(frozen=True)
-class SetNoise:
+class SetBallNoise:
     """Say how noisy the balls of a group's views are beside the dataset's; others are like it."""
 
     noise: Mapping[str, float]
@@ -321,9 +321,9 @@ class SetNoise:
         views = (replace(view, noise=self.noise.get(view.key, 1.0)) for view in group.views)
         return replace(group, views=tuple(views))
 
-    def inverse(self, group: Group) -> SetNoise:
+    def inverse(self, group: Group) -> SetBallNoise:
         """The noise as it was."""
-        return SetNoise(group.noise)
+        return SetBallNoise(group.noise)
 
 
 @dataclass(frozen=True)
@@ -347,7 +347,7 @@ class CompositeEdit:
         return CompositeEdit(tuple(back))
 
 
-STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)
+STATION_EDITS = (SetLines, SetCalibrationSource, SetPictureGeometry)
 """Edits of a view that belong to its station when that is shared."""
 
 

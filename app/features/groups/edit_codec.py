@@ -10,19 +10,19 @@ from app.errors import TooManyPointsError
 from app.features.groups.edit import (
     CompositeEdit,
     Edit,
-    IncludeView,
     LineChanges,
+    SetBallNoise,
     SetBalls,
     SetCalibrationSource,
+    SetCameraPositions,
     SetLines,
-    SetNoise,
-    SetPaint,
-    SetPicture,
+    SetPaintReadings,
+    SetPictureGeometry,
     SetPitch,
-    SetPositions,
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
+    SetViewInclusion,
     StationEdit,
 )
 from app.soccer.annotation import Lines
@@ -33,9 +33,9 @@ from app.soccer.codec import (
     camera_to_json,
     covariance_from_json,
     covariance_to_json,
-    paint_to_json,
-    picture_from_json,
-    picture_to_json,
+    paint_digests_to_json,
+    picture_geometry_from_json,
+    picture_geometry_to_json,
     positions_from_json,
     positions_to_json,
 )
@@ -57,23 +57,27 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
         case SetBalls(view, balls, noise):
             fields = {"balls": [*map(ball_to_json, balls)], **_noise_to_json(noise)}
             return {"edit": "set_balls", "view": view, **fields}
-        case IncludeView(view, included, reason, note):
+        case SetViewInclusion(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
             return {"edit": "include_view", "view": view, "included": included, **why}
         case SetCalibrationSource(view, calibration):
             return {"edit": "set_calibration", "view": view, "calibration": calibration}
-        case SetPicture(view, picture):
-            return {"edit": "set_picture", "view": view, "picture": picture_to_json(picture)}
+        case SetPictureGeometry(view, picture):
+            return {
+                "edit": "set_picture",
+                "view": view,
+                "picture": picture_geometry_to_json(picture),
+            }
         case SetPitch(length, width):
             return {"edit": "set_pitch", "length": float(length), "width": float(width)}
-        case SetPositions(positions):
+        case SetCameraPositions(positions):
             return {"edit": "set_positions", "positions": positions_to_json(positions)}
-        case SetNoise(noise):
+        case SetBallNoise(noise):
             return {"edit": "set_noise", "noise": {view: float(of) for view, of in noise.items()}}
         case CompositeEdit(edits):
             return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
-        case SetPaint(paint):
-            return {"edit": "set_paint", "paint": paint_to_json(paint)}
+        case SetPaintReadings(paint):
+            return {"edit": "set_paint", "paint": paint_digests_to_json(paint)}
         case _:
             return _station_edit_to_json(edit)
 
@@ -106,17 +110,17 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
             return SetBalls(value["view"], balls, float(value.get("noise", 1.0)))
         case "include_view":
             why = value.get("reason"), value.get("note")
-            return IncludeView(value["view"], value["included"], *why)
+            return SetViewInclusion(value["view"], value["included"], *why)
         case "set_calibration":
             return SetCalibrationSource(value["view"], value["calibration"])
         case "set_picture":
-            return SetPicture(value["view"], picture_from_json(value["picture"]))
+            return SetPictureGeometry(value["view"], picture_geometry_from_json(value["picture"]))
         case "set_pitch":
             return SetPitch(value["length"], value["width"])
         case "set_positions":
-            return SetPositions(positions_from_json(value["positions"]))
+            return SetCameraPositions(positions_from_json(value["positions"]))
         case "set_noise":
-            return SetNoise(value["noise"])
+            return SetBallNoise(value["noise"])
         case "several":
             return CompositeEdit(tuple(map(edit_from_json, value["edits"])))
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")

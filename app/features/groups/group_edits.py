@@ -14,7 +14,7 @@ from app.db.log import (
 )
 from app.db.session import Session, now
 from app.features.datasets.queries import list_group_ids
-from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, require_view
+from app.features.groups.edit import CompositeEdit, Edit, SetBallNoise, SetBalls, require_view
 from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import make_next_revision, save_revision
@@ -107,10 +107,12 @@ def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, act
     append_entries(session, [NewLogEntry(NOISE, actor, now(), body, dataset_id)])
     ids = list_group_ids(session, dataset_id)
 
-    def make_noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
+    def make_noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetBallNoise]:
         placed = read_last_ball_actors(session, [*some])
         return {
-            number: SetNoise(_compute_noise_by_view(stored.group, placed.get(number, {}), factors))
+            number: SetBallNoise(
+                _find_noise_factors_by_view(stored.group, placed.get(number, {}), factors)
+            )
             for number, stored in some.items()
         }
 
@@ -141,7 +143,7 @@ def keep_view_noise(group: Group, edit: Edit) -> Edit:
     return replace(edit, noise=require_view(group, edit.view).noise)
 
 
-def _compute_noise_by_view(
+def _find_noise_factors_by_view(
     group: Group, placed: Mapping[str, str], factors: Factors
 ) -> dict[str, float]:
     return {

@@ -33,7 +33,7 @@ def station_to_columns(station: Station) -> dict[str, Any]:
         "given": None if given is None else canonical_json_text(given),
         "picture": None
         if station.picture is None
-        else canonical_json_text(codec.picture_to_json(station.picture)),
+        else canonical_json_text(codec.picture_geometry_to_json(station.picture)),
         "proposed": canonical_json_text([*station.proposed]) if station.proposed else None,
         "digest": station_digest(station),
     }
@@ -81,7 +81,7 @@ def group_to_columns(
         paint: Digests of what was read of its pictures, where the readings are not at hand.
         views: Digests of each view and its station, where they are known.
     """
-    read = codec.paint_to_json(group.paint) if paint is None else paint
+    read = codec.paint_digests_to_json(group.paint) if paint is None else paint
     return {
         "key": group.key,
         "match": group.match,

@@ -18,11 +18,11 @@ from app.errors import (
 )
 from app.features.paint.proposal_queries import Proposal
 from app.geometry.camera import Camera
-from app.media.files import read_pixels
+from app.media.files import read_digest_and_pixels
 from app.media.frames import make_picture_error
 from app.paint.evidence import Image
 from app.paint.view_paint import (
-    choose_hiding_boxes,
+    drop_boxes_larger_than_a_person,
     explain_unreadable_picture,
     read_paint_of_image,
 )
@@ -97,13 +97,13 @@ class PaintTask:
 
 def digest_people_boxes(view: View) -> str:
     """Digest of the boxes that hide paint in a view; empty where there are none."""
-    boxes = choose_hiding_boxes(view.extras.places, view.size)
+    boxes = drop_boxes_larger_than_a_person(view.extras.places, view.size)
     if not boxes:
         return ""
     return digest_json(sorted([box.x, box.y, box.width, box.height] for box in boxes))
 
 
-def mark_paint_outdated_by_other_people(
+def mark_readings_with_stale_people_boxes(
     group: Group, readings: Mapping[str, PaintReading]
 ) -> dict[str, PaintReading]:
     """Readings as they are given to a group: of those that were made beside other people than its
@@ -148,7 +148,7 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
         return reusable
     try:
         known = "" if reusable is None else reusable.frame
-        frame, image = read_pixels(media, task.view.station.flipped, settings, known)
+        frame, image = read_digest_and_pixels(media, task.view.station.flipped, settings, known)
     except NotFoundError:
         return reusable or task.make_reading_without_frame
     except (ImageError, StorageError, TooLargeError):
@@ -239,11 +239,11 @@ class ProposalTask:
         )
 
 
-def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
+def propose_lines_for_task(task: ProposalTask, settings: Settings) -> Proposal | None:
     """What is to be kept for a view; None where what was proposed before still stands."""
     known = task.reusable_frame_digest
     try:
-        digest, image = read_pixels(task.media, task.flipped, settings, known)
+        digest, image = read_digest_and_pixels(task.media, task.flipped, settings, known)
     except NotFoundError:
         return task.make_proposal_without_picture(MISSING)
     except (ImageError, StorageError, TooLargeError):

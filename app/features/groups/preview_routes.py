@@ -21,8 +21,14 @@ from starlette.concurrency import run_in_threadpool
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError, OverloadedError
-from app.features.groups.edit import Edit, IncludeView, SetLines, SetPicture, set_ball
-from app.features.groups.schemas import BallEdit, LineEdits, PictureEdit, points_by_marking
+from app.features.groups.edit import (
+    Edit,
+    SetLines,
+    SetPictureGeometry,
+    SetViewInclusion,
+    make_set_ball_edit,
+)
+from app.features.groups.schemas import BallEdit, LineEdits, PictureGeometryEdit, points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, solve_edited_group
 from app.features.groups.view_paint import PaintUpdater, PaintUpdaterWithoutPictures
@@ -50,7 +56,7 @@ _stores: dict[str, Store] = {}
 """In the process of previews: the database, once it was opened."""
 
 
-class ViewPreview(BaseModel):
+class ViewPreviewChanges(BaseModel):
     """Changes to one view; what is absent stays as it is."""
 
     model_config = ConfigDict(extra="forbid")
@@ -60,7 +66,7 @@ class ViewPreview(BaseModel):
         default=None, description="null: the view has no ball; absent: the ball stays as it is."
     )
     included: StrictBool | None = None
-    picture: PictureEdit | None = Field(
+    picture: PictureGeometryEdit | None = Field(
         default=None,
         description="null: as the camera took it; absent: unchanged.",
     )
@@ -76,7 +82,7 @@ class PreviewRequest(BaseModel):
         },
     )
 
-    views: Annotated[dict[str, ViewPreview], Field(max_length=64)]
+    views: Annotated[dict[str, ViewPreviewChanges], Field(max_length=64)]
 
 
 class PreviewDocument(Document):
@@ -161,16 +167,18 @@ def build_preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
     return edits
 
 
-def _build_view_edits(key: str, change: ViewPreview) -> list[Edit]:
+def _build_view_edits(key: str, change: ViewPreviewChanges) -> list[Edit]:
     edits: list[Edit] = []
     if change.lines:
         edits.append(SetLines(key, points_by_marking(change.lines)))
     if "ball" in change.model_fields_set:
-        edits.append(set_ball(key, None if change.ball is None else change.ball.ball()))
+        edits.append(make_set_ball_edit(key, None if change.ball is None else change.ball.ball()))
     if change.included is not None:
-        edits.append(IncludeView(key, change.included))
+        edits.append(SetViewInclusion(key, change.included))
     if "picture" in change.model_fields_set:
-        edits.append(SetPicture(key, None if change.picture is None else change.picture.picture()))
+        edits.append(
+            SetPictureGeometry(key, None if change.picture is None else change.picture.picture())
+        )
     return edits
 
 

@@ -12,7 +12,7 @@ from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
 
 from app.db.dialects.dialect import insert
-from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
+from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.errors import NotFoundError
 from app.features.datasets.queries import parse_stored_policy
@@ -234,7 +234,7 @@ def _view_from_row(row: Any, station: Station) -> View:
 
 
 def _paint_from_text(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return {view: readings[digest] for view, digest in read_paint_digests(text).items()}
 
 
@@ -242,25 +242,25 @@ def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
     """Shared positions of a group from its column, by the views' keys."""
     if text is None:
         return {}
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.positions_from_json(parse_json_column(text))
 
 
 def _left_out_from_text(text: str) -> ViewExclusion | None:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.view_exclusion_from_json(parse_json_column(text))
 
 
 # Most requests ask for what the one before asked for.
 @lru_cache(maxsize=1024)
 def _balls_from_text(text: str) -> tuple[BallAnnotation, ...]:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return tuple(map(codec.ball_from_json, parse_json_column(text)))
 
 
 @lru_cache(maxsize=256)
 def _extras_from_bytes(data: bytes) -> Extras:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.extras_from_json(decompress_json(data))
 
 

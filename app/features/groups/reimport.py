@@ -192,7 +192,7 @@ class SharedStations:
         if stored is None:
             self._insert_station(incoming)
             return
-        source = self._find_dataset_version(stored)
+        source = self._find_station_as_imported(stored)
         followed = update_station_from_dataset(
             stored, incoming, source, lines_left=self._lines_left
         )
@@ -201,7 +201,7 @@ class SharedStations:
             self._save_station(stored, followed)
             self.changed.append(incoming.key)
 
-    def _find_dataset_version(self, stored: StoredStation) -> Station | None:
+    def _find_station_as_imported(self, stored: StoredStation) -> Station | None:
         """A station as its dataset last brought it; under an edit only the log remembers."""
         if not stored.edited:
             return stored.station

@@ -108,7 +108,11 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
         revision=stored.revision + 1,
         changed=at,
         inputs_hash=hash_solver_inputs(
-            group.pitch, pairs, group.positions, codec.paint_to_json(group.paint), group.noise
+            group.pitch,
+            pairs,
+            group.positions,
+            codec.paint_digests_to_json(group.paint),
+            group.noise,
         ),
         group=group,
         stations=stations,
@@ -135,7 +139,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
     values["positions"] = positions_to_column(after.group)
-    values["paint"] = paint_to_column(codec.paint_to_json(after.group.paint))
+    values["paint"] = paint_to_column(codec.paint_digests_to_json(after.group.paint))
     _update_row(session, GroupModel.__table__, after.id, values)
 
 
@@ -153,7 +157,7 @@ def _update_statement(table: Any) -> Any:
     return update(table).where(table.c.id == bindparam("row"))
 
 
-def save_group(
+def save_reimported_group(
     session: Session,
     stored: StoredGroup,
     group: Group,
@@ -286,7 +290,7 @@ def count_groups(session: Session, dataset_id: int) -> int:
     return session.scalar(select(func.count()).select_from(GroupModel).where(mine)) or 0
 
 
-def count_changes(session: Session, dataset_id: int, after: int) -> int:
+def count_changed_groups(session: Session, dataset_id: int, after: int) -> int:
     """How many groups of a dataset have changed after a change."""
     statement = select(func.count()).select_from(GroupChangeModel)
     return session.scalar(statement.where(*_changed_since_conditions(dataset_id, after))) or 0

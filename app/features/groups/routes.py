@@ -32,7 +32,13 @@ from app.features.groups.state import GroupState
 from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.people.roles import role_allows
 from app.features.queue import service as queue
-from app.features.queue.routes import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
+from app.features.queue.routes import (
+    GroupHistory,
+    GroupPage,
+    GroupRow,
+    LogEntryDocument,
+    Neighbours,
+)
 from app.features.queue.service import MatchingGroups
 from app.http.access import get_current_login
 from app.http.cursor import foreign_cursor_error, paged
@@ -63,7 +69,7 @@ CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as 
 CONFLICTS = (404, 409, 412, 413, 415, 428)
 
 
-class ViewThen(Document):
+class ViewVersionDocument(Document):
     """A view as it was said to be at a time."""
 
     included: bool
@@ -90,8 +96,8 @@ class ChangedViewDocument(Document):
     width: int
     height: int
     image: str | None = Field(description="Address of the frame, where there is one now.")
-    before: ViewThen | None
-    after: ViewThen | None
+    before: ViewVersionDocument | None
+    after: ViewVersionDocument | None
 
     @classmethod
     def of(cls, changed: ChangedView) -> Self:
@@ -105,12 +111,12 @@ class ChangedViewDocument(Document):
             width=there.size.width,
             height=there.size.height,
             image=url_of_image(changed.id) if shown and changed.id is not None else None,
-            before=None if changed.before is None else ViewThen.of(changed.before),
-            after=None if changed.after is None else ViewThen.of(changed.after),
+            before=None if changed.before is None else ViewVersionDocument.of(changed.before),
+            after=None if changed.after is None else ViewVersionDocument.of(changed.after),
         )
 
 
-class StepDocument(Document):
+class EntryChangesDocument(Document):
     """What an entry has changed: the views that differ, and the pitch."""
 
     entry: LogEntryDocument
@@ -239,16 +245,16 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
-def get_history(group: Id, store: AppStore) -> History:
+def get_history(group: Id, store: AppStore) -> GroupHistory:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
-    return History(items=[LogEntryDocument.of(entry) for entry in read_history(store, group)])
+    return GroupHistory(items=[LogEntryDocument.of(entry) for entry in read_history(store, group)])
 
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
+def get_entry_changes(group: Id, entry: Id, store: AppStore) -> EntryChangesDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
-    return StepDocument.of(read_entry_changes(store, group, entry))
+    return EntryChangesDocument.of(read_entry_changes(store, group, entry))
 
 
 @router.post(

@@ -273,7 +273,7 @@ def lines_to_document(lines: Lines) -> LineDocuments:
     return _kept_documents(lines)
 
 
-class DatasetName(Document):
+class DatasetReference(Document):
     """The dataset that a group belongs to."""
 
     id: int
@@ -350,7 +350,7 @@ class GroupDocument(Document):
 
     id: int
     number: int = Field(description="Place in the dataset, from 1.")
-    dataset: DatasetName
+    dataset: DatasetReference
     key: str
     label: str
     match: str
@@ -373,7 +373,7 @@ class GroupDocument(Document):
         return GroupDocument.model_construct(
             id=state.id,
             number=state.number,
-            dataset=DatasetName(id=state.dataset_id, name=state.dataset),
+            dataset=DatasetReference(id=state.dataset_id, name=state.dataset),
             key=group.key,
             label=group.label or group.key,
             match=group.match,
@@ -469,7 +469,7 @@ _Shift = Annotated[float, Field(ge=-MAX_SHIFT, le=MAX_SHIFT)]
 _Sigma = Annotated[float, Field(ge=0, le=1)]
 
 
-class PictureEdit(BaseModel):
+class PictureGeometryEdit(BaseModel):
     """What was done to a picture since it was taken; what is absent its own lines say."""
 
     model_config = ConfigDict(
@@ -523,7 +523,7 @@ class ViewEdit(BaseModel):
         default=None, description="The same in one's own words; `other` needs it."
     )
     calibration: CalibrationChoice = "given"
-    picture: PictureEdit | None = Field(
+    picture: PictureGeometryEdit | None = Field(
         default=None, description="What was done to the picture; null: it is as it was taken."
     )
 
@@ -536,7 +536,7 @@ class ViewEdit(BaseModel):
         return self
 
 
-class StationEdit(BaseModel):
+class StationCalibrationEdit(BaseModel):
     """Choose which calibration of a static camera counts."""
 
     model_config = ConfigDict(
@@ -546,7 +546,7 @@ class StationEdit(BaseModel):
     calibration: CalibrationChoice
 
 
-class Neighbour(BaseModel):
+class NeighbourFrame(BaseModel):
     """A frame of the same camera just before or after that of a view."""
 
     offset: int = Field(description="Frames later; below zero: before.")
@@ -554,23 +554,23 @@ class Neighbour(BaseModel):
     image: str = Field(description="Address of the frame.")
 
 
-class NeighbourList(ListDocument[Neighbour]):
+class NeighbourFrameList(ListDocument[NeighbourFrame]):
     """The frames around a view's, in their order; `sentence` says why there are none."""
 
     sentence: str | None
 
     @staticmethod
-    def of(view: int, offsets: Sequence[int], why_none: str) -> NeighbourList:
+    def of(view: int, offsets: Sequence[int], why_none: str) -> NeighbourFrameList:
         """The document for a view and the offsets that there are."""
         items = [
-            Neighbour(
+            NeighbourFrame(
                 offset=offset,
                 label=describe_frame_offset(offset),
                 image=f"{url_of_image(view)}?offset={offset}",
             )
             for offset in offsets
         ]
-        return NeighbourList(items=items, sentence=None if items else why_none)
+        return NeighbourFrameList(items=items, sentence=None if items else why_none)
 
 
 def describe_frame_offset(offset: int) -> str:

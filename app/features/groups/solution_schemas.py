@@ -142,7 +142,7 @@ class CameraDocument(Document):
     )
 
 
-class MarkingDocument(Document):
+class MarkingFitDocument(Document):
     """Where the camera puts a marking, and how far its annotated points are off."""
 
     marking: str
@@ -156,7 +156,7 @@ class MarkingDocument(Document):
     )
 
 
-class SuspectDocument(Document, shows=SuspectLabel):
+class SuspectMarkingDocument(Document, shows=SuspectLabel):
     """A marking whose label looks wrong, and what would fit."""
 
     error_px: Measured
@@ -196,8 +196,8 @@ class CalibrationDocument(Document):
     )
     error_px: float | None
     unobservable: list[str]
-    markings: list[MarkingDocument]
-    suspects: list[SuspectDocument]
+    markings: list[MarkingFitDocument]
+    suspects: list[SuspectMarkingDocument]
     paint: PaintFitDocument | None = Field(
         description="How it and the paint agree; null where none was read for these lines."
     )
@@ -345,7 +345,7 @@ def _edit_to_json(edit: Any) -> Any:
     return edit if isinstance(edit, dict) else edit_to_json(edit)
 
 
-class OfferDocument(Document):
+class EditOfferDocument(Document):
     """An edit that carries a fix out."""
 
     label: str = Field(description="What a button for it says.")
@@ -359,7 +359,7 @@ class OfferDocument(Document):
     )
 
 
-class GuideDocument(Document):
+class FixGuideDocument(Document):
     """Where a person is led who has to look or draw: what no edit can do for them."""
 
     label: str = Field(description="What a button for it says.")
@@ -374,7 +374,7 @@ class GuideDocument(Document):
     )
 
 
-class DismissedDocument(Document):
+class DismissalDocument(Document):
     """Who has checked a finding and found it fine."""
 
     by: str = Field(validation_alias="actor")
@@ -389,16 +389,16 @@ class FindingDocument(Document, shows=Finding):
     unusable_ball: bool = Field(
         description="Whether the ball is unusable: accepting the group then needs a note."
     )
-    offers: list[OfferDocument] = Field(
+    offers: list[EditOfferDocument] = Field(
         description=(
             "Edits that correct it; empty when only a person can correct it, several to choose "
             "from."
         )
     )
-    guide: GuideDocument | None = Field(
+    guide: FixGuideDocument | None = Field(
         description="Where a person has to look or draw; null if edits are offered, or nothing."
     )
-    dismissed: DismissedDocument | None = Field(
+    dismissed: DismissalDocument | None = Field(
         default=None,
         description="Person who dismissed the finding, while it has not changed; null: not dismissed.",
     )
@@ -408,7 +408,7 @@ class FindingDocument(Document, shows=Finding):
         """The document of a finding of a group."""
         document = FindingDocument.model_validate(finding, context=group)
         if dismissed is not None:
-            document.dismissed = DismissedDocument.model_validate(dismissed)
+            document.dismissed = DismissalDocument.model_validate(dismissed)
         return document
 
     @model_validator(mode="before")
@@ -457,5 +457,5 @@ class SolutionDocument(Document):
         document = SolutionDocument.model_validate(solution, context=group)
         for finding, dismissal in zip(document.findings, dismissed, strict=False):
             if dismissal is not None:
-                finding.dismissed = DismissedDocument.model_validate(dismissal)
+                finding.dismissed = DismissalDocument.model_validate(dismissal)
         return document

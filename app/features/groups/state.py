@@ -23,7 +23,7 @@ from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.queries import SolutionKey, read_solutions
-from app.features.verdicts.queries import StoredVerdict, is_fixed, read_last_verdicts
+from app.features.verdicts.queries import StoredVerdict, is_group_mended, read_last_verdicts
 from app.soccer.codec import digest_json
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
@@ -68,7 +68,7 @@ def group_etag(
 
 
 @dataclass(frozen=True)
-class GroupHead:
+class GroupChangeBasis:
     """What a change of a group rests on.
 
     Attributes:
@@ -80,13 +80,13 @@ class GroupHead:
     policy_hash: str
 
 
-def read_group_head(session: Session, group_id: int) -> GroupHead | None:
+def read_group_change_basis(session: Session, group_id: int) -> GroupChangeBasis | None:
     """What a change of a group would rest on now; None where there is no such group."""
     row = find_etag_row(session, group_id)
     if row is None:
         return None
     content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
-    return GroupHead(content, row.policy_hash)
+    return GroupChangeBasis(content, row.policy_hash)
 
 
 def content_tag_from_etag(etag: str) -> str:
@@ -107,7 +107,7 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
         NotFoundError: The group is gone.
         StaleRevisionError: With both ETags.
     """
-    head = read_group_head(session, group_id)
+    head = read_group_change_basis(session, group_id)
     if head is None:
         raise NotFoundError.group(group_id)
     require_unchanged_content(session, group_id, head.content, if_match, what)
@@ -299,19 +299,21 @@ def require_group(session: Session, group_id: int) -> StoredGroup:
     return stored
 
 
-def read_record(session: Session, group_id: int) -> GroupWithoutSolution:
+def read_group_without_solution(session: Session, group_id: int) -> GroupWithoutSolution:
     """A group's record as it is in a session's snapshot.
 
     Raises:
         NotFoundError: There is no such group.
     """
-    records = read_records(session, [group_id])
+    records = read_groups_without_solution(session, [group_id])
     if not records:
         raise NotFoundError.group(group_id)
     return records[0]
 
 
-def read_records(session: Session, group_ids: Sequence[int]) -> list[GroupWithoutSolution]:
+def read_groups_without_solution(
+    session: Session, group_ids: Sequence[int]
+) -> list[GroupWithoutSolution]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
     noticed, dismissals = read_import_findings(session, group_ids)
@@ -335,7 +337,7 @@ def read_state(session: Session, group_id: int) -> GroupState:
     Raises:
         NotFoundError: There is no such group.
     """
-    record = read_record(session, group_id)
+    record = read_group_without_solution(session, group_id)
     key = record.solution_key
     return record.make_state(read_solutions(session, [key]).get(group_id))
 
@@ -350,7 +352,7 @@ def read_states(
         group_ids: Which groups.
         markings: Whether calibrations hold their markings.
     """
-    records = read_records(session, group_ids)
+    records = read_groups_without_solution(session, group_ids)
     keys = [record.solution_key for record in records]
     found = read_solutions(session, keys, markings=markings)
     return [record.make_state(found.get(record.stored.id)) for record in records]
@@ -372,7 +374,7 @@ def _make_verdict_state(
         actor=given.actor,
         at=given.at,
         stale=reviewed and given.inputs_hash != stored.inputs_hash,
-        fixed=is_fixed(given, edited, passes),
+        fixed=is_group_mended(given, edited, passes),
         override=given.override,
     )
 

@@ -31,7 +31,7 @@ from app.features.queue.tables import QueueModel
 from app.features.tables import Base
 from app.features.verdicts.tables import VerdictModel
 from app.soccer.annotation import Extras
-from app.soccer.codec import extras_from_json, hash_group_inputs, paint_to_json
+from app.soccer.codec import extras_from_json, hash_group_inputs, paint_digests_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
@@ -256,5 +256,5 @@ def _make_group_record(stored: StoredGroup) -> GroupRecord:
         source_hash=stored.source_hash,
         head=replace(stored.group, views=(), paint={}),
         views=views,
-        paint=paint_to_json(stored.group.paint),
+        paint=paint_digests_to_json(stored.group.paint),
     )

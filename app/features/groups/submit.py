@@ -16,8 +16,8 @@ from app.features.groups.edit import (
     STATION_EDITS,
     CompositeEdit,
     Edit,
-    SetPaint,
-    SetPicture,
+    SetPaintReadings,
+    SetPictureGeometry,
     require_view,
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json, require_point_limits_of_edits
@@ -28,7 +28,7 @@ from app.features.groups.state import (
     GroupState,
     GroupWithoutSolution,
     read_etags,
-    read_record,
+    read_group_without_solution,
     read_state,
     require_group,
     require_unchanged,
@@ -49,7 +49,7 @@ from app.solving.solve import solve_group
 
 
 @dataclass(frozen=True)
-class FoundView:
+class ViewLocation:
     """Where a view belongs and where its frame lies."""
 
     group_id: int
@@ -62,7 +62,7 @@ class FoundView:
     """Whether the camera stands still for all views that share it."""
 
 
-def find_view(store: Store, view_id: int) -> FoundView:
+def find_view_location(store: Store, view_id: int) -> ViewLocation:
     """The view of that id.
 
     Raises:
@@ -72,7 +72,7 @@ def find_view(store: Store, view_id: int) -> FoundView:
         found = views.find_view(session, view_id)
     if found is None:
         raise NotFoundError(f"there is no view {view_id}")
-    return FoundView(
+    return ViewLocation(
         found.group_id,
         found.key,
         found.media,
@@ -232,7 +232,7 @@ def solve_edited_group(
         edits = edits_of(group)
         require_point_limits_of_edits(group, edits)
         for edit in edits:
-            if isinstance(edit, SetPicture):
+            if isinstance(edit, SetPictureGeometry):
                 refuse_edit_of_shared_station(stored, edit)
         for edit in edits:
             group = keep_view_noise(group, edit).apply(group)
@@ -260,13 +260,13 @@ def load_solved_group_of_view(store: Store, view_id: int) -> GroupState:
 
 def solve_and_store_group(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
-    record, solution = read_solved_group(store, group_id)
+    record, solution = ensure_group_solution(store, group_id)
     return record.make_state(solution)
 
 
 def read_and_solve_group(session: Session, group_id: int) -> GroupState:
     """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
-    record = read_record(session, group_id)
+    record = read_group_without_solution(session, group_id)
     solution = read_solutions(session, [record.solution_key]).get(group_id)
     if solution is None:
         group, policy = record.stored.group, record.stored.policy
@@ -274,12 +274,12 @@ def read_and_solve_group(session: Session, group_id: int) -> GroupState:
     return record.make_state(solution)
 
 
-def read_solved_group(
+def ensure_group_solution(
     store: Store, group_id: int, *, needed: bool = True
 ) -> tuple[GroupWithoutSolution, Solution | None]:
     """A group's record and its solution, which is computed and kept where it is needed."""
     with store.read() as session:
-        record = read_record(session, group_id)
+        record = read_group_without_solution(session, group_id)
         stored = record.stored
         solution = read_solutions(session, [record.solution_key]).get(group_id)
         if solution is not None or not needed:
@@ -298,7 +298,7 @@ def refuse_edit_of_shared_station(stored: StoredGroup, edit: Edit) -> None:
         return
     station = require_view(stored.group, edit.view).station
     if station.shared:
-        what = "picture" if isinstance(edit, SetPicture) else "lines"
+        what = "picture" if isinstance(edit, SetPictureGeometry) else "lines"
         raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
 
 
@@ -328,7 +328,7 @@ def submit_change(
     """
     while True:
         with store.read() as session:
-            before = read_record(session, find(session))
+            before = read_group_without_solution(session, find(session))
             what = f"group {before.stored.group.key}"
             require_unchanged_content(session, before.stored.id, before.content, if_match, what)
             change = plan(session, before, actor)
@@ -390,7 +390,7 @@ def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
 def _make_paint_entry_body(outcome: _AppliedChange) -> Json:
     """Body of the entry that says what was read of the paint with a change."""
     before = outcome.change.group
-    edit = SetPaint(outcome.painted.paint)
+    edit = SetPaintReadings(outcome.painted.paint)
     body = edit_and_inverse_to_json(edit, edit.inverse(before))
     return {FOLLOWS: outcome.change.kind, **body}
 

@@ -8,10 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, SetPicture, set_ball
+from app.features.groups.edit import (
+    Edit,
+    SetBalls,
+    SetLines,
+    SetPictureGeometry,
+    SetViewInclusion,
+    make_set_ball_edit,
+)
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, remove_markings
-from app.soccer.finding import Finding, PlacedFinding, SuggestedFix
+from app.soccer.finding import Finding, FindingWithBallPlace, SuggestedFix
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View, make_view_letter
 from app.soccer.picture import OPEN
@@ -100,7 +107,7 @@ def list_edits_of_finding(group: Group, finding: Finding) -> tuple[EditOffer, ..
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
         return _offer_fitted_box(group, finding)
-    if isinstance(finding, PlacedFinding):
+    if isinstance(finding, FindingWithBallPlace):
         return _offer_edits_for_ball_off_track(group, finding)
     return list_edits_of_fix(group, finding.fix)
 
@@ -132,13 +139,15 @@ def describe_condition(group: Group, fix: SuggestedFix, moved_px: float = 0.0) -
 def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBalls:
     """The edit that puts a view's ball somewhere else, as large as it is."""
     if ball.box is None:
-        return set_ball(view, replace(ball, point=point))
+        return make_set_ball_edit(view, replace(ball, point=point))
     box = ball.box
     moved = replace(box, x=point.x - box.width / 2, y=point.y - box.height / 2)
-    return set_ball(view, replace(ball, box=moved))
+    return make_set_ball_edit(view, replace(ball, box=moved))
 
 
-def _offer_edits_for_ball_off_track(group: Group, finding: PlacedFinding) -> tuple[EditOffer, ...]:
+def _offer_edits_for_ball_off_track(
+    group: Group, finding: FindingWithBallPlace
+) -> tuple[EditOffer, ...]:
     """The ball at the place of the track, another ball of the view, or the view left out."""
     key = finding.view
     view = None if key is None else group.view(key)
@@ -158,7 +167,7 @@ def _offer_fitted_box(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     if view is None or ball is None or ball.box is None or not finding.number:
         return ()
     box = Box.square(ball.box.center, ball.box.diameter / finding.number)
-    return (EditOffer("Fit the box", set_ball(view.key, replace(ball, box=box))),)
+    return (EditOffer("Fit the box", make_set_ball_edit(view.key, replace(ball, box=box))),)
 
 
 def _format_button_text(text: str, fix: SuggestedFix, **more: str | float) -> str:
@@ -179,12 +188,12 @@ def _no_edit(_view: View, _fix: SuggestedFix, _point: ImagePoint | None) -> Edit
 
 
 def _include_view_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
-    return IncludeView(view.key, fix.action == "include_view")
+    return SetViewInclusion(view.key, fix.action == "include_view")
 
 
 def _pick_ball_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:
     there = fix.index is not None and fix.index < len(view.balls)
-    return set_ball(view.key, view.balls[fix.index or 0]) if there else None
+    return make_set_ball_edit(view.key, view.balls[fix.index or 0]) if there else None
 
 
 def _move_ball_edit(view: View, _fix: SuggestedFix, point: ImagePoint | None) -> Edit | None:
@@ -209,7 +218,7 @@ def _estimate_picture_edit(
     view: View, _fix: SuggestedFix, _point: ImagePoint | None
 ) -> Edit | None:
     """Its own lines say what was done to the picture; that of a static camera belongs to no view."""
-    return None if view.station.shared else SetPicture(view.key, OPEN)
+    return None if view.station.shared else SetPictureGeometry(view.key, OPEN)
 
 
 def _relabel_marking_edit(view: View, fix: SuggestedFix, _point: ImagePoint | None) -> Edit | None:

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.db.log import (
-    list_group_steps,
-    list_newest_steps,
-    list_station_steps,
+    list_group_entry_kinds,
+    list_newest_entry_kinds,
+    list_station_entry_kinds,
 )
 from app.db.session import Session
 
@@ -52,7 +52,7 @@ def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Undo
     if len(group_ids) == 1:
         return {group_ids[0]: _read_stacks_from_newest_steps(session, group_ids[0])}
     steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
-    for row in list_group_steps(session, group_ids, GROUP_KINDS):
+    for row in list_group_entry_kinds(session, group_ids, GROUP_KINDS):
         steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
     return {number: _build_stacks(taken) for number, taken in steps.items()}
 
@@ -61,7 +61,7 @@ def _read_stacks_from_newest_steps(session: Session, group_id: int) -> UndoStack
     """The stacks of one group from as little of its history as tells them."""
     most = _FIRST_LOOK
     while True:
-        rows = list_newest_steps(session, group_id, GROUP_KINDS, most)
+        rows = list_newest_entry_kinds(session, group_id, GROUP_KINDS, most)
         steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
         stacks = (
             _build_stacks(steps) if len(rows) < most else _build_stacks_from_newest_steps(steps)
@@ -87,7 +87,7 @@ def _build_stacks_from_newest_steps(steps: Sequence[tuple[str, int]]) -> UndoSta
 
 def read_station_stacks(session: Session, station_id: int) -> UndoStacks:
     """The stacks of a shared station."""
-    rows = list_station_steps(session, station_id, STATION_KINDS)
+    rows = list_station_entry_kinds(session, station_id, STATION_KINDS)
     return _build_stacks((STATION_KINDS[row.kind], row.id) for row in rows)
 
 

@@ -33,7 +33,7 @@ from app.solving.calibrate import (
     calibrate_from_clicks,
     compute_click_calibration_key,
     compute_paint_search_key,
-    compute_view_key,
+    compute_view_calibration_key,
     find_usable_paint_reading,
 )
 from app.solving.observations import principal_point
@@ -103,7 +103,7 @@ def make_proposal_request(store: Store, view_id: int, lines: LineChanges) -> Vie
     """
     with store.read() as session:
         question = _make_request(session, view_id, lines)
-        known = list_nearby_cameras(session, _find_group_and_view(session, view_id)[0])
+        known = list_cameras_of_nearest_groups(session, _find_group_and_view(session, view_id)[0])
     return replace(question, known=known, drawn=question.view.station.lines)
 
 
@@ -140,7 +140,7 @@ def _require_media(view: View) -> Media:
     return view.media
 
 
-def list_nearby_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
+def list_cameras_of_nearest_groups(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
     """Cameras of the main views of the groups of the match that are nearest by their number.
 
     Those that their lines leave open say nothing of a stand, and lenses of another kind nothing
@@ -155,7 +155,7 @@ def list_nearby_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, 
     found = []
     for group in groups:
         for view in group.views[:1]:
-            item = known.get(compute_view_key(group, view, policy))
+            item = known.get(compute_view_calibration_key(group, view, policy))
             if item is not None and item.camera is not None and not item.unobservable:
                 found.append((item.camera, view.size))
     return tuple(camera for camera, size in found if _has_plain_lens(camera, size))

@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, select, update
 
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import station_to_columns
@@ -68,7 +68,7 @@ class StoredView(_FrameRow):
     @property
     def balls(self) -> list[BallAnnotation]:
         """The balls that were annotated in it."""
-        with report_damaged_values():
+        with translate_shape_errors_to_damage():
             return [ball_from_json(value) for value in parse_json_column(self.said)]
 
 
@@ -281,35 +281,35 @@ def list_station_pitches(session: Session, dataset_id: int) -> list[tuple[int, P
 
 @lru_cache(maxsize=1024)
 def _lines_from_text(text: str) -> Lines:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.lines_from_json(parse_json_column(text))
 
 
 @lru_cache(maxsize=1024)
 def _not_visible_from_text(text: str) -> tuple[str, ...]:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.not_visible_from_json(parse_json_column(text))
 
 
 @lru_cache(maxsize=1024)
 def _parse_camera(text: str) -> Camera:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.camera_from_json(parse_json_column(text))
 
 
 @lru_cache(maxsize=1024)
 def _covariance_from_text(text: str) -> tuple[float, ...] | None:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return codec.covariance_from_json(parse_json_column(text).get("covariance"))
 
 
 @lru_cache(maxsize=256)
 def _proposed_from_text(text: str) -> tuple[str, ...]:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return tuple(map(str, parse_json_column(text)))
 
 
 @lru_cache(maxsize=256)
 def _picture_from_text(text: str) -> PictureGeometry | None:
-    with report_damaged_values():
-        return codec.picture_from_json(parse_json_column(text))
+    with translate_shape_errors_to_damage():
+        return codec.picture_geometry_from_json(parse_json_column(text))

@@ -14,24 +14,24 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.features.groups.edit import (
     Edit,
-    IncludeView,
     SetCalibrationSource,
     SetLines,
-    SetPicture,
-    set_ball,
+    SetPictureGeometry,
+    SetViewInclusion,
+    make_set_ball_edit,
 )
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
 from app.features.groups.schemas import (
     BallEdit,
     GroupDocument,
     LinesEdit,
-    NeighbourList,
+    NeighbourFrameList,
     ViewEdit,
     describe_frame_offset,
     make_group_response,
 )
 from app.features.groups.state import GroupState
-from app.features.groups.submit import FoundView, find_view, submit_view_edit
+from app.features.groups.submit import ViewLocation, find_view_location, submit_view_edit
 from app.features.groups.view_paint import NO_FRAME_HINT
 from app.features.solutions.service import Solve, solve_and_encode
 from app.http.cursor import paged
@@ -112,7 +112,9 @@ def patch_ball(
 ) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     value = None if ball is None else ball.ball()
-    return _submit_view_edit(services, view, lambda key: set_ball(key, value), if_match, actor)
+    return _submit_view_edit(
+        services, view, lambda key: make_set_ball_edit(key, value), if_match, actor
+    )
 
 
 @router.patch(
@@ -133,8 +135,8 @@ def patch_view(
             return SetCalibrationSource(key, change.calibration)
         if "picture" in change.model_fields_set:
             picture = change.picture
-            return SetPicture(key, None if picture is None else picture.picture())
-        return IncludeView(key, change.included, change.reason, change.note)
+            return SetPictureGeometry(key, None if picture is None else picture.picture())
+        return SetViewInclusion(key, change.included, change.reason, change.note)
 
     return _submit_view_edit(services, view, make_edit, if_match, actor)
 
@@ -180,13 +182,13 @@ async def get_image(
     ] = 0,
 ) -> Response:
     """The frame of a view, or one just before or after it, scaled down when a width is given."""
-    found = await to_thread.run_sync(find_view, services.store, view)
+    found = await to_thread.run_sync(find_view_location, services.store, view)
     if offset:
-        around = await _read_neighbour_frames(request, services.frames, found)
+        around = await _find_neighbour_frame_media(request, services.frames, found)
         if around is None:
             return Response(status_code=CLIENT_GONE)
         found = replace(found, media=_find_frame_at_offset(found, around, offset))
-    picture = await _read_picture(request, services.frames, found, clamp_width(width))
+    picture = await _read_picture(request, services.frames, found, round_up_and_clamp_width(width))
     if picture is None:
         return Response(status_code=CLIENT_GONE)
     etag = f'"{picture.digest}"'
@@ -199,29 +201,29 @@ async def get_image(
 @router.get(
     "/{view}/neighbours",
     operation_id="getFramesAround",
-    response_model=NeighbourList,
+    response_model=NeighbourFrameList,
     responses=responses(404, 503),
 )
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 @paged()
-async def get_neighbours(
+async def get_neighbour_frames(
     view: Id, services: AppServices, request: Request
-) -> NeighbourList | Response:
+) -> NeighbourFrameList | Response:
     """The frames of the same camera just before and after a view's, where they are on disk.
 
     Only videos and folders of frames that are numbered by time have them: the files of most
     datasets are numbered by action.
     """
-    found = await to_thread.run_sync(find_view, services.store, view)
-    around = await _read_neighbour_frames(request, services.frames, found)
+    found = await to_thread.run_sync(find_view_location, services.store, view)
+    around = await _find_neighbour_frame_media(request, services.frames, found)
     if around is None:
         return Response(status_code=CLIENT_GONE)
-    return NeighbourList.of(view, sorted(around), NO_NEIGHBOURS)
+    return NeighbourFrameList.of(view, sorted(around), NO_NEIGHBOURS)
 
 
-async def _read_neighbour_frames(
-    request: Request, frames: FrameProvider, view: FoundView
+async def _find_neighbour_frame_media(
+    request: Request, frames: FrameProvider, view: ViewLocation
 ) -> dict[int, Media] | None:
     """Where the frames before and after a view's lie, by how many frames later.
 
@@ -245,7 +247,7 @@ async def _read_neighbour_frames(
     return found
 
 
-def _find_frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> Media:
+def _find_frame_at_offset(view: ViewLocation, around: dict[int, Media], offset: int) -> Media:
     """The frame so many frames later."""
     if not around:
         raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
@@ -255,7 +257,7 @@ def _find_frame_at_offset(view: FoundView, around: dict[int, Media], offset: int
 
 
 async def _read_picture(
-    request: Request, frames: FrameProvider, view: FoundView, width: int | None
+    request: Request, frames: FrameProvider, view: ViewLocation, width: int | None
 ) -> EncodedPicture | None:
     """The frame, or None where nobody waits for it any more.
 
@@ -288,7 +290,7 @@ def add_view_to_errors(key: str) -> Iterator[None]:
         raise type(error)(f"view {key}: {error.message}", hint=error.hint) from cause
 
 
-def clamp_width(width: int | None) -> int | None:
+def round_up_and_clamp_width(width: int | None) -> int | None:
     """The width that is made for a width that is asked for."""
     if width is None:
         return None

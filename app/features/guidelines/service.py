@@ -20,7 +20,7 @@ from app.features.guidelines.queries import (
     list_guideline_heads,
     read_guideline_text,
 )
-from app.features.imports.upload_queries import upload_path
+from app.features.imports.upload_queries import find_complete_upload_path
 from app.json_text import Moment
 from app.media.frames import FrameProvider
 from app.soccer.group import Media
@@ -140,7 +140,7 @@ def add_picture(
         OverloadedError: Too many pictures wait to be decoded.
         ConflictError: There are too many.
     """
-    path = upload_path(store.settings, upload)
+    path = find_complete_upload_path(store.settings, upload)
     if path.stat().st_size > MAX_PICTURE:
         raise TooLargeError(f"a picture of guidelines has at most {MAX_PICTURE:,} bytes")
     found = frames.request_picture(Media(str(path)), None, False).future.result()

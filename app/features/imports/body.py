@@ -19,7 +19,7 @@ from app.features.findings.queries import (
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
 from app.features.groups.revision_chain import RevisionChains
-from app.features.groups.revision_queries import save_group
+from app.features.groups.revision_queries import save_reimported_group
 from app.features.imports.queries import list_known_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import ReaderReport
@@ -95,7 +95,7 @@ def save_missing_group_findings(
     at, entries = now(), []
     for number, item in stored.items():
         base = chains[number].base
-        save_group(session, item, item.group, at=at, source=base)
+        save_reimported_group(session, item, item.group, at=at, source=base)
         body = _make_missing_group_entry_body(
             item, base, source, list_group_findings(session, number)
         )

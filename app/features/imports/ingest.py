@@ -21,7 +21,7 @@ from app.features.findings.queries import (
     list_group_findings,
     replace_group_findings,
 )
-from app.features.groups.edit import SetPaint, SetPositions
+from app.features.groups.edit import SetCameraPositions, SetPaintReadings
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.pictures import mark_paint_outdated_where_people_moved
 from app.features.groups.queries import (
@@ -32,7 +32,7 @@ from app.features.groups.queries import (
     upsert_unassigned_frames,
 )
 from app.features.groups.reimport import KIND, KeptEdit, SharedStations, update_group_from_dataset
-from app.features.groups.revision_queries import save_group
+from app.features.groups.revision_queries import save_reimported_group
 from app.features.imports.body import (
     GONE,
     MAX_VIEWS,
@@ -324,13 +324,13 @@ def _update_group(
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
     if incoming.match == stored.group.match:
         # What the match shares comes from its other pictures.
-        shared_here = SetPositions(stored.group.positions).apply(followed.group)
+        shared_here = SetCameraPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
     # What was read of a picture says of which, and is read again where that is another.
     paint = mark_paint_outdated_where_people_moved(stored.group, followed.group)
-    followed = replace(followed, group=SetPaint(paint).apply(followed.group))
+    followed = replace(followed, group=SetPaintReadings(paint).apply(followed.group))
     insert_paint_readings(session, origin.dataset_id, followed.group.paint.values())
-    save_group(
+    save_reimported_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )
     after = read_groups(session, [group_id])[group_id]
@@ -404,7 +404,7 @@ def import_unassigned_frames(
     while batch := list(islice(items, UNASSIGNED_AT_ONCE)):
         dataset_id = ensure_dataset(store, dataset, actor)
         with store.write() as session:
-            _save_batch(session, dataset_id, batch, source, actor, report)
+            _save_unassigned_frame_batch(session, dataset_id, batch, source, actor, report)
     return report
 
 
@@ -421,7 +421,7 @@ def read_unassigned_persons(session: Session, dataset: str | int) -> Iterator[Fr
             yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 
 
-def _save_batch(
+def _save_unassigned_frame_batch(
     session: Session,
     dataset_id: int,
     batch: Sequence[UnassignedFrame],

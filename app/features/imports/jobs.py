@@ -15,14 +15,18 @@ from app.errors import ConflictError, InputError, TooLargeError
 from app.features.datasets.queries import find_dataset, has_more_groups
 from app.features.datasets.service import get_dataset_head, require_valid_name
 from app.features.imports.sources import FORMATS, ImportSource, import_source
-from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
+from app.features.imports.upload_queries import (
+    find_complete_upload_path,
+    get_upload,
+    mark_upload_permanent,
+)
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.job_run import FailedWithReportError, JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
-from app.features.paint.service import has_pictures
+from app.features.paint.service import has_pictures_to_read_paint_from
 from app.features.solve.jobs import request_solve_job
 from app.formats.file_tree import Root
 from app.progress import ReportProgress
@@ -228,7 +232,9 @@ def _request_following_jobs(
             return {"solve_job": solve.id}
         proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor)
         return {"solve_job": solve.id, "proposals_job": proposals.id}
-    if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
+    if found.policy.calibration.source == "paint" and has_pictures_to_read_paint_from(
+        store, found.id
+    ):
         paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
     rig = None
     if request.format in ("issia", "issia-3d"):
@@ -323,5 +329,5 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
 def _resolve_source_path(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
-        return upload_path(settings, upload.id), upload.name
+        return find_complete_upload_path(settings, upload.id), upload.name
     return resolve_folder(settings, source["folder"]), source["folder"].rstrip("/")

@@ -16,13 +16,17 @@ from app.features.findings.queries import (
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_chain import RevisionChain, format_pitch_size
-from app.features.groups.revision_queries import save_group
+from app.features.groups.revision_queries import save_reimported_group
 from app.features.imports.body import collect_view_and_station_ids, make_import_entry_body
 from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, list_verdicts_of_groups
 from app.features.pitches.service import set_pitch_of_groups
-from app.features.verdicts.queries import StoredVerdict, find_next_verdict_id, insert_verdicts
+from app.features.verdicts.queries import (
+    StoredVerdict,
+    find_next_verdict_id,
+    insert_verdicts_and_end_work,
+)
 from app.soccer.codec import station_digest, view_digest
 from app.soccer.finding import Dismissal
 from app.soccer.group import Group, View
@@ -89,7 +93,7 @@ def merge_group(
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
     at = now()
-    save_group(session, stored, merged, at=at, source=chain.base)
+    save_reimported_group(session, stored, merged, at=at, source=chain.base)
     after = read_groups(session, [stored.id])[stored.id]
     noticed = save_findings(session, after, kept)
     base = chain.base
@@ -215,7 +219,7 @@ def merge_verdicts(
         fresh.append(known[-1])
     first = find_next_verdict_id(session)
     given = [StoredVerdict(first + place, group_id, **item) for place, item in enumerate(fresh)]
-    insert_verdicts(session, origin.dataset_id, given, actor=origin.actor, at=now())
+    insert_verdicts_and_end_work(session, origin.dataset_id, given, actor=origin.actor, at=now())
     return True
 
 

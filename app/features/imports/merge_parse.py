@@ -266,7 +266,7 @@ def _validate_station(station: Station) -> Station:
             )
     if station.calibration not in CALIBRATIONS:
         raise InputError(f"has a `calibration` that is none of {', '.join(CALIBRATIONS)}")
-    _require_truth_values(
+    _require_booleans(
         "a static camera whose `flipped` or `shared`", station.flipped, station.shared
     )
     for marking in station.annotated_lines:
@@ -281,7 +281,7 @@ def _validate_station(station: Station) -> Station:
     return station
 
 
-def _require_truth_values(what: str, *values: object) -> None:
+def _require_booleans(what: str, *values: object) -> None:
     if not all(isinstance(value, bool) for value in values):
         raise InputError(f"has {what} is neither true nor false")
 

@@ -10,10 +10,10 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.features.datasets.queries import find_dataset
-from app.features.findings.queries import replace_shape_findings
+from app.features.findings.queries import replace_picture_shape_findings
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import ReaderReport
-from app.media.files import read_picture_header, read_video_length, read_video_times
+from app.media.files import read_declared_frame_count, read_picture_header, read_video_times
 from app.media.images import SIDEWAYS, ImageHeader
 from app.paint.view_paint import SHAPES_APART
 from app.progress import ReportProgress
@@ -112,7 +112,7 @@ class PictureCheck:
         with store.write() as session:
             row = find_dataset(session, dataset)
             if row is not None:
-                ids = replace_shape_findings(session, int(row.id), self.groups, self.found)
+                ids = replace_picture_shape_findings(session, int(row.id), self.groups, self.found)
                 refresh_queue(session, ids)
         return len(self.found)
 
@@ -149,7 +149,7 @@ class PictureCheck:
         """What a video is; its frames are counted here unless that takes too long."""
         header = read_picture_header(media)
         try:
-            if read_video_length(media) > LONGEST:
+            if read_declared_frame_count(media) > LONGEST:
                 return _VideoHeader(header, None)
             return _VideoHeader(header, self._count_frames(media))
         except (NotFoundError, ImageError, StorageError, TooLargeError) as error:

@@ -24,7 +24,7 @@ from app.formats.coco_reader import read_coco
 from app.formats.file_tree import ImportLimits, Root
 from app.formats.frames_reader import parse_grouping_pattern, read_frame_list, read_frames
 from app.formats.gamestate_reader import read_gamestate
-from app.formats.guess_format import guess_format, guess_from_content, holds_only_videos
+from app.formats.guess_format import guess_format, guess_other_format, holds_only_videos
 from app.formats.issia_3d import open_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.parquet import read_parquet
@@ -218,7 +218,7 @@ class ImportResult:
             first = source.shown(problems[0])
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
-        look = guess_from_content(source.path, source.format)
+        look = guess_other_format(source.path, source.format)
         if look is not None and not (problems and look.is_stated_by(problems[0])):
             return sentence, look.sentence
         if self.report.read:
@@ -340,7 +340,7 @@ def import_source(
             dry_run=dry_run,
         )
         return ImportResult(source, report, result)
-    folder = _open_static_folder(source, report, limits) if source.format in STATIC else None
+    folder = _open_issia_folder(source, report, limits) if source.format in STATIC else None
     groups = _read_groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).replace_listed_frames(
@@ -410,7 +410,7 @@ def _read_groups(
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
 
 
-def _open_static_folder(
+def _open_issia_folder(
     source: ImportSource, report: ReaderReport, limits: ImportLimits
 ) -> IssiaFolder:
     options = IssiaOptions(

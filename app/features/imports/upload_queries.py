@@ -85,7 +85,7 @@ def lock_upload_records(settings: Settings) -> Iterator[None]:
     """
     with _WRITING:
         with _convert_storage_errors():
-            make_upload_folder(settings.uploads)
+            ensure_folder_of_all_uploads(settings.uploads)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
             require_lock(folder, "has been writing uploads", WRITING_SECONDS)
@@ -94,14 +94,14 @@ def lock_upload_records(settings: Settings) -> Iterator[None]:
             os.close(folder)
 
 
-def make_upload_folder(uploads: Path) -> None:
+def ensure_folder_of_all_uploads(uploads: Path) -> None:
     """Make the folder of all uploads, if need be, so that it is there after a power cut."""
     if not uploads.is_dir():
         uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
         sync_to_disk(uploads.parent)
 
 
-def upload_path(settings: Settings, upload_id: str) -> Path:
+def find_complete_upload_path(settings: Settings, upload_id: str) -> Path:
     """Where the content of an upload is.
 
     Raises:
@@ -336,7 +336,7 @@ class UploadWriter:
     def _open_content(self) -> None:
         with _convert_storage_errors():
             settings = self._settings
-            make_upload_folder(settings.uploads)
+            ensure_folder_of_all_uploads(settings.uploads)
             content = self._folder / CONTENT
             content.mkdir(mode=0o700, parents=True)
             self._folder.chmod(0o700)

@@ -27,12 +27,12 @@ from app.features.imports.upload_queries import (
     CONTENT,
     content_path,
     delete_upload,
+    ensure_folder_of_all_uploads,
     get_upload,
     is_full_disk,
     list_uploads,
     lock_upload_records,
     make_safe_file_name,
-    make_upload_folder,
     read_upload,
     require_unused_by_datasets,
     require_upload_size,
@@ -305,7 +305,7 @@ def begin_upload_in_parts(
 
 
 def _make_upload_folder(folder: Path, upload: Upload) -> None:
-    make_upload_folder(folder.parent)
+    ensure_folder_of_all_uploads(folder.parent)
     (folder / CONTENT).mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     (folder / CONTENT / upload.name).write_bytes(b"")
@@ -315,7 +315,7 @@ def _make_upload_folder(folder: Path, upload: Upload) -> None:
 
 
 def _require_disk_space(settings: Settings, upload: Upload) -> None:
-    make_upload_folder(settings.uploads)
+    ensure_folder_of_all_uploads(settings.uploads)
     missing, free = upload.whole_size - upload.bytes, shutil.disk_usage(settings.uploads).free
     if missing > free:
         raise StorageError(

@@ -12,13 +12,13 @@ from app.errors import ConflictError, InputError
 from app.features.groups.edit import (
     CompositeEdit,
     Edit,
-    IncludeView,
     SetBalls,
     SetCalibrationSource,
     SetLines,
-    SetPicture,
+    SetPictureGeometry,
     SetStationCalibration,
     SetStationLines,
+    SetViewInclusion,
     StationEdit,
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json
@@ -48,7 +48,7 @@ from app.features.queue.refresh_queries import refresh_queue
 from app.features.verdicts.queries import (
     StoredVerdict,
     find_next_verdict_id,
-    insert_verdicts,
+    insert_verdicts_and_end_work,
     read_last_verdicts,
 )
 from app.features.webhooks.queries import HANDED_BACK, make_time_suffix, queue_webhook_messages
@@ -136,7 +136,7 @@ def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
         if (own.included, own.left_out) != (view.included, view.left_out):
             why = own.left_out
             reason = (None, None) if why is None else (why.reason, why.note)
-            yield IncludeView(view.key, own.included, *reason)
+            yield SetViewInclusion(view.key, own.included, *reason)
         if view.station.shared:
             continue
         lines = _make_line_edit(view.station, own.station)
@@ -145,7 +145,7 @@ def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
         if own.station.calibration != view.station.calibration:
             yield SetCalibrationSource(view.key, own.station.calibration)
         if own.station.picture != view.station.picture:
-            yield SetPicture(view.key, own.station.picture)
+            yield SetPictureGeometry(view.key, own.station.picture)
 
 
 def _make_line_edit(before: Station, after: Station) -> SetStationLines | None:
@@ -233,7 +233,7 @@ def copy_verdict_to_original(
             "policy_hash": after.policy.hash,
         }
     )
-    insert_verdicts(session, after.dataset_id, [verdict], actor=actor, at=verdict.at)
+    insert_verdicts_and_end_work(session, after.dataset_id, [verdict], actor=actor, at=verdict.at)
     return verdict
 
 
@@ -261,7 +261,7 @@ def return_annotation(
         annotation = read_annotation(session, annotation_id)
         reopen_copy(session, annotation)
         copy = annotation.copy_id
-        log_return(
+        log_and_notify_return(
             session, KIND, copy, annotation.person, checked, actor=actor, batch=annotation.batch_id
         )
         back = disclose_annotation_in_session(session, read_annotation(session, annotation_id))
@@ -269,7 +269,7 @@ def return_annotation(
         return back
 
 
-def log_return(
+def log_and_notify_return(
     session: Session,
     kind: str,
     group_id: int,

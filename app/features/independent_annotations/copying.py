@@ -11,7 +11,7 @@ from app.db.log import LogEntry, list_group_entries
 from app.db.session import Session
 from app.features.datasets.queries import find_dataset, parse_stored_policy
 from app.features.datasets.service import insert_dataset, save_policy
-from app.features.groups.edit import SetPaint
+from app.features.groups.edit import SetPaintReadings
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
@@ -111,7 +111,9 @@ def _undo_entry(session: Session, entry: LogEntry, group: Group) -> Group:
     inverse = entry.body["inverse"]
     if inverse["edit"] == "set_paint":
         read = read_paint_readings(session, inverse["paint"].values())
-        return SetPaint({view: read[key] for view, key in inverse["paint"].items()}).apply(group)
+        return SetPaintReadings({view: read[key] for view, key in inverse["paint"].items()}).apply(
+            group
+        )
     return edit_from_json(inverse).apply(group)
 
 

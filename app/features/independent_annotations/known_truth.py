@@ -17,7 +17,7 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.agreement.queries import AGREED, DECIDED, read_group_states
+from app.features.agreement.queries import AGREED, DECIDED, read_agreement_states
 from app.features.datasets.service import dataset_id
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.submit import solve_and_store_group
@@ -192,7 +192,7 @@ def _iterate_version_truths(
     """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
     ids: dict[str, int] = {}
     for start in range(0, len(group_ids), BATCH):
-        states = read_group_states(session, group_ids[start : start + BATCH])
+        states = read_agreement_states(session, group_ids[start : start + BATCH])
         settled = [group for group, state in states.items() if state in (AGREED, DECIDED)]
         ids |= {one.group.key: group for group, one in read_groups(session, settled).items()}
     for row in read_rows(session, version.id, members=True):

@@ -183,7 +183,7 @@ def list_annotations_of_batch(
     return _fetch_annotations(session, statement.order_by(IndependentAnnotationModel.id))
 
 
-def count_groups_left(
+def count_begun_and_free_groups(
     session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
 ) -> tuple[int, int]:
     """How many independent annotations of a batch a person has begun, and of how many of its groups they may make one.

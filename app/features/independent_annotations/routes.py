@@ -214,7 +214,7 @@ def _begun_response(annotation: DisclosedAnnotation) -> Response:
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_begun_response)
-def begin(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotation:
+def begin_own_annotation(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return service.begin_annotation(store, group, person=actor)
 
@@ -257,7 +257,7 @@ def hand_in(
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def hand_back(
+def return_to_annotator(
     group: Id, store: AppStore, actor: Actor, why: ReturnReason | None = None
 ) -> service.DisclosedAnnotation:
     """Let the person of an annotation that was submitted go on with it, and tell them why."""
@@ -295,7 +295,7 @@ gold_router = APIRouter(tags=["independent annotations"], route_class=Route)
     responses=responses(404),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
+def get_gold_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     """The gold groups of a dataset, and what each person made of those that they were given."""
     return gold.read_gold_report(store, dataset)
 
@@ -308,7 +308,7 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
-def choose(
+def mark_known_truth_groups(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChoiceResult:
     """Make gold groups of those whose truth is known, also while batches are under way."""
@@ -325,7 +325,7 @@ def choose(
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def mark_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
     return gold.mark_gold_group(store, group, edit.start, actor=actor)
 
@@ -338,7 +338,7 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def change_gold_start(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.set_gold_start(store, group, edit.start, actor=actor)
 
@@ -351,6 +351,6 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def unmark_gold(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     return gold.unmark_gold_group(store, group, actor=actor)

@@ -82,7 +82,9 @@ def submit_copy(
     append_entries(session, [NewLogEntry(KIND, actor, at, body, stored.dataset_id, stored.id)])
 
 
-def record_copy_verdict(session: Session, copy_id: int, state: str, *, actor: str, at: str) -> None:
+def submit_copy_on_verdict(
+    session: Session, copy_id: int, state: str, *, actor: str, at: str
+) -> None:
     """A verdict on a copy submits it; on an ordinary group nothing comes of it.
 
     Raises:

@@ -56,10 +56,10 @@ from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import count_linked_admins, read_rules
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.solutions.service import list_stale_groups
-from app.features.what_if.service import examine_yields
+from app.features.what_if.service import examine_yield_cache
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
-from app.soccer.codec import hash_group_inputs, paint_to_json, station_digest, view_digest
+from app.soccer.codec import hash_group_inputs, paint_digests_to_json, station_digest, view_digest
 from app.wording import plural
 
 
@@ -118,7 +118,7 @@ def examine_database(store: Store) -> list[CheckResult]:
     """
     with store.read() as session:
         restore = get_session_dialect(session).restoring
-        checks = [_check_file(session, restore)]
+        checks = [_check_database_file(session, restore)]
         entries = find_newest_entry_id(session)
         try:
             logged = replay_log(session)
@@ -126,7 +126,7 @@ def examine_database(store: Store) -> list[CheckResult]:
             checks.append(CheckResult("log", False, error.message, error.hint or restore))
         else:
             checks.append(CheckResult("log", True, f"{entries:,} entries, each as it was written"))
-            checks.append(_check_texts(session))
+            checks.append(_check_null_characters(session))
             checks += _check_tables_against_log(session, logged, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed_records(session, restore)
@@ -135,7 +135,7 @@ def examine_database(store: Store) -> list[CheckResult]:
     return [*checks, *_check_solutions(store)]
 
 
-def _check_file(session: Session, restore: str) -> CheckResult:
+def _check_database_file(session: Session, restore: str) -> CheckResult:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
     dialect = get_session_dialect(session)
     faults, lost = dialect.find_file_faults(session), dialect.count_lost_references(session)
@@ -146,7 +146,7 @@ def _check_file(session: Session, restore: str) -> CheckResult:
     return CheckResult("file", True, dialect.no_fault)
 
 
-def _check_texts(session: Session) -> CheckResult:
+def _check_null_characters(session: Session) -> CheckResult:
     """Texts from before U+0000 was refused: no fault here, and nothing that PostgreSQL can keep."""
     found = find_null_characters(session)
     if not found:
@@ -189,7 +189,7 @@ def _check_digests(session: Session) -> CheckResult:
     for group in iterate_groups(session):
         count += 1
         views = {view.key: view_digest(view) for view in group.group.views}
-        hashed = hash_group_inputs(group.group, paint_to_json(group.group.paint))
+        hashed = hash_group_inputs(group.group, paint_digests_to_json(group.group.paint))
         present = {key: digest for key, (digest, _) in group.view_digests.items()}
         if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
@@ -230,12 +230,12 @@ _NO_CONTENT = '"touchline-asks-for-no-content"'
 """What no store calls any content."""
 
 
-def examine_stores(settings: Settings) -> list[CheckResult]:
+def examine_object_stores(settings: Settings) -> list[CheckResult]:
     """Ask every configured store for what the service needs of it."""
-    return [_check_store(settings, name) for name in sorted(settings.stores)]
+    return [_check_object_store(settings, name) for name in sorted(settings.stores)]
 
 
-def _check_store(settings: Settings, name: str) -> CheckResult:
+def _check_object_store(settings: Settings, name: str) -> CheckResult:
     title, done = f"store {name}", list[str]()
     try:
         store = open_store(settings, name)
@@ -290,7 +290,7 @@ def examine_home(settings: Settings) -> list[CheckResult]:
     return [
         *(examine(settings) for examine in examined),
         _check_library_versions(),
-        *examine_stores(settings),
+        *examine_object_stores(settings),
     ]
 
 
@@ -302,9 +302,9 @@ def examine_surroundings(store: Store) -> list[CheckResult]:
             *([admins] if admins else []),
             _check_clock(session),
             _check_leftovers(settings),
-            _check_calibrations(session),
-            _check_uploads(session, settings),
-            _check_recordings(session, settings),
+            _check_unused_calibrations(session),
+            _check_unused_uploads(session, settings),
+            _check_unused_frame_files(session, settings),
         ]
 
 
@@ -444,20 +444,20 @@ def _check_leftovers(settings: Settings) -> CheckResult:
     return CheckResult("leftovers", True, "none")
 
 
-def _check_calibrations(session: Session) -> CheckResult:
+def _check_unused_calibrations(session: Session) -> CheckResult:
     count = len(list_unused_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
     return CheckResult("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
-def _check_uploads(session: Session, settings: Settings) -> CheckResult:
+def _check_unused_uploads(session: Session, settings: Settings) -> CheckResult:
     found = list_unused_uploads(session, settings)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return CheckResult("uploads", True, sentence, mend)
 
 
-def _check_recordings(session: Session, settings: Settings) -> CheckResult:
+def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResult:
     found = list_unused_frame_files(session, settings)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
     mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
@@ -467,7 +467,7 @@ def _check_recordings(session: Session, settings: Settings) -> CheckResult:
 def examine_everything(settings: Settings) -> list[CheckResult]:
     """Look at everything; where the database cannot be opened, say why, and what lies around it."""
     make_home(settings)
-    checks = [*examine_home(settings), examine_yields(settings)]
+    checks = [*examine_home(settings), examine_yield_cache(settings)]
     try:
         with closing(Store.open(settings)) as store:
             checks += [*examine_surroundings(store), *examine_database(store)]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from app.terminal.options import Json, read_settings
-from app.terminal.server import open_store, require_home
+from app.terminal.server import open_store, require_no_server
 from app.terminal.terminal import print_json, say
 from app.wording import plural
 
@@ -32,7 +32,7 @@ def doctor(
     if rebuild:
         with hold_server_lock(settings), open_store(settings) as store:
             rebuild_tables(store)
-    require_home()
+    require_no_server()
     checks = examine_everything(settings)
     if json_:
         print_json([vars(check) for check in checks])

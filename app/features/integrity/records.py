@@ -9,7 +9,7 @@ from typing import Any
 
 from app.db.check import CheckResult, compare_with_log, summarize_faulty_records
 from app.db.dialects.dialect import get_session_dialect
-from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
+from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.log import LogEntry, iterate_entries_of_kinds
 from app.db.session import Session
 from app.db.store import Store
@@ -41,11 +41,11 @@ from app.features.versions.frozen_queries import (
 )
 from app.features.versions.queries import VersionRow, iterate_annotation_rows, list_all_versions
 from app.features.versions.service import collect_calibration_keys, hash_version
-from app.soccer.codec import hash_group_inputs, paint_to_json, policy_from_json
+from app.soccer.codec import hash_group_inputs, paint_digests_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
-from app.solving.calibrate import compute_view_keys
+from app.solving.calibrate import compute_view_calibration_keys
 from app.solving.facts import facts_from_bytes
 
 DATASET, DELETED = "dataset", "dataset_deleted"
@@ -88,7 +88,7 @@ def examine_people(session: Session, restore: str) -> list[CheckResult]:
     parts = {"accounts": "accounts", "roles": "roles in datasets", "shown": "adopted names"}
     return [
         compare_with_log(
-            words, getattr(logged, name), getattr(present, name), restore, _record_name
+            words, getattr(logged, name), getattr(present, name), restore, _format_people_key
         )
         for name, words in parts.items()
     ]
@@ -180,7 +180,7 @@ _STEPS: Mapping[str, Callable[[PeopleSnapshot, LogEntry, str], None]] = {
 """What of the words about people changes who there is, and as what."""
 
 
-def _record_name(key: str | tuple[str, int]) -> str:
+def _format_people_key(key: str | tuple[str, int]) -> str:
     return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
 
 
@@ -254,7 +254,8 @@ def _read_undamaged_groups(session: Session, ids: Sequence[int]) -> dict[int, Gr
     return {
         key: item.group
         for key, item in found.items()
-        if item.inputs_hash == hash_group_inputs(item.group, paint_to_json(item.group.paint))
+        if item.inputs_hash
+        == hash_group_inputs(item.group, paint_digests_to_json(item.group.paint))
     }
 
 
@@ -274,7 +275,7 @@ def _is_solution_of_group(group: Group, solution: Solution, policy: Policy) -> b
     if [view.key for view in group.views] != [view.view for view in solution.views]:
         return False
     return all(
-        solved.calibration_key in compute_view_keys(group, view, policy.calibration)
+        solved.calibration_key in compute_view_calibration_keys(group, view, policy.calibration)
         for view, solved in zip(group.views, solution.views, strict=True)
     )
 
@@ -311,7 +312,7 @@ def examine_versions(store: Store) -> list[CheckResult]:
 def _find_differing_versions(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
-        with report_damaged_values():
+        with translate_shape_errors_to_damage():
             logged = _read_logged_freezes(session)
     except StorageError:
         # Nothing follows from a log that cannot be read, which is named by itself.
@@ -357,7 +358,7 @@ def _find_version_fault(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
     rows = [item._asdict() for item in iterate_annotation_rows(session, row.id)]
     try:
-        with report_damaged_values():
+        with translate_shape_errors_to_damage():
             counts, policy = (
                 parse_json_column(row.counts),
                 policy_from_json(parse_json_column(row.policy)),
@@ -407,7 +408,7 @@ def _find_referenced_keys(key: str, body: bytes | None) -> set[str]:
     """
     if body is None:
         return set()
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         if not key.startswith((SAID, SOLUTION)):
             decompress_json(body)
         if compute_content_key(key, body) != key:

@@ -34,13 +34,13 @@ from app.db.dialects.dialect import (
     get_dialect,
     get_session_dialect,
     make_engine,
-    report_storage_errors,
+    translate_storage_errors,
 )
 from app.db.home import create_private_file
 from app.db.locks import hold_exclusive_database_lock, hold_server_lock
 from app.db.log import verify_chain
 from app.db.migrate import UNFINISHED, apply_missing_migrations, read_schema_revision
-from app.db.recovery.anchor import read_anchor_of_database
+from app.db.recovery.anchor import compute_anchor_from_database
 from app.db.session import Session
 from app.db.store import Store
 from app.durable import read_private_file
@@ -217,7 +217,7 @@ def transfer_database(
             create_private_file(target.database_file)
         engine = make_engine(target)
         held.callback(engine.dispose)
-        held.enter_context(report_storage_errors(target))
+        held.enter_context(translate_storage_errors(target))
         # Before the source is read: what goes wrong in there is told as the source's.
         dialect.require_supported_configuration(engine)
         with store.read() as session:
@@ -243,7 +243,7 @@ def _copy_all_tables(
     yields: Path,
     tell: Callable[[str, int], None],
 ) -> TransferResult:
-    anchor = read_anchor_of_database(session)
+    anchor = compute_anchor_from_database(session)
     if anchor is None:
         raise InputError(
             "the source database has no complete Touchline schema",
@@ -255,7 +255,7 @@ def _copy_all_tables(
         copied += _copy_tables(session, target, tables, tell)
     with Session(target) as copy:
         rows = _require_equal_rows(session, copy)
-        entries = _require_same_chain(copy, anchor.entries, anchor.hash)
+        entries = _require_same_log_chain(copy, anchor.entries, anchor.hash)
         dialect.settle(copy, _tables_to_copy(), anchor.installation)
         # Their marks are those of the changes of another database.
         shutil.rmtree(yields, ignore_errors=True)
@@ -365,7 +365,7 @@ def _digest_rows(connection: Connection, table: Table) -> tuple[int, str]:
     return count, digest.hexdigest()
 
 
-def _require_same_chain(session: Session, entries: int, last: str) -> int:
+def _require_same_log_chain(session: Session, entries: int, last: str) -> int:
     count = verify_chain(session)
     found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
     if count != entries or (found.scalar() or "") != last:

@@ -62,7 +62,7 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def report_counts_in_words(progress: JobProgress, what: str) -> ReportProgress:
+def make_counts_reporter(progress: JobProgress, what: str) -> ReportProgress:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
 
     Where the work says a sentence, it is that one.

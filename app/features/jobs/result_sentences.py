@@ -136,7 +136,7 @@ def _describe_instants(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
-def _describe_ball_search(result: Json) -> str:
+def _describe_ball_tracking(result: Json) -> str:
     there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
     count = len(result["without"])
     without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
@@ -174,7 +174,7 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "pictures": _describe_picture_estimates,
     "recording": _describe_recording_index,
     "instants": _describe_instants,
-    "ball": _describe_ball_search,
+    "ball": _describe_ball_tracking,
     "track": _describe_camera_tracking,
     "link": _describe_link,
 }

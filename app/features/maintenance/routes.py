@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
 from app.features.maintenance.service import LONGEST, Banner, clear_banner, set_banner
-from app.features.queue.changes import read_position
+from app.features.queue.changes import read_newest_entry_id
 from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedProcessMetrics
 from app.http.permissions import Action, may, open_to_all
@@ -97,7 +97,7 @@ async def get_health(request: Request) -> Health:
 def get_readiness(store: AppStore) -> Readiness:
     """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
     store.require_undamaged()
-    read_position(store)
+    read_newest_entry_id(store)
     try:
         store.require_writable()
     except BusyError:

@@ -16,7 +16,7 @@ from app.config import Settings
 from app.db.home import delete_leftovers
 from app.db.idempotency import delete_old_responses, delete_oldest_response_bodies
 from app.db.log import find_newest_entry_id
-from app.db.recovery.anchor import sync_anchor
+from app.db.recovery.anchor import flush_anchor_to_disk
 from app.db.recovery.preopen_check import find_write_ahead_log_file
 from app.db.session import format_utc_time
 from app.db.store import Store
@@ -27,8 +27,8 @@ from app.features.exports.jobs import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
 from app.features.jobs.queries import count_jobs, delete_old_jobs
 from app.features.jobs.service import Jobs
-from app.features.queue.queries import count_groups_to_solve
-from app.features.webhooks.queries import forget_deliveries, has_old_deliveries
+from app.features.queue.queries import read_solving_backlog
+from app.features.webhooks.queries import delete_finished_deliveries, has_finished_deliveries
 
 log = structlog.get_logger("touchline.upkeep")
 
@@ -82,7 +82,7 @@ def clean_up(store: Store, wanted: Callable[[], bool] = lambda: True) -> Cleanup
         "deliveries": lambda: delete_old_deliveries(store),
     }
     gone = {name: _run_step(name, step) or 0 for name, step in steps.items() if wanted()}
-    _run_step("anchor", lambda: sync_anchor(settings.database_file))
+    _run_step("anchor", lambda: flush_anchor_to_disk(settings.database_file))
     return CleanupCounts(**gone)
 
 
@@ -116,10 +116,10 @@ def delete_old_deliveries(store: Store, at: datetime | None = None) -> int:
     before = (at or datetime.now(UTC)) - DELIVERIES_KEPT
     text = format_utc_time(before)
     with store.read() as session:
-        if not has_old_deliveries(session, text):
+        if not has_finished_deliveries(session, text):
             return 0
     with store.write() as session:
-        return forget_deliveries(session, text)
+        return delete_finished_deliveries(session, text)
 
 
 class UpkeepScheduler:
@@ -205,7 +205,7 @@ def read_home_report(store: Store) -> HomeReport:
         StorageError: The database does not answer.
     """
     with store.read() as session:
-        groups, unsolved, oldest = count_groups_to_solve(session)
+        groups, unsolved, oldest = read_solving_backlog(session)
         entries, jobs = find_newest_entry_id(session), count_jobs(session)
     settings = store.settings
     free = shutil.disk_usage(settings.home).free

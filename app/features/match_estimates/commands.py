@@ -16,7 +16,7 @@ from app.terminal.terminal import print_json, print_rows, print_values, say
 from app.wording import plural
 
 if TYPE_CHECKING:
-    from app.features.match_estimates.pictures import PictureState
+    from app.features.match_estimates.pictures import MatchPictureState
     from app.features.pitches.service import DatasetPitches, PitchState
 from enum import StrEnum
 
@@ -169,9 +169,9 @@ def picture(
     if source is not None:
         if accept or as_taken or match:
             raise typer.BadParameter("--accept, --as-taken and --match are for datasets")
-        from app.features.file_tools.matches import estimate_picture_of_files
+        from app.features.file_tools.matches import estimate_picture_geometry_of_files
 
-        print_values(estimate_picture_of_files(source, size=size), json_)
+        print_values(estimate_picture_geometry_of_files(source, size=size), json_)
         return
     if accept and as_taken:
         raise typer.BadParameter("--accept and --as-taken contradict each other")
@@ -214,13 +214,13 @@ def _estimate_pictures_of_dataset(
         say(f"{plural(changed, 'view')} changed; run touchline solve --dataset {dataset}")
 
 
-def _describe_picture(state: PictureState) -> str:
+def _describe_picture(state: MatchPictureState) -> str:
     if state.estimate is None:
         return state.sentence
     return f"{state.sentence}; {'use it with --accept' if state.proposed else 'nothing to change'}"
 
 
-def _picture_to_json(state: PictureState) -> dict[str, Any]:
+def _picture_to_json(state: MatchPictureState) -> dict[str, Any]:
     from dataclasses import asdict
 
     values = asdict(state)
@@ -306,7 +306,7 @@ def noise(
     json_: Json = False,
 ) -> None:
     """Estimate how noisy a dataset's balls and lines are, from what its views disagree about."""
-    from app.features.policies.noise import apply_noise, read_noise, reset_noise_factors
+    from app.features.policies.noise import adopt_estimated_noise, read_noise, reset_noise_factors
 
     if apply and alike:
         raise typer.BadParameter("--apply and --alike contradict each other")
@@ -315,7 +315,9 @@ def noise(
             with store.write() as session:
                 reset_noise_factors(session, dataset, actor=get_current_actor())
         found = read_noise(store, dataset)
-        policy = apply_noise(store, found, actor=get_current_actor()).policy if apply else None
+        policy = (
+            adopt_estimated_noise(store, found, actor=get_current_actor()).policy if apply else None
+        )
     if json_:
         applied = None if policy is None else {"name": policy.name, "hash": policy.hash}
         advice = [{**asdict(item), "agrees": item.agrees} for item in found.advice]

@@ -21,7 +21,7 @@ from app.features.datasets.service import (
     get_dataset_head,
     require_dataset_with_matches,
 )
-from app.features.jobs.job_run import JobProgress, Work, report_counts_in_words
+from app.features.jobs.job_run import JobProgress, Work, make_counts_reporter
 from app.features.jobs.queries import Job
 from app.features.jobs.records import require_job
 from app.features.jobs.service import Jobs
@@ -38,8 +38,8 @@ from app.features.match_estimates.rig import (
     rig_proposal_to_json,
     undo_accepted_rig,
 )
-from app.features.solve.jobs import change_and_return_job, request_solve_job
-from app.soccer.codec import picture_to_json
+from app.features.solve.jobs import change_and_return_solve_job, request_solve_job
+from app.soccer.codec import picture_geometry_to_json
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class MatchJob:
             # Whoever is at it waits for this transaction, and asks in the next whether to go on.
             jobs.cancel_on_commit(session, ended)
 
-        job = change_and_return_job(jobs, store, number, undo_in_session, actor=actor)
+        job = change_and_return_solve_job(jobs, store, number, undo_in_session, actor=actor)
         jobs.cancel_each(ended)
         return job
 
@@ -198,7 +198,7 @@ class MatchJob:
 
 def _estimate_pictures(call: MatchJobContext, progress: JobProgress) -> Json:
     with call.jobs.pool() as executor:
-        counter = report_counts_in_words(progress, "matches")
+        counter = make_counts_reporter(progress, "matches")
         found = estimate_picture_geometries(
             call.store, call.dataset_id, executor, counter, call.matches
         )
@@ -209,8 +209,8 @@ def _estimate_pictures(call: MatchJobContext, progress: JobProgress) -> Json:
                 "frames": item.frames,
                 "estimate": None
                 if item.estimate is None
-                else picture_to_json(item.estimate.picture),
-                "proposed": picture_to_json(item.proposed),
+                else picture_geometry_to_json(item.estimate.picture),
+                "proposed": picture_geometry_to_json(item.proposed),
                 "sentence": item.sentence,
             }
             for item in found
@@ -230,7 +230,7 @@ def _share_positions(call: MatchJobContext, progress: JobProgress) -> Json:
                 call.matches,
                 actor=call.job.actor,
                 executor=executor,
-                progress=report_counts_in_words(progress, "matches"),
+                progress=make_counts_reporter(progress, "matches"),
                 require_wanted=progress.require_not_cancelled,
             )
     finally:

@@ -20,7 +20,7 @@ from app.features.datasets.service import (
     require_dataset_id,
     require_dataset_with_matches,
 )
-from app.features.groups.edit import SetPicture
+from app.features.groups.edit import SetPictureGeometry
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.match_estimates.queries import MatchPictures, read_match_pictures
@@ -29,14 +29,14 @@ from app.progress import ReportProgress
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
-from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
+from app.solving.match_picture import PictureEstimate, PictureFrameLines, estimate_match_picture
 from app.workers.executors import run_tasks
 
 _BATCH = 100
 
 
 @dataclass(frozen=True)
-class PictureState:
+class MatchPictureState:
     """The main cameras' pictures of one match.
 
     Attributes:
@@ -75,7 +75,7 @@ class PictureState:
 @dataclass(frozen=True)
 class _PictureGeometryTask:
     match: str
-    frames: tuple[PictureFrame, ...]
+    frames: tuple[PictureFrameLines, ...]
     used: tuple[PictureGeometry | None, ...]
     policy: CalibrationPolicy
 
@@ -96,7 +96,7 @@ def estimate_picture_geometries(
     executor: Executor | None = None,
     progress: ReportProgress | None = None,
     only: Collection[str] | None = None,
-) -> list[PictureState]:
+) -> list[MatchPictureState]:
     """What the lines of each match's main cameras say of their pictures; saves nothing.
 
     Args:
@@ -123,7 +123,7 @@ def estimate_picture_geometries(
 
 
 def choose_requested_geometries(
-    chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
+    chosen: Iterable[MatchPictureState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
     """What somebody wants the pictures of matches to be, by match.
 
@@ -173,10 +173,10 @@ def _set_picture_of_groups(
     picture: PictureGeometry | None,
     actor: str,
 ) -> int:
-    def make_picture_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPicture]:
+    def make_picture_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPictureGeometry]:
         views = {number: _find_main_camera_view(stored.group) for number, stored in some.items()}
         return {
-            number: SetPicture(view.key, picture)
+            number: SetPictureGeometry(view.key, picture)
             for number, view in views.items()
             if view is not None
         }
@@ -197,7 +197,7 @@ def _make_task(
     store: Store, dataset_id: int, match: str, policy: CalibrationPolicy
 ) -> _PictureGeometryTask:
     seen = list(_iterate_main_camera_views(store, dataset_id, match))
-    frames = tuple(PictureFrame(view.station.lines, view.size, at.pitch) for at, view in seen)
+    frames = tuple(PictureFrameLines(view.station.lines, view.size, at.pitch) for at, view in seen)
     return _PictureGeometryTask(
         match, frames, tuple(view.station.picture for _, view in seen), policy
     )
@@ -216,11 +216,11 @@ def _iterate_main_camera_views(
                     yield stored.group, view
 
 
-def _run_picture_task(task: _PictureGeometryTask) -> PictureState:
+def _run_picture_task(task: _PictureGeometryTask) -> MatchPictureState:
     """Of one match; runs in a worker."""
     used = max(set(task.used), key=task.used.count) if task.used else None
     try:
         found = estimate_match_picture(task.frames, task.policy)
     except GeometryError as error:
-        return PictureState(task.match, len(task.frames), used, None, error.message)
-    return PictureState(task.match, len(task.frames), used, found, None)
+        return MatchPictureState(task.match, len(task.frames), used, None, error.message)
+    return MatchPictureState(task.match, len(task.frames), used, found, None)

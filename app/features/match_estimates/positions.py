@@ -18,7 +18,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.groups.edit import Edit, SetPositions
+from app.features.groups.edit import Edit, SetCameraPositions
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
@@ -38,7 +38,12 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, compute_calibration_key
-from app.solving.match_position import FramePlace, FramePlaces, find_camera_place, find_pan
+from app.solving.match_position import (
+    FrameCameraPlace,
+    FrameCameraPlaces,
+    find_camera_place,
+    find_pan,
+)
 from app.workers.executors import run_tasks
 
 _BATCH = 100
@@ -84,7 +89,7 @@ class DatasetPositions:
 
 
 @dataclass(frozen=True)
-class _MainPicture:
+class _MainCameraPicture:
     """The main camera of a group, and its calibration by its lines alone, where that is known."""
 
     group_id: int
@@ -98,7 +103,7 @@ class _MainPicture:
 class _PositionTask:
     match: str
     inputs: str
-    pictures: tuple[_MainPicture, ...]
+    pictures: tuple[_MainCameraPicture, ...]
     policy: CalibrationPolicy
 
 
@@ -147,7 +152,7 @@ def share_positions(
     for done, (task, positions) in enumerate(
         run_tasks(_run_position_task, tasks, executor), start=1
     ):
-        edits = {group: SetPositions(at) for group, at in positions.items()}
+        edits = {group: SetCameraPositions(at) for group, at in positions.items()}
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
@@ -321,7 +326,7 @@ def _make_task(
     store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy
 ) -> _PositionTask:
     item, inputs = chosen
-    pictures: list[_MainPicture] = []
+    pictures: list[_MainCameraPicture] = []
     with store.read() as session:
         for start in range(0, len(item.groups), _BATCH):
             stored = read_groups(session, item.groups[start : start + _BATCH], extras=False)
@@ -331,15 +336,17 @@ def _make_task(
             }
             known = read_calibrations(session, keys.values())
             pictures += (
-                _make_main_picture(number, it.group, known.get(keys[number]))
+                _make_main_camera_picture(number, it.group, known.get(keys[number]))
                 for number, it in stored.items()
             )
     return _PositionTask(item.match, inputs, tuple(pictures), policy)
 
 
-def _make_main_picture(group_id: int, group: Group, alone: Calibration | None) -> _MainPicture:
+def _make_main_camera_picture(
+    group_id: int, group: Group, alone: Calibration | None
+) -> _MainCameraPicture:
     view = group.views[0]
-    return _MainPicture(group_id, view.key, view.station, group.pitch, alone)
+    return _MainCameraPicture(group_id, view.key, view.station, group.pitch, alone)
 
 
 def _run_position_task(
@@ -348,7 +355,7 @@ def _run_position_task(
     """Positions by group and view; runs in a worker."""
     found = list(_calibrate_pictures_alone(task))
     places = [place for _, _, place in found if place is not None]
-    every, row = FramePlaces(places), iter(range(len(places)))
+    every, row = FrameCameraPlaces(places), iter(range(len(places)))
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without_frame(next(row))
@@ -366,7 +373,7 @@ def _run_position_task(
 
 def _calibrate_pictures_alone(
     task: _PositionTask,
-) -> Iterator[tuple[_MainPicture, Calibration | None, FramePlace | None]]:
+) -> Iterator[tuple[_MainCameraPicture, Calibration | None, FrameCameraPlace | None]]:
     """Pictures, calibrated; None where solving would take no position from others."""
     for picture in task.pictures:
         station = picture.station

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import func, select, update
 
-from app.db.json_columns import Json, parse_json_column, report_damaged_values
+from app.db.json_columns import Json, parse_json_column, translate_shape_errors_to_damage
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.json_text import canonical_json_text
-from app.soccer.codec import digest_json, picture_from_json, positions_from_json
+from app.soccer.codec import digest_json, picture_geometry_from_json, positions_from_json
 from app.soccer.group import SharedPosition
 from app.soccer.picture import PictureGeometry
 
@@ -50,7 +50,7 @@ def noise_factors_from_text(text: str | None) -> Factors:
     """The factors that a dataset's row holds."""
     if text is None:
         return ()
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return tuple(NoiseFactor(*row) for row in parse_json_column(text))
 
 
@@ -124,8 +124,8 @@ def read_match_pictures(session: Session, dataset_id: int) -> list[MatchPictures
 def _picture_from_text(text: str | None) -> PictureGeometry | None:
     if text is None:
         return None
-    with report_damaged_values():
-        return picture_from_json(parse_json_column(text))
+    with translate_shape_errors_to_damage():
+        return picture_geometry_from_json(parse_json_column(text))
 
 
 POSITION = "position"
@@ -186,7 +186,7 @@ def read_match_positions(session: Session, dataset_id: int) -> list[MatchPositio
 
 def parse_positions_column(text: str) -> Mapping[str, SharedPosition]:
     """The positions of a group from their column."""
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return positions_from_json(parse_json_column(text))
 
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.db.session import Session
-from app.features.groups.schemas import PictureEdit
+from app.features.groups.schemas import PictureGeometryEdit
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, undo_rig_adjustment
@@ -16,9 +16,9 @@ from app.features.match_estimates.pictures import read_picture_geometries, set_p
 from app.features.match_estimates.positions import PositionState, get_positions
 from app.features.match_estimates.queries import MatchPictures
 from app.features.policies import noise as noises
-from app.features.policies.noise import Advice
+from app.features.policies.noise import ThresholdAdvice
 from app.features.policies.service import read_policy
-from app.features.solve.jobs import change_and_return_job
+from app.features.solve.jobs import change_and_return_solve_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.documents import Document, ListDocument, make_document_response, respond_with
@@ -61,7 +61,9 @@ class MatchPictureChange(BaseModel):
     )
 
     match: str = Field(min_length=1, max_length=1000)
-    picture: PictureEdit | None = Field(description="As proposed; null: as they were taken.")
+    picture: PictureGeometryEdit | None = Field(
+        description="As proposed; null: as they were taken."
+    )
 
 
 class SharedPositionsDocument(ListDocument[PositionState]):
@@ -108,7 +110,7 @@ class BallNoiseDocument(Document):
     )
 
 
-class SourceNoiseDocument(Document):
+class CameraOrPersonNoiseDocument(Document):
     """Noise of the balls of a static camera or of a person, drawn towards the dataset's."""
 
     source: str = Field(description="Key of the station, or name of the person.")
@@ -120,14 +122,14 @@ class SourceNoiseDocument(Document):
     differs: bool = Field(description="The interval leaves out the dataset's sigma.")
 
 
-class AdviceDocument(Document, shows=Advice):
+class ThresholdAdviceDocument(Document, shows=ThresholdAdvice):
     """A threshold of the policy and what the dataset says of it."""
 
     present: float | None = Field(description="Null: the policy leaves it to each image.")
     agrees: bool = Field(description="The interval holds the present value.")
 
 
-class FactorDocument(Document):
+class NoiseFactorDocument(Document):
     """How noisy balls of a camera that a person places are beside the dataset's."""
 
     camera: str | None = Field(description="Key of a static camera; null: any other.")
@@ -141,22 +143,22 @@ class NoiseDocument(Document):
     groups: int = Field(description="Groups that were looked at.")
     solved: int = Field(description="Groups with a solution.")
     ball: BallNoiseDocument
-    stations: list[SourceNoiseDocument] = Field(
+    stations: list[CameraOrPersonNoiseDocument] = Field(
         description="Static cameras of which enough is seen, the noisiest first."
     )
-    people: list[SourceNoiseDocument] = Field(
+    people: list[CameraOrPersonNoiseDocument] = Field(
         description="The same for the people who placed the balls last."
     )
-    factors: list[FactorDocument] = Field(
+    factors: list[NoiseFactorDocument] = Field(
         description="Of cameras and people together; empty where all may be like the dataset."
     )
-    used: list[FactorDocument] = Field(description="Those that sigma uses now.")
+    used: list[NoiseFactorDocument] = Field(description="Those that sigma uses now.")
     is_new: bool = Field(description="`factors` say something else than `used`.")
     line_estimate: LineEstimate | None = Field(description="Null where no lines make a camera.")
     follows: bool = Field(
         description="The policy uses the estimates: each solve of the dataset sets them."
     )
-    advice: list[AdviceDocument]
+    advice: list[ThresholdAdviceDocument]
     values: dict[str, float] = Field(
         description="To be sent to the policy; empty where it agrees already."
     )
@@ -238,7 +240,7 @@ def _make_take_back_response(count: int) -> Response:
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_take_back_response)
-def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
+def take_rig_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
     return undo_rig_adjustment(services.jobs, services.store, dataset, actor=actor)
 
@@ -269,10 +271,12 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     found, store = services.noises.read(dataset), services.store
     state = read_policy(store, found.dataset_id)
 
-    def reset_noise(session: Session) -> None:
-        noises.accept_noise(session, found, state, actor)
+    def apply_noise_estimates(session: Session) -> None:
+        noises.adopt_estimated_noise_in_session(session, found, state, actor)
 
-    return change_and_return_job(services.jobs, store, found.dataset_id, reset_noise, actor=actor)
+    return change_and_return_solve_job(
+        services.jobs, store, found.dataset_id, apply_noise_estimates, actor=actor
+    )
 
 
 @noise_router.delete("", operation_id="revertNoise", **describe_job_response_for_openapi(404))
@@ -285,10 +289,12 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
     The policy stays as it is.
     """
 
-    def reset_noise(session: Session) -> None:
+    def apply_noise_estimates(session: Session) -> None:
         noises.reset_noise_factors(session, dataset, actor=actor)
 
-    return change_and_return_job(services.jobs, services.store, dataset, reset_noise, actor=actor)
+    return change_and_return_solve_job(
+        services.jobs, services.store, dataset, apply_noise_estimates, actor=actor
+    )
 
 
 @pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
@@ -332,6 +338,6 @@ def set_match_picture(
     def apply_picture_change(session: Session) -> None:
         set_picture_geometries(session, dataset, {change.match: picture}, actor=actor)
 
-    return change_and_return_job(
+    return change_and_return_solve_job(
         services.jobs, services.store, dataset, apply_picture_change, actor=actor
     )

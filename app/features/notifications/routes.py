@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.notifications import service as bell
 from app.features.notifications.queries import Notification
-from app.features.notifications.service import NotificationState
+from app.features.notifications.service import NotificationPage
 from app.features.people.session_routes import Me
 from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
@@ -70,6 +70,6 @@ def get_notifications(
 @respond_with(make_document_responder(NotificationsDocument.model_validate))
 def mark_notifications_read(
     body: SeenNotifications, store: AppStore, _team: AppTeam, me: Me
-) -> NotificationState:
+) -> NotificationPage:
     """One has seen some of it, or all."""
     return bell.mark_as_read(store, me, body.ids)

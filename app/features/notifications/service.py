@@ -27,7 +27,7 @@ KEPT_DAYS = 90
 
 
 @dataclass(frozen=True)
-class NotificationState:
+class NotificationPage:
     """What a person was told, the newest first, and how much of all of it they have not seen."""
 
     items: list[Notification]
@@ -80,13 +80,13 @@ def notify_person(
 
 def read_notifications(
     store: Store, login: Login, limit: int = 50, before: int | None = None
-) -> NotificationState:
+) -> NotificationPage:
     """What somebody was told in the last 90 days, of what they see at this moment."""
     with store.read() as session:
         return _read_state(session, login, limit, before)
 
 
-def mark_as_read(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationState:
+def mark_as_read(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationPage:
     """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
         mark_read(session, login.person_id, login.visibility, ids, now())
@@ -97,9 +97,9 @@ def mark_as_read(store: Store, login: Login, ids: Sequence[int] | None = None) -
 
 def _read_state(
     session: Session, login: Login, limit: int = 50, before: int | None = None
-) -> NotificationState:
+) -> NotificationPage:
     mine = (login.person_id, login.visibility, _oldest_shown_time())
-    return NotificationState(
+    return NotificationPage(
         select_notifications(session, *mine, limit, before), count_unread(session, *mine)
     )
 

@@ -30,7 +30,7 @@ Tripod = Annotated[
 ]
 
 
-class PitchReference(StrEnum):
+class TrackPitchChoice(StrEnum):
     """Of which pitch the cameras of a clip are."""
 
     PLAN = "plan"
@@ -62,7 +62,11 @@ def paint(
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
     from app.features.datasets.service import filter_by_match
-    from app.features.paint.service import get_paint, read_paint, undo_paint_reading
+    from app.features.paint.service import (
+        read_paint_of_pictures,
+        summarize_paint_readings,
+        undo_paint_reading,
+    )
 
     if show and undo:
         raise typer.BadParameter("show what was read or take it back, one at a time")
@@ -71,10 +75,10 @@ def paint(
             with store.write() as session:
                 undo_paint_reading(session, dataset, actor=get_current_actor())
         if undo or show:
-            found = get_paint(store, dataset)
+            found = summarize_paint_readings(store, dataset)
         else:
             with show_progress("Reading paint") as progress:
-                found = read_paint(
+                found = read_paint_of_pictures(
                     store,
                     dataset,
                     None if match is None else [match],
@@ -204,7 +208,11 @@ def propose(
 def _propose_for_views(
     dataset: str, match: str | None, show: bool, undo: bool, workers: int | None, json_: bool
 ) -> None:
-    from app.features.paint.proposals import forget_proposals, get_proposals, propose_views
+    from app.features.paint.proposals import (
+        forget_proposals,
+        get_proposal_counts,
+        propose_cameras_for_views,
+    )
 
     matches = None if match is None else [match]
     with open_store() as store:
@@ -214,7 +222,7 @@ def _propose_for_views(
             print_values({"forgotten": forget_proposals(store, dataset)}, json_)
             return
         if show:
-            items = [asdict(item) for item in get_proposals(store, dataset, matches).items]
+            items = [asdict(item) for item in get_proposal_counts(store, dataset, matches).items]
             if json_:
                 print_json(items)
                 return
@@ -227,7 +235,9 @@ def _propose_for_views(
                 say(f"{name}{sentence}, {item['accepted']} accepted")
             return
         with show_progress("Proposing") as progress:
-            run = propose_views(store, dataset, matches, workers=workers, progress=progress)
+            run = propose_cameras_for_views(
+                store, dataset, matches, workers=workers, progress=progress
+            )
     print_values(asdict(run), json_)
 
 
@@ -239,7 +249,7 @@ def _propose_for_files(
     tripod: str | None,
     json_: bool,
 ) -> None:
-    from app.features.file_tools.propose import count_proposals, propose_cameras_of_files
+    from app.features.file_tools.propose import count_proposal_outcomes, propose_cameras_of_files
 
     wanted = None if size == "native" else parse_size(size)
     with show_progress("Proposing") as progress:
@@ -252,7 +262,7 @@ def _propose_for_files(
     for row in rows:
         if row["reason"]:
             say(f"{row['frame']}: {row['outcome']}; {row['reason']}")
-    print_values(count_proposals(rows), False)
+    print_values(count_proposal_outcomes(rows), False)
 
 
 @commands.command()
@@ -270,12 +280,12 @@ def track(
         ),
     ] = None,
     pitch: Annotated[
-        PitchReference,
+        TrackPitchChoice,
         typer.Option(
             help="plan: cameras lay the markings of 105 x 68 m on the paint; shown: they are those "
             "of the pitch that the clip shows, of its own length, width and crown (track.json)."
         ),
-    ] = PitchReference.PLAN,
+    ] = TrackPitchChoice.PLAN,
     turn: Annotated[
         bool,
         typer.Option(
@@ -293,7 +303,7 @@ def track(
     from app.features.file_tools.track import count_outcomes, track_cameras_of_clip
 
     with show_progress("Tracking") as progress:
-        on_shown = pitch is PitchReference.SHOWN
+        on_shown = pitch is TrackPitchChoice.SHOWN
         result = track_cameras_of_clip(
             clip, out, lines or (), on_shown=on_shown, turn=turn, progress=progress
         )

@@ -7,11 +7,15 @@ from dataclasses import asdict
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.job_run import JobProgress, report_counts_in_words
+from app.features.jobs.job_run import JobProgress, make_counts_reporter
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import MatchJob, MatchJobContext
-from app.features.paint.proposals import forget_proposals, propose_views
-from app.features.paint.service import read_paint, require_paint_in_use, undo_paint_reading
+from app.features.paint.proposals import forget_proposals, propose_cameras_for_views
+from app.features.paint.service import (
+    read_paint_of_pictures,
+    require_paint_in_use,
+    undo_paint_reading,
+)
 
 REPORTED = (
     *("views", "without_picture", "read"),
@@ -22,13 +26,13 @@ REPORTED = (
 
 def _run_paint_job(call: MatchJobContext, progress: JobProgress) -> Json:
     try:
-        found = read_paint(
+        found = read_paint_of_pictures(
             call.store,
             call.dataset_id,
             call.matches,
             actor=call.job.actor,
             run=call.job.request["run"],
-            progress=report_counts_in_words(progress, "groups looked at"),
+            progress=make_counts_reporter(progress, "groups looked at"),
             require_wanted=progress.require_not_cancelled,
         )
     finally:
@@ -60,11 +64,11 @@ def cancel_and_forget_proposals(jobs: Jobs, store: Store, dataset: str | int) ->
 
 
 def _run_proposal_job(call: MatchJobContext, progress: JobProgress) -> Json:
-    run = propose_views(
+    run = propose_cameras_for_views(
         call.store,
         call.dataset_id,
         call.matches,
-        progress=report_counts_in_words(progress, "views looked at"),
+        progress=make_counts_reporter(progress, "views looked at"),
         require_wanted=progress.require_not_cancelled,
     )
     return asdict(run)

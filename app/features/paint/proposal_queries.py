@@ -14,7 +14,7 @@ from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, o
 from sqlalchemy.orm import aliased
 
 from app.db.dialects.dialect import insert, select_from_number_list, select_json_array_items
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.paint.queries import ProposalModel
@@ -65,7 +65,7 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class MatchProposals:
+class MatchProposalCounts:
     """How far the views of one match are.
 
     Attributes:
@@ -193,7 +193,7 @@ def list_views_to_propose_for(
 
 def count_proposals_by_match(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
-) -> list[MatchProposals]:
+) -> list[MatchProposalCounts]:
     """How far each match of a dataset is, or each of these, by name."""
     lost = list_views_without_camera_from_lines(session, dataset_id, matches)
     is_candidate, outcome = _needs_proposal(lost), ProposalModel.outcome
@@ -221,7 +221,7 @@ def count_proposals_by_match(
     if matches is not None:
         statement = statement.where(GroupModel.match.in_(matches))
     rows: Iterable[Any] = session.execute(statement)
-    return [MatchProposals(*row) for row in rows]
+    return [MatchProposalCounts(*row) for row in rows]
 
 
 def read_proposals(session: Session, views: Iterable[int]) -> dict[int, Proposal]:
@@ -278,5 +278,5 @@ def delete_proposals(session: Session, dataset_id: int) -> int:
 
 def _proposal_from_row(row: Any) -> Proposal:
     values = {item.name: getattr(row, item.name) for item in fields(Proposal)}
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return Proposal(**{**values, "lines": lines_from_json(parse_json_column(row.lines))})

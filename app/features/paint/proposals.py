@@ -19,12 +19,17 @@ from app.features.datasets.service import (
     require_dataset_id,
     require_dataset_with_matches,
 )
-from app.features.groups.pictures import UNREADABLE, PictureTask, ProposalTask, read_proposal
+from app.features.groups.pictures import (
+    UNREADABLE,
+    PictureTask,
+    ProposalTask,
+    propose_lines_for_task,
+)
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.state import read_group_head
-from app.features.groups.view_paint import list_nearby_cameras
+from app.features.groups.state import read_group_change_basis
+from app.features.groups.view_paint import list_cameras_of_nearest_groups
 from app.features.paint.proposal_queries import (
-    MatchProposals,
+    MatchProposalCounts,
     count_proposals_by_match,
     delete_proposals,
     list_views_to_propose_for,
@@ -47,12 +52,12 @@ _PER_WORKER = 4
 
 
 @dataclass(frozen=True)
-class DatasetProposals:
+class DatasetProposalCounts:
     """What was proposed for a dataset's views, by match."""
 
     dataset_id: int
     dataset: str
-    items: tuple[MatchProposals, ...]
+    items: tuple[MatchProposalCounts, ...]
 
     def count(self, name: str) -> int:
         """Sum of a count over the matches."""
@@ -93,9 +98,9 @@ class ProposalRun:
         )
 
 
-def get_proposals(
+def get_proposal_counts(
     store: Store, dataset: str | int, matches: Collection[str] | None = None
-) -> DatasetProposals:
+) -> DatasetProposalCounts:
     """What was proposed for the views of a dataset's matches; of all, or of these.
 
     Raises:
@@ -104,7 +109,7 @@ def get_proposals(
     with store.read() as session:
         found = require_dataset_with_matches(session, dataset, matches)
         items = count_proposals_by_match(session, found.id, matches)
-    return DatasetProposals(found.id, found.name, tuple(items))
+    return DatasetProposalCounts(found.id, found.name, tuple(items))
 
 
 def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Proposal]]:
@@ -114,12 +119,12 @@ def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Pr
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        if read_group_head(session, group_id) is None:
+        if read_group_change_basis(session, group_id) is None:
             raise NotFoundError.group(group_id)
         return read_group_proposals(session, group_id)
 
 
-def propose_views(
+def propose_cameras_for_views(
     store: Store,
     dataset: str | int,
     matches: Collection[str] | None = None,
@@ -192,7 +197,7 @@ def _make_tasks(
         old = read_proposals(session, [view for views in views_by_group.values() for view in views])
         for stored in read_groups(session, list(views_by_group), extras=False).values():
             # The replays of a group look from elsewhere, but its main camera may be known, too.
-            known = list_nearby_cameras(session, stored)
+            known = list_cameras_of_nearest_groups(session, stored)
             for key, number in stored.view_ids.items():
                 if number in views_by_group[stored.id]:
                     tasks.append(_make_task(stored, key, known, dataset, old.get(number)))
@@ -234,7 +239,9 @@ def _run_tasks(
     store: Store, pool: WorkerPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
 ) -> list[Proposal | None]:
     futures = [
-        PictureTask(pool, *videos.wrap_with_index(task.media, read_proposal, task, store.settings))
+        PictureTask(
+            pool, *videos.wrap_with_index(task.media, propose_lines_for_task, task, store.settings)
+        )
         for task in tasks
     ]
     return [_wait_for_proposal(task, reads) for task, reads in zip(tasks, futures, strict=True)]

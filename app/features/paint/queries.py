@@ -12,11 +12,11 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import any_value_of, insert, select_json_object_values
-from app.db.json_columns import decompress, parse_json_column, report_damaged_values
+from app.db.json_columns import decompress, parse_json_column, translate_shape_errors_to_damage
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, PaintEvidenceModel, StationModel, ViewModel
-from app.soccer.paint_evidence import PaintReading, reading_from_text
+from app.soccer.paint_evidence import PaintReading, reading_from_canonical_json
 
 PAINT = "paint"
 """Kind of the log's entries that say what was read of a group's pictures."""
@@ -97,8 +97,8 @@ def read_paint_readings(session: Session, digests: Iterable[str]) -> dict[str, P
 
 @lru_cache(maxsize=64)
 def decode_paint_reading(digest: str, body: bytes) -> PaintReading:
-    with report_damaged_values():
-        reading = reading_from_text(decompress(body).decode())
+    with translate_shape_errors_to_damage():
+        reading = reading_from_canonical_json(decompress(body).decode())
         if reading.digest != digest:
             raise ValueError(f"the paint measurement stored under {digest} has another digest")
     return reading
@@ -108,12 +108,12 @@ def read_paint_digests(text: str | None) -> dict[str, str]:
     """Digest of what was read by view, from the column of a group."""
     if text is None:
         return {}
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return dict(parse_json_column(text))
 
 
 @dataclass(frozen=True)
-class MatchPaint:
+class MatchPaintCounts:
     """What was read of the pictures of one match.
 
     Attributes:
@@ -132,7 +132,7 @@ class MatchPaint:
     reasons: Mapping[str | None, int]
 
 
-def read_match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
+def read_match_paint(session: Session, dataset_id: int) -> list[MatchPaintCounts]:
     """What was read of the pictures of each match of a dataset, by name."""
     group = GroupModel
     statement = (
@@ -161,7 +161,7 @@ def read_match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     for row in session.execute(statement):
         rows.setdefault(row.match, []).append(row)
     return [
-        MatchPaint(
+        MatchPaintCounts(
             match,
             tuple(row.id for row in some),
             sum(row.views for row in some),
@@ -196,7 +196,7 @@ def _count_readings_by_reason(
     return found
 
 
-def find_last_paint_run(session: Session, dataset_id: int) -> list[LogEntry]:
+def find_last_paint_run_entries(session: Session, dataset_id: int) -> list[LogEntry]:
     """The entries of a dataset's newest reading that was not taken back; none where there is none."""
     taken_back: set[str] = set()
     runs: dict[str, list[LogEntry]] = {}

@@ -31,9 +31,9 @@ from app.features.jobs.schemas import (
 )
 from app.features.match_estimates.routes import MatchRequest
 from app.features.paint.jobs import PAINT, PROPOSALS, cancel_and_forget_proposals
-from app.features.paint.proposal_queries import MatchProposals, Proposal
-from app.features.paint.proposals import get_group_proposals, get_proposals
-from app.features.paint.service import PaintState, get_paint
+from app.features.paint.proposal_queries import MatchProposalCounts, Proposal
+from app.features.paint.proposals import get_group_proposals, get_proposal_counts
+from app.features.paint.service import MatchPaintSummary, summarize_paint_readings
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.http.documents import Document, ListDocument, make_document_response, respond_with
@@ -58,13 +58,13 @@ REFUSALS = (404, 409, 413, 415, 503)
 proposals_router = APIRouter(tags=["datasets"], route_class=Route)
 
 
-class DatasetPaintDocument(ListDocument[PaintState]):
+class DatasetPaintDocument(ListDocument[MatchPaintSummary]):
     """What was read of the paint in a dataset's pictures, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
 
 
-class PaintRequest(BaseModel):
+class UnsavedLinesRequest(BaseModel):
     """Lines that are not saved yet; without any those count that are."""
 
     model_config = ConfigDict(
@@ -140,7 +140,7 @@ class ProposalDocument(Document):
         return cls.model_validate({**vars(found), "lines": lines_to_document(found.lines)})
 
 
-class DatasetProposalsDocument(ListDocument[MatchProposals]):
+class DatasetProposalCountsDocument(ListDocument[MatchProposalCounts]):
     """What was proposed for the views of a dataset, by name of the match."""
 
 
@@ -165,7 +165,7 @@ class ForgottenProposalsDocument(Document):
     forgotten: int = Field(description="How many proposals there were; accepted lines stay.")
 
 
-class GroupProposal(ProposalDocument):
+class GroupViewProposal(ProposalDocument):
     """What was proposed for one view: a prediction until its lines are saved."""
 
     view: int
@@ -178,7 +178,7 @@ class GroupProposal(ProposalDocument):
     version: str = Field(description="Of what read the picture.")
 
     @classmethod
-    def of_view(cls, key: str, is_open: bool, found: Proposal) -> GroupProposal:
+    def of_view(cls, key: str, is_open: bool, found: Proposal) -> GroupViewProposal:
         """The document of what was proposed for a view."""
         shown = cls.model_fields.keys() - {"view", "key", "open"}
         values: dict[str, Any] = {name: getattr(found, name) for name in shown}
@@ -186,16 +186,16 @@ class GroupProposal(ProposalDocument):
         return cls.model_construct(**{**values, "lines": lines_to_document(found.lines)})
 
 
-class GroupProposals(ListDocument[GroupProposal]):
+class GroupProposals(ListDocument[GroupViewProposal]):
     """What was proposed for the views of a group, in their order."""
 
 
 @paint_router.get("", operation_id="listDatasetPaint", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
+def list_paint_summaries(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     """How many pictures of each match were read for their paint, and what came of it."""
-    return DatasetPaintDocument.model_validate(get_paint(store, dataset))
+    return DatasetPaintDocument.model_validate(summarize_paint_readings(store, dataset))
 
 
 @paint_router.post(
@@ -203,7 +203,7 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def read_paint(
+def request_paint_reading(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Read the paint of pictures and give it to their groups, which are solved again.
@@ -237,7 +237,7 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def read_view_paint(
-    view: Id, wanted: PaintRequest, services: AppServices, request: Request
+    view: Id, wanted: UnsavedLinesRequest, services: AppServices, request: Request
 ) -> PaintDocument | Response:
     """What the frame shows of the markings near a view's camera; saves nothing."""
     question = await to_thread.run_sync(
@@ -258,7 +258,7 @@ async def read_view_paint(
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def propose_lines(
-    view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
+    view: Id, services: AppServices, request: Request, wanted: UnsavedLinesRequest | None = None
 ) -> ProposalDocument | Response:
     """Lines for a view without a camera, from its frame alone; saves nothing.
 
@@ -285,9 +285,9 @@ async def _wait_for_result(
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDocument:
+def list_proposal_counts(dataset: DatasetPath, store: AppStore) -> DatasetProposalCountsDocument:
     """For how many views of each match something is proposed; nothing of it counts."""
-    return DatasetProposalsDocument.model_validate(get_proposals(store, dataset))
+    return DatasetProposalCountsDocument.model_validate(get_proposal_counts(store, dataset))
 
 
 @proposals_router.post(
@@ -306,7 +306,7 @@ def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDoc
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def accept_proposed_lines(
+def request_line_proposals(
     dataset: DatasetPath,
     request: DatasetProposalsRequest,
     services: AppServices,
@@ -321,7 +321,7 @@ def accept_proposed_lines(
     """
     if dry_run or request.dry_run:
         matches = None if request.match is None else [request.match]
-        found = get_proposals(services.store, dataset, matches)
+        found = get_proposal_counts(services.store, dataset, matches)
         counts = {name: found.count(name) for name in ("views", "looked")}
         return make_document_response(ProposalPlanDocument(**counts))
     return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
@@ -339,7 +339,7 @@ def _make_forgotten_response(gone: int) -> Response:
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_forgotten_response)
-def forget(dataset: DatasetPath, services: AppServices) -> int:
+def forget_dataset_proposals(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
 
     A search that waits or runs is cancelled, and nothing that it finds is kept afterwards.
@@ -358,4 +358,4 @@ def forget(dataset: DatasetPath, services: AppServices) -> int:
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""
     found = get_group_proposals(store, group)
-    return GroupProposals(items=[GroupProposal.of_view(*item) for item in found])
+    return GroupProposals(items=[GroupViewProposal.of_view(*item) for item in found])

@@ -21,20 +21,20 @@ from app.features.datasets.service import (
     require_dataset_id,
     require_dataset_with_matches,
 )
-from app.features.groups.edit import SetPaint
+from app.features.groups.edit import SetPaintReadings
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.pictures import (
     PaintTask,
     PictureTask,
-    mark_paint_outdated_by_other_people,
+    mark_readings_with_stale_people_boxes,
     read_view_paint,
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.jobs.queries import Job
 from app.features.paint.queries import (
     PAINT,
-    MatchPaint,
-    find_last_paint_run,
+    MatchPaintCounts,
+    find_last_paint_run_entries,
     insert_paint_readings,
     read_match_paint,
     read_paint_readings,
@@ -60,7 +60,7 @@ how a dataset stands; a reading compares all."""
 
 
 @dataclass(frozen=True)
-class PaintState:
+class MatchPaintSummary:
     """What was read of the pictures of one match.
 
     Attributes:
@@ -99,10 +99,10 @@ class DatasetPaint:
     dataset_id: int
     dataset: str
     used: bool
-    items: tuple[PaintState, ...]
+    items: tuple[MatchPaintSummary, ...]
 
 
-def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
+def summarize_paint_readings(store: Store, dataset: str | int) -> DatasetPaint:
     """What was read of the pictures of a dataset's matches.
 
     Raises:
@@ -118,7 +118,7 @@ def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
     return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
 
 
-def read_paint(
+def read_paint_of_pictures(
     store: Store,
     dataset: str | int,
     matches: Collection[str] | None = None,
@@ -171,7 +171,7 @@ def read_paint(
             if progress is not None:
                 progress(done, len(ids))
     solve_match_tripods(store, found, matches, actor, run, require_wanted)
-    return get_paint(store, found.id)
+    return summarize_paint_readings(store, found.id)
 
 
 def require_paint_in_use(
@@ -217,7 +217,7 @@ def undo_paint_reading(
         NotFoundError: There is no such dataset.
     """
     found = require_dataset_with_matches(session, dataset)
-    entries = find_last_paint_run(session, found.id)
+    entries = find_last_paint_run_entries(session, found.id)
     stopped_runs = {job.request["run"] for job in stopped}
     if stopped and not (entries and entries[0].body["run"] in stopped_runs):
         return
@@ -250,16 +250,16 @@ def _save_reading_edits(
     """One entry for each group that changes; of a take-back for the first in any case."""
     ids = sorted(wanted)
 
-    def make_paint_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
+    def make_paint_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaintReadings]:
         fitting = {
-            number: SetPaint(
-                mark_paint_outdated_by_other_people(stored.group, wanted[number])
+            number: SetPaintReadings(
+                mark_readings_with_stale_people_boxes(stored.group, wanted[number])
             ).apply(stored.group)
             for number, stored in some.items()
         }
         for group in fitting.values():
             insert_paint_readings(session, dataset_id, group.paint.values())
-        return {number: SetPaint(group.paint) for number, group in fitting.items()}
+        return {number: SetPaintReadings(group.paint) for number, group in fitting.items()}
 
     always_logged = ids[0] if ids and "takes_back" in body else None
     edit_groups(
@@ -336,7 +336,7 @@ def _wait_for_reading(task: PaintTask, reads: PictureTask) -> PaintReading | Non
     return reading
 
 
-def has_pictures(store: Store, dataset: str | int) -> bool:
+def has_pictures_to_read_paint_from(store: Store, dataset: str | int) -> bool:
     """Whether there is a picture whose paint could be read.
 
     Raises:
@@ -348,7 +348,7 @@ def has_pictures(store: Store, dataset: str | int) -> bool:
 
 
 def _count_outdated_readings(
-    session: Session, dataset: DatasetHead, matches: Sequence[MatchPaint]
+    session: Session, dataset: DatasetHead, matches: Sequence[MatchPaintCounts]
 ) -> dict[str, int] | None:
     """How many readings of each match do not fit any more; None where they are too many."""
     ids = [number for item in matches for number in item.painted]
@@ -363,8 +363,8 @@ def _count_outdated_readings(
     return old
 
 
-def _make_paint_state(item: MatchPaint, old: int | None) -> PaintState:
-    found = PaintState(
+def _make_paint_state(item: MatchPaintCounts, old: int | None) -> MatchPaintSummary:
+    found = MatchPaintSummary(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
@@ -379,7 +379,7 @@ def _make_paint_state(item: MatchPaint, old: int | None) -> PaintState:
     return replace(found, sentence=_describe_state(found))
 
 
-def _describe_state(state: PaintState) -> str:
+def _describe_state(state: MatchPaintSummary) -> str:
     left = max(state.views - state.without_picture, state.read)
     if not left:
         return f"none of {state.views} views has a picture" if state.views else "nothing to read"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead
-from app.features.groups.edit import SetPaint
+from app.features.groups.edit import SetPaintReadings
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.paint.queries import PAINT, insert_paint_readings, read_match_paint
@@ -51,10 +51,10 @@ def solve_match_tripods(
             some: Mapping[int, StoredGroup],
             before: Mapping[int, PaintReading | None] = before,
             changed: Mapping[int, PaintReading] = changed,
-        ) -> dict[int, SetPaint]:
+        ) -> dict[int, SetPaintReadings]:
             # What was drawn and read meanwhile says something else.
             return {
-                number: SetPaint({**stored.group.paint, key: changed[number]})
+                number: SetPaintReadings({**stored.group.paint, key: changed[number]})
                 for number, stored in some.items()
                 if stored.group.paint.get(key := stored.group.views[0].key) == before[number]
             }

@@ -13,7 +13,7 @@ from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.features.people.access_tokens import AccessToken
-    from app.features.people.invitations import Invitation, LinkMailer
+    from app.features.people.invitations import InvitationOutcome, LinkMailer
     from app.features.people.roles import Role
     from app.features.people.service import Person
 
@@ -282,6 +282,6 @@ def _person_to_dict(person: Person) -> dict[str, Any]:
     return values | linked | ({"datasets": datasets} if datasets else {})
 
 
-def _print_link(row: Invitation, json_: bool) -> None:
+def _print_link(row: InvitationOutcome, json_: bool) -> None:
     values = {key: value for key, value in vars(row).items() if key not in ("row", "state")}
     print_values({key: value for key, value in values.items() if value not in (None, False)}, json_)

@@ -207,7 +207,7 @@ class StoredPendingActions:
         return Fernet(urlsafe_b64encode(get_installation_key(self._store.settings, BEGUN)))
 
 
-def make_pending_actions(
+def make_pending_action_store(
     store: Store, clock: Clock, lasts: timedelta, kind: str
 ) -> PendingActionStore:
     """What waits, where every process finds it that may be asked for it."""

@@ -41,7 +41,7 @@ class InvitationRow:
 
 
 @dataclass(frozen=True)
-class Invitation:
+class InvitationOutcome:
     """What became of one row of a list.
 
     Attributes:
@@ -80,8 +80,8 @@ class LinkMailer:
     base: str
 
     def send_links(
-        self, rows: Sequence[tuple[Invitation, PasswordLink, str | None]], by: str
-    ) -> list[Invitation]:
+        self, rows: Sequence[tuple[InvitationOutcome, PasswordLink, str | None]], by: str
+    ) -> list[InvitationOutcome]:
         """Send the links of those who have an address; what is not sent is shown.
 
         Args:
@@ -107,7 +107,7 @@ class LinkMailer:
 
 def invite_person(
     store: Store, name: str, role: Role, email: str | None, post: LinkMailer, *, actor: str
-) -> tuple[Person, Invitation]:
+) -> tuple[Person, InvitationOutcome]:
     """Make an account, and hand over the link with which its person chooses a password.
 
     Raises:
@@ -117,13 +117,13 @@ def invite_person(
     """
     address = parse_mail_address(email, pointer="/email") if email else None
     person, link = invite(store, name, role, actor=actor)
-    row = Invitation(1, person.name, person.role, "invited", expires=link.expires)
+    row = InvitationOutcome(1, person.name, person.role, "invited", expires=link.expires)
     return person, post.send_links([(row, link, address)], actor)[0]
 
 
 def renew_invitation(
     store: Store, person_id: int, email: str | None, post: LinkMailer, *, actor: str
-) -> tuple[Person, Invitation]:
+) -> tuple[Person, InvitationOutcome]:
     """Make another link for somebody, and hand it over as an invitation is.
 
     Raises:
@@ -135,13 +135,13 @@ def renew_invitation(
     address = parse_mail_address(email, pointer="/email") if email else None
     person, link = renew_link(store, person_id, actor=actor)
     state: Literal["reset", "invited"] = "reset" if person.joined else "invited"
-    row = Invitation(1, person.name, person.role, state, expires=link.expires)
+    row = InvitationOutcome(1, person.name, person.role, state, expires=link.expires)
     return person, post.send_links([(row, link, address)], actor)[0]
 
 
 def invite_many(
     store: Store, wanted: Sequence[InvitationRow], post: LinkMailer, *, actor: str, dry_run: bool
-) -> list[Invitation]:
+) -> list[InvitationOutcome]:
     """Invite everybody of a list whose row is right, and say of each row what became of it.
 
     Args:
@@ -160,8 +160,8 @@ def invite_many(
         raise InputError(
             f"a list has 1 to {MOST} people, and this one {len(wanted):,}", pointer="/people"
         )
-    refused: list[Invitation] = []
-    made: list[tuple[Invitation, PasswordLink | None, str | None]] = []
+    refused: list[InvitationOutcome] = []
+    made: list[tuple[InvitationOutcome, PasswordLink | None, str | None]] = []
     with store.read() if dry_run else store.write() as session:
         seen: dict[str, int] = {}
         for one in wanted:
@@ -174,10 +174,10 @@ def invite_many(
                 continue
             seen[name] = one.row
             if dry_run:
-                made.append((Invitation(one.row, name, role, "possible"), None, address))
+                made.append((InvitationOutcome(one.row, name, role, "possible"), None, address))
                 continue
             _, link = insert_invited_person(session, name, role, actor=actor)
-            row = Invitation(one.row, name, role, "invited", expires=link.expires)
+            row = InvitationOutcome(one.row, name, role, "invited", expires=link.expires)
             made.append((row, link, address))
     done = [row for row, link, _ in made if link is None]
     links = [(row, link, address) for row, link, address in made if link is not None]
@@ -249,12 +249,12 @@ def _validate_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str,
     return name, role, parse_mail_address(one.email) if one.email else None
 
 
-def _make_refused_invitation(one: InvitationRow, problem: str) -> Invitation:
-    return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
+def _make_refused_invitation(one: InvitationRow, problem: str) -> InvitationOutcome:
+    return InvitationOutcome(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
 
 
 def _compose_invitation_mail(
-    url: str, row: Invitation, link: PasswordLink, address: str, by: str
+    url: str, row: InvitationOutcome, link: PasswordLink, address: str, by: str
 ) -> MailMessage:
     host = urlsplit(url).hostname
     until = f"{datetime.fromisoformat(link.expires):%d %B %Y, %H:%M} UTC"

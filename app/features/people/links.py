@@ -145,7 +145,7 @@ class LinkHolder:
     joined: bool
 
 
-def make_first_link(store: Store, *, actor: str) -> PasswordLink | None:
+def make_first_admin_link(store: Store, *, actor: str) -> PasswordLink | None:
     """A link that makes the first admin; None where there is one who can log in."""
     with store.write() as session:
         if count_people_who_can_log_in(session, Role.ADMIN):
@@ -227,10 +227,10 @@ def _find_holder(session: Session, token: str) -> tuple[int | None, LinkHolder]:
     person = find_person_by_id(session, row.person_id)
     if person is None or person.disabled:
         raise NotFoundError(GONE, hint=ASK)
-    return row.person_id, LinkHolder(person.name, has_joined(session, person))
+    return row.person_id, LinkHolder(person.name, has_login_method(session, person))
 
 
-def has_joined(session: Session, person: Any) -> bool:
+def has_login_method(session: Session, person: Any) -> bool:
     """Whether somebody has a way in: a password, or an account at the provider of single sign-on."""
     return person.password is not None or find_person_identity(session, person.id) is not None
 

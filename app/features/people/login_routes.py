@@ -12,14 +12,14 @@ from app.features.datasets.service import dataset_id
 from app.features.people.login_schemas import (
     AccessTokenDocument,
     AccessTokenList,
-    CreationOptions,
     MadeAccessToken,
     NewAccessToken,
     NewPasskey,
+    PasskeyCreationOptions,
     PasskeyList,
     PasskeyLogin,
     PasskeyMade,
-    RequestOptions,
+    PasskeyRequestOptions,
 )
 from app.features.people.schemas import (
     CodeOnly,
@@ -63,11 +63,13 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
+def begin_passkey(
+    body: PasswordOnly, request: Request, team: AppTeam, me: Me
+) -> PasskeyCreationOptions:
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
     team.count_login_attempt(request, me.name)
-    return CreationOptions(
+    return PasskeyCreationOptions(
         options=team.passkeys.begin(me, body.password, team.make_passkey_site(request))
     )
 
@@ -79,7 +81,7 @@ def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -
     responses=responses(401, 409, 413, 415),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
+def make_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
     credential = new.credential.model_dump()
     made, codes = team.passkeys.make(me, new.name, credential, team.make_passkey_site(request))
@@ -107,14 +109,16 @@ def remove_passkey(
     responses=responses(409, 413, 415, 429),
 )
 @open_to_all
-def begin_login(request: Request, response: Response, team: AppTeam) -> RequestOptions:
+def begin_passkey_login(
+    request: Request, response: Response, team: AppTeam
+) -> PasskeyRequestOptions:
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
     team.require_passwords()
     team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     options = team.passkeys.ask(asker, team.make_passkey_site(request))
     response.set_cookie(**team.cookies.make_passkey_cookie(asker))
-    return RequestOptions(options=options)
+    return PasskeyRequestOptions(options=options)
 
 
 @passkeys_router.post(
@@ -123,7 +127,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
     responses=responses(401, 409, 413, 415, 429),
 )
 @open_to_all
-def log_in(
+def log_in_with_passkey(
     body: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in with a passkey: no name, no password, and no code."""
@@ -176,7 +180,7 @@ def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me:
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def confirm(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
+def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
     team.attempts.count_code(me.name)
     return RecoveryCodes(codes=team.factors.confirm(me, body.code))
@@ -202,21 +206,21 @@ def remove_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me
     responses=responses(401, 404, 409),
 )
 @may(Action.ADMINISTER)
-def clear(user: Id, team: AppTeam, me: Me) -> None:
+def clear_second_factor(user: Id, team: AppTeam, me: Me) -> None:
     """Take away the second factor of somebody who has lost it."""
     team.factors.clear(user, actor=me.actor)
 
 
 @team_router.get("/team", operation_id="getTeam", responses=responses(401, 409))
 @may(Action.ADMINISTER)
-def get_settings(team: AppTeam, _me: Me) -> TeamSettings:
+def get_team_settings(team: AppTeam, _me: Me) -> TeamSettings:
     """What counts for everybody."""
     return TeamSettings(require_second_factor=team.factors.required())
 
 
 @team_router.put("/team", operation_id="changeTeam", responses=responses(401, 409, 413, 415))
 @may(Action.ADMINISTER)
-def put_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
+def put_team_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
     """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
     team.factors.require(wanted.require_second_factor, actor=me.actor)
     return wanted

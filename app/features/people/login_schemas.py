@@ -18,18 +18,18 @@ Base64url = Annotated[str, Field(min_length=1, max_length=16_384, pattern=r"^[A-
 _EXAMPLE = {"id": "q0xBeRXL", "rawId": "q0xBeRXL", "type": "public-key"}
 
 
-class _Closed(BaseModel):
+class _ForbidExtraModel(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Attestation(_Closed):
+class Attestation(_ForbidExtraModel):
     """What a device says of a passkey that it has made."""
 
     clientDataJSON: Base64url  # noqa: N815
     attestationObject: Base64url  # noqa: N815
 
 
-class Assertion(_Closed):
+class Assertion(_ForbidExtraModel):
     """What a device signs with a passkey."""
 
     clientDataJSON: Base64url  # noqa: N815
@@ -38,7 +38,7 @@ class Assertion(_Closed):
     userHandle: Base64url  # noqa: N815
 
 
-class _Credential(_Closed):
+class _Credential(_ForbidExtraModel):
     id: Base64url
     rawId: Base64url  # noqa: N815
     type: Literal["public-key"]
@@ -103,7 +103,7 @@ class PasskeyLogin(BaseModel):
     credential: SignedCredential
 
 
-class CreationOptions(Document):
+class PasskeyCreationOptions(Document):
     """What a browser needs to make a passkey."""
 
     options: dict[str, Any] = Field(
@@ -111,7 +111,7 @@ class CreationOptions(Document):
     )
 
 
-class RequestOptions(Document):
+class PasskeyRequestOptions(Document):
     """What a browser needs to use a passkey."""
 
     options: dict[str, Any] = Field(

@@ -70,7 +70,7 @@ class Ownership:
     called: str | None = None
 
 
-def find_role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
+def find_role_by_ownership(found: Ownership, roles: DatasetRoles, name: str) -> Role:
     """What somebody is where something belongs; ``none``: they do not see it.
 
     Args:

@@ -29,7 +29,7 @@ from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import PasskeyChallenges, make_pending_actions
+from app.features.people.devices import PasskeyChallenges, make_pending_action_store
 from app.features.people.links import hash_token
 from app.features.people.login_queries import (
     delete_logins,
@@ -106,7 +106,9 @@ class Passkeys:
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ):
         self._store, self._logins, self._clock = store, logins, clock
-        self._challenges = PasskeyChallenges(make_pending_actions(store, clock, LASTS, "passkey"))
+        self._challenges = PasskeyChallenges(
+            make_pending_action_store(store, clock, LASTS, "passkey")
+        )
 
     def of(self, person_id: int) -> list[Passkey]:
         """The passkeys of a person, the oldest first."""

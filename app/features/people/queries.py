@@ -412,10 +412,10 @@ def write_team_setting(session: Session, name: str, value: str | None) -> None:
 
 def has_second_factor(session: Session, person_id: int) -> bool:
     """Whether somebody has an authenticator that is confirmed, or a passkey."""
-    return bool(session.scalar(select(_has_confirmed_factor(person_id))))
+    return bool(session.scalar(select(_second_factor_condition(person_id))))
 
 
-def _has_confirmed_factor(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
+def _second_factor_condition(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
     confirmed = SecondFactorModel.confirmed.is_(True)
     return or_(
         exists().where(SecondFactorModel.person_id == person_id, confirmed),
@@ -432,5 +432,5 @@ def list_people_with_second_factor(session: Session) -> set[int]:
 
 MUST_ENROL: ColumnElement[bool] = exists().where(
     TeamSettingModel.name == REQUIRED, TeamSettingModel.value == "on"
-) & ~_has_confirmed_factor(PersonModel.__table__.c.id)
+) & ~_second_factor_condition(PersonModel.__table__.c.id)
 """Of a row of people: whether everybody needs a second factor, and they have none yet."""

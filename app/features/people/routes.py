@@ -8,7 +8,7 @@ from app.db.store import Store
 from app.features.audit.service import assign_local_work, find_owner_of_local_work
 from app.features.people import service as people
 from app.features.people.invitations import (
-    Invitation,
+    InvitationOutcome,
     InvitationRow,
     LinkMailer,
     invite_many,
@@ -19,10 +19,10 @@ from app.features.people.login_schemas import AccessTokenList
 from app.features.people.schemas import (
     InvitationList,
     InvitationReport,
+    LinkRenewal,
     MemberDocument,
     MemberEdit,
     MemberList,
-    NewLink,
     NewUser,
     UserEdit,
     UserList,
@@ -40,7 +40,7 @@ from app.http.team import AppTeam, TeamLogin
 users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRoute)
 
 
-def _user_with_link(person: Person, row: Invitation) -> UserWithLink:
+def _user_with_link(person: Person, row: InvitationOutcome) -> UserWithLink:
     return UserWithLink(
         user=person,
         link=row.link,
@@ -151,7 +151,7 @@ def renew_link(
     store: AppStore,
     team: AppTeam,
     me: Me,
-    new: NewLink | None = None,
+    new: LinkRenewal | None = None,
 ) -> UserWithLink:
     """A new link with which somebody sets their password; earlier links are no longer valid.
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
 from app.features.maintenance.service import Banner
-from app.features.people.invitations import MOST, Invitation
+from app.features.people.invitations import MOST, InvitationOutcome
 from app.features.people.logins import LoginMethod
 from app.features.people.roles import Action, Role
 from app.features.people.service import Person, SingleRole
@@ -25,7 +25,7 @@ EXAMPLE: JsonDict = {
 }
 
 
-class NewSession(BaseModel):
+class LoginCredentials(BaseModel):
     """Who somebody says they are."""
 
     model_config = ConfigDict(
@@ -102,7 +102,7 @@ class LinkToken(BaseModel):
     token: Token
 
 
-class LinkUse(LinkToken):
+class NewPasswordByLink(LinkToken):
     """The password that somebody chooses; the first admin chooses a name, too."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
@@ -181,7 +181,7 @@ class NewUser(BaseModel):
     )
 
 
-class NewLink(BaseModel):
+class LinkRenewal(BaseModel):
     """Where another link for somebody goes."""
 
     model_config = ConfigDict(
@@ -226,7 +226,7 @@ class InvitationList(BaseModel):
     people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
 
 
-class InvitationReport(ListDocument[Invitation]):
+class InvitationReport(ListDocument[InvitationOutcome]):
     """What became of each row, in the order of the list."""
 
     dry_run: bool = Field(description="Nothing was done.")

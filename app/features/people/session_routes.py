@@ -25,9 +25,9 @@ from app.features.people.logins import Login
 from app.features.people.roles import SCOPES, Role, role_allows
 from app.features.people.schemas import (
     LinkToken,
-    LinkUse,
+    LoginCredentials,
     LoginMethods,
-    NewSession,
+    NewPasswordByLink,
     OpenSessionDocument,
     OpenSessionList,
     PasswordEdit,
@@ -120,7 +120,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
 @open_to_all
 @limit(TRANSFER)
 def log_in(
-    who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
+    who: LoginCredentials, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in; the answer sets the cookie of a new session.
 
@@ -218,7 +218,7 @@ def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
 )
 @may(Action.ACCOUNT)
-def end_others(team: AppTeam, me: Me) -> None:
+def end_other_sessions(team: AppTeam, me: Me) -> None:
     """End every session of one's own but this one."""
     team.logins.end_others(me)
 
@@ -249,7 +249,7 @@ def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppT
 @open_to_all
 @limit(TRANSFER)
 def use_link(
-    chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
+    chosen: NewPasswordByLink, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Set the password that a link is for, and log in with it; the link is then no longer valid.
 
@@ -269,7 +269,9 @@ def use_link(
 )
 @open_to_all
 @limit(TRANSFER)
-def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnStarted:
+def begin_sign_on(
+    body: SignOnBegin, request: Request, response: Response, team: AppTeam
+) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
     team.attempts.count_challenge(team.address(request))
@@ -288,7 +290,7 @@ def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam
 )
 @open_to_all
 @limit(TRANSFER)
-def finish(
+def finish_sign_on(
     body: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
     """Log in with what the provider has answered, or link the account where that was begun.
@@ -325,7 +327,7 @@ def finish(
 
 @sign_on_router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
 @may(Action.ACCOUNT)
-def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
+def get_own_login_methods(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = read_login_ways(store, me.person_id), team.sign_on and team.sign_on.rules
     return OwnLoginMethods(
@@ -343,7 +345,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
 )
 @may(Action.ACCOUNT)
 @limit(TRANSFER)
-def begin_link(
+def begin_identity_link(
     body: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnStarted:
     """Where to go to link an account of the provider with one's own; takes the password."""
@@ -362,7 +364,9 @@ def begin_link(
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
-def remove(body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
+def remove_own_identity(
+    body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me
+) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
     team.count_login_attempt(request, me.name)
     unlink_identity(store, me, body.password, datetime.now(UTC))
@@ -376,6 +380,6 @@ def remove(body: PasswordOnly, request: Request, store: AppStore, team: AppTeam,
     responses=responses(401, 404, 409),
 )
 @may(Action.ADMINISTER)
-def remove_from(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
+def remove_identity_of_user(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
     """Unlink somebody's account of the provider; their sessions that began with it end."""
     unlink_person(store, user, actor=me.actor)

@@ -18,7 +18,7 @@ from typing import Any
 from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
-from app.features.people.devices import make_pending_actions, verify_and_use_code
+from app.features.people.devices import make_pending_action_store, verify_and_use_code
 from app.features.people.links import consume_link, find_link_holder, hash_token, make_random_token
 from app.features.people.login_queries import (
     delete_logins,
@@ -108,7 +108,7 @@ class SignOn:
         self.rules = rules
         self._store, self._logins, self._clock = store, logins, clock
         self._provider = Provider(rules, clock)
-        self._begun = make_pending_actions(store, clock, LASTS, "sign-on")
+        self._begun = make_pending_action_store(store, clock, LASTS, "sign-on")
 
     def begin(
         self,

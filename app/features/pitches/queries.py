@@ -15,7 +15,7 @@ from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
 from app.soccer.annotation import Lines
-from app.soccer.codec import digest_json, lines_from_json, picture_from_json
+from app.soccer.codec import digest_json, lines_from_json, picture_geometry_from_json
 from app.soccer.finding import PITCH_SIZE
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -124,7 +124,9 @@ def read_lines_of_match(
 def _restore_original_lines(row: Any) -> tuple[Lines, ImageSize] | None:
     """What a camera's lines are without what was done to its picture; None where nobody knows that."""
     lines, size = lines_from_json(parse_json_column(row.lines)), ImageSize(row.width, row.height)
-    picture = None if row.picture is None else picture_from_json(parse_json_column(row.picture))
+    picture = (
+        None if row.picture is None else picture_geometry_from_json(parse_json_column(row.picture))
+    )
     if picture is None:
         return lines, size
     return (picture.lines_in_original_picture(lines, size), size) if picture.is_known else None

@@ -17,7 +17,7 @@ from app.features.jobs.schemas import (
     make_location_header,
 )
 from app.features.pitches.service import DatasetPitches, read_pitches
-from app.features.solve.jobs import PitchJob, request_pitch_change, request_solve_job
+from app.features.solve.jobs import PitchesAndJob, request_pitch_change, request_solve_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.http.documents import Document, ListDocument, make_document_response, respond_with
@@ -162,7 +162,7 @@ def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) 
     return request_solve_job(services.jobs, services.store, found.id, actor=actor, title=title)
 
 
-def _make_pitch_job_response(sized: PitchJob) -> Response:
+def _make_pitch_job_response(sized: PitchesAndJob) -> Response:
     pitches = PitchesDocument.model_validate(sized.state)
     job = JobDocument.model_validate(sized.job)
     job.result = {"pitches": pitches.model_dump(mode="json")}
@@ -186,7 +186,7 @@ def set_pitch(
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-) -> PitchJob:
+) -> PitchesAndJob:
     """Give a match another pitch, all its groups at once.
 
     They are solved again by the job; `result.pitches` of the answer is the list as it is now.

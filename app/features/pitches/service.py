@@ -39,7 +39,7 @@ from app.soccer.codec import digest_json
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, calibration_values_to_digest
 from app.soccer.solution import SOLVER_VERSION
-from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
+from app.solving.pitch_size import PitchEstimate, PitchSizeFrameLines, estimate_pitch
 from app.workers.executors import run_tasks
 
 
@@ -109,7 +109,7 @@ class DatasetPitches:
 class _PitchTask:
     match: str
     inputs: str
-    frames: tuple[PitchFrame, ...]
+    frames: tuple[PitchSizeFrameLines, ...]
     policy: CalibrationPolicy
 
 
@@ -356,7 +356,7 @@ def _make_task(
 ) -> _PitchTask:
     with store.read() as session:
         lines = read_lines_of_match(session, dataset_id, match)
-    return _PitchTask(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
+    return _PitchTask(match, inputs, tuple(PitchSizeFrameLines(*item) for item in lines), policy)
 
 
 def _run_pitch_task(task: _PitchTask) -> tuple[str, dict[str, Any]]:

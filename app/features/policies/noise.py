@@ -40,11 +40,11 @@ from app.solving.ball_noise import BallNoise, RayResidual, SigmaEstimate
 from app.solving.dataset_noise import (
     BallSource,
     DatasetNoise,
-    NoiseGroup,
-    SourceFactors,
+    GroupNoiseInputs,
     SourceNoise,
+    SourceNoiseFactors,
     estimate_noise,
-    estimate_sources,
+    estimate_source_noise,
 )
 from app.solving.line_noise import LineEstimate
 
@@ -63,7 +63,7 @@ ESTIMATED_WORDS = "The policy uses the estimates, as they were when the dataset 
 
 
 @dataclass(frozen=True)
-class Advice:
+class ThresholdAdvice:
     """A threshold of the policy, what it is, and what the dataset says of it.
 
     Attributes:
@@ -123,7 +123,7 @@ class Noise:
     used: Factors
     line_estimate: LineEstimate | None
     follows: bool
-    advice: tuple[Advice, ...]
+    advice: tuple[ThresholdAdvice, ...]
     notices: tuple[str, ...]
 
     @property
@@ -177,7 +177,7 @@ def choose_noise_sample(ids: Sequence[int]) -> Sequence[int]:
     return ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
 
 
-def is_noise_estimated(store: Store, dataset: str | int) -> bool:
+def is_noise_estimated_when_solving(store: Store, dataset: str | int) -> bool:
     """Whether solving a dataset estimates its noise.
 
     Somebody's own copies have the numbers of what they are of.
@@ -187,7 +187,7 @@ def is_noise_estimated(store: Store, dataset: str | int) -> bool:
         return found.policy.noise == ESTIMATED and not is_copy_dataset(session, found.id)
 
 
-def update_estimated_noise(store: Store, dataset: str | int, actor: str) -> bool:
+def update_policy_noise(store: Store, dataset: str | int, actor: str) -> bool:
     """Let the policy of a dataset, whose noise is ``estimated``, have what the dataset shows now.
 
     A change too small to matter is none: the groups would all be solved again.
@@ -211,7 +211,7 @@ def update_estimated_noise(store: Store, dataset: str | int, actor: str) -> bool
     return True
 
 
-def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
+def adopt_estimated_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
     """Judge the dataset with the noise that was estimated, of it and of its cameras and people.
 
     Raises:
@@ -221,12 +221,14 @@ def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
         raise InputError(f'the noise measured in "{noise.dataset}" is what its policy already uses')
     state = read_policy(store, noise.dataset_id)
     with store.write() as session:
-        accept_noise(session, noise, state, actor)
+        adopt_estimated_noise_in_session(session, noise, state, actor)
     return read_policy(store, noise.dataset_id)
 
 
-def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str) -> None:
-    """``apply_noise`` within a write session; where nothing is new nothing changes.
+def adopt_estimated_noise_in_session(
+    session: Session, noise: Noise, state: PolicyState, actor: str
+) -> None:
+    """``adopt_estimated_noise`` within a write session; where nothing is new nothing changes.
 
     Raises:
         StaleRevisionError: The policy is another by now.
@@ -283,15 +285,15 @@ def _estimate_source_factors(
     seen: Sequence[tuple[RayResidual, Mapping[str, Sequence[BallSource]]]],
     ball: BallNoise,
     policy: Policy,
-) -> SourceFactors:
+) -> SourceNoiseFactors:
     """Noise of the sources of some views, beside what is known of the dataset."""
     click = policy.click_sigma_px if ball.click is None else ball.click.value
     share = policy.box_sigma_share if ball.share is None else ball.share
     given = policy.given_sigma_px if ball.given is None else ball.given.value
-    return estimate_sources(seen, click, share, given)
+    return estimate_source_noise(seen, click, share, given)
 
 
-def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
+def _factors_by_camera_and_person(found: SourceNoiseFactors) -> Factors:
     """Of each camera that is told with each person that is; none where all may be alike."""
     cameras, people = (
         ["", *(source.name for source in found.sources if source.kind == kind)]
@@ -316,20 +318,20 @@ def _estimate_noise(
     store: Store, ids: Sequence[int], policy: Policy
 ) -> tuple[int, list[Mapping[str, Sequence[BallSource]]], DatasetNoise]:
     """How many groups were asked, the sources of the balls of each, and what all of them say."""
-    seen: list[NoiseGroup] = []
+    seen: list[GroupNoiseInputs] = []
     sources: list[Mapping[str, Sequence[BallSource]]] = []
     for state, placed in _groups_with_ball_actors(store, choose_noise_sample(ids)):
         if state.solution is not None:
-            seen.append(NoiseGroup.of(state.group, state.solution, state.policy))
+            seen.append(GroupNoiseInputs.of(state.group, state.solution, state.policy))
             sources.append(_find_ball_sources(state, placed))
     return len(seen), sources, estimate_noise(seen, policy)
 
 
-def _make_advice(noise: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
+def _make_advice(noise: DatasetNoise, policy: Policy) -> tuple[ThresholdAdvice, ...]:
     return (*_ball_advice(noise.ball, policy), *_line_advice(noise.lines, policy))
 
 
-def _ball_advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
+def _ball_advice(ball: BallNoise, policy: Policy) -> Iterator[ThresholdAdvice]:
     if ball.click is not None:
         yield _threshold_advice("click_sigma_px", _make_interval(ball.click), policy)
     if ball.share is not None and ball.share_interval is not None:
@@ -338,7 +340,7 @@ def _ball_advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
         yield _threshold_advice("given_sigma_px", _make_interval(ball.given), policy)
 
 
-def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]:
+def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[ThresholdAdvice]:
     if found is not None:
         for name, item in (("line_sigma_px", found.sigma), ("line_share", found.share)):
             ends = item.value, item.low, item.high
@@ -349,17 +351,19 @@ def _make_interval(sigma: SigmaEstimate) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
 
-def _threshold_advice(name: str, found: tuple[float, float, float], policy: Policy) -> Advice:
+def _threshold_advice(
+    name: str, found: tuple[float, float, float], policy: Policy
+) -> ThresholdAdvice:
     """Advice on a threshold from an estimate and the ends of its interval."""
     threshold = next(item for item in THRESHOLDS if item.name == name)
     least, most = threshold.minimum or 0.0, threshold.maximum or np.inf
     estimate = round(float(np.clip(found[0], least, most)), DECIMALS)
     low, high = round(found[1], DECIMALS), round(found[2], DECIMALS)
     present = threshold.value(policy)
-    return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
+    return ThresholdAdvice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
 
-def _describe_notices(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
+def _describe_notices(advice: Sequence[ThresholdAdvice], policy: Policy) -> Iterator[str]:
     if not advice:
         yield (
             "Too few views agree on a ball to estimate the noise of its annotation: the sigma of the "

@@ -19,7 +19,7 @@ from app.features.policies.service import (
     replace_thresholds,
     unknown_policy_error,
 )
-from app.features.solve.jobs import PolicyJob, request_policy_change
+from app.features.solve.jobs import PolicyStateAndJob, request_policy_change
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.http.documents import make_document_response, respond_with
@@ -66,7 +66,7 @@ def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> Pol
     return policy
 
 
-def _make_policy_job_response(judged: PolicyJob) -> Response:
+def _make_policy_job_response(judged: PolicyStateAndJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
     return make_document_response(
@@ -89,7 +89,7 @@ def put_policy(
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-) -> PolicyJob:
+) -> PolicyStateAndJob:
     """Judge the dataset by another policy.
 
     What that leaves without a solution is stale and solved by the job; `result.policy` of the

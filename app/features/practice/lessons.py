@@ -31,7 +31,7 @@ from app.sample.scene import (
     ViewTruth,
     truth_to_json,
 )
-from app.sample.scenes import MatchStage, make_scene, make_stage
+from app.sample.scenes import MatchSetup, make_match_setup, make_scene
 from app.sample.write import JPEG_QUALITY, ZIP_DATE
 from app.soccer.group import Group, View, make_view_letter
 
@@ -43,7 +43,7 @@ CLEAN = "clean"
 
 
 @dataclass(frozen=True)
-class Lesson:
+class LessonRecipe:
     """Which scene a lesson is made of.
 
     Attributes:
@@ -60,14 +60,14 @@ class Lesson:
 
 
 LESSONS = (
-    Lesson(CLEAN, 3),
-    Lesson("wrong_label", 102, view=1, seed=1),
-    Lesson("swapped_sides", 201, view=1),
-    Lesson("bad_point", 368, view=0, seed=1),
-    Lesson("missing_ball", 401, view=1),
-    Lesson("not_synchronous", 503, view=1, seed=1),
-    Lesson("undrawn_line", 618, view=0, seed=1),
-    Lesson("tiny_baseline", 701, view=1, seed=1),
+    LessonRecipe(CLEAN, 3),
+    LessonRecipe("wrong_label", 102, view=1, seed=1),
+    LessonRecipe("swapped_sides", 201, view=1),
+    LessonRecipe("bad_point", 368, view=0, seed=1),
+    LessonRecipe("missing_ball", 401, view=1),
+    LessonRecipe("not_synchronous", 503, view=1, seed=1),
+    LessonRecipe("undrawn_line", 618, view=0, seed=1),
+    LessonRecipe("tiny_baseline", 701, view=1, seed=1),
 )
 
 
@@ -77,12 +77,12 @@ def make_practice_scenes() -> list[Scene]:
     return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
 
 
-def make_practice_stage() -> MatchStage:
+def make_practice_stage() -> MatchSetup:
     """The match that all lessons are from."""
-    return make_stage(0, MATCH_GROUPS, SEED)
+    return make_match_setup(0, MATCH_GROUPS, SEED)
 
 
-def _fault_plan_of_lesson(lesson: Lesson) -> FaultPlan | None:
+def _fault_plan_of_lesson(lesson: LessonRecipe) -> FaultPlan | None:
     if lesson.kind == CLEAN:
         return None
     return FaultPlan(lesson.kind, lesson.view, lesson.seed)
@@ -314,7 +314,7 @@ class _LessonTexts:
 
     def __init__(self, truth: SceneTruth, group: Group):
         self._words = WORDS[find_lesson_kind(truth)]
-        self._values = _fault_values(truth.faults, group)
+        self._values = _make_fault_text_values(truth.faults, group)
 
     @property
     def fixed_sentence(self) -> str:
@@ -339,7 +339,7 @@ _PLAIN = ("You ", "Your ", "The ", "It ", "A ", "Leaving ", "Nothing ")
 """Beginnings that are written small behind a colon."""
 
 
-def _fault_values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
+def _make_fault_text_values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
     if not faults:
         return {}
     first = faults[0]

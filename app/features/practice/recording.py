@@ -129,7 +129,7 @@ def make_recording_practice(
         recording = index_recording_in_worker(store, recording.id, progress=reading, stop=stop)
         truth = _read_truth(settings)
         assert truth is not None
-        _plant_faults(store, recording, truth, progress, actor, stop)
+        _track_shots_and_plant_faults(store, recording, truth, progress, actor, stop)
     return {"dataset": name, "recording": recording.id, "made": True}
 
 
@@ -148,7 +148,7 @@ def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
     )
 
 
-def _plant_faults(
+def _track_shots_and_plant_faults(
     store: Store,
     recording: Recording,
     truth: FilmTruth,

@@ -100,7 +100,9 @@ class FilmTruth:
 
 def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
     """How many shots are where they are in truth, and of their kind."""
-    wrong = [one for one in truth.shots if not any(_is_same_shot(one, other) for other in shots)]
+    wrong = [
+        one for one in truth.shots if not any(_is_nearly_same_shot(one, other) for other in shots)
+    ]
     right = len(truth.shots) - len(wrong)
     told = f"{right} of {plural(len(truth.shots), 'shot')} are right."
     if wrong:
@@ -125,7 +127,7 @@ def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
     )
 
 
-def _is_same_shot(one: Shot, other: Shot) -> bool:
+def _is_nearly_same_shot(one: Shot, other: Shot) -> bool:
     ends = max(abs(one.first - other.first), abs(one.last - other.last))
     return ends <= NEAR_FRAMES and one.kind == other.kind
 
@@ -206,8 +208,8 @@ def judge_replay_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Re
 def judge_replay_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
     """How far the times of the replay are from the truth."""
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
-    mine = [one for one in links if _overlaps_shot(one.replay.frames, replay)]
-    fitting = [one for one in mine if _overlaps_shot(one.live.frames, live)]
+    mine = [one for one in links if _covers_most_of_shot(one.replay.frames, replay)]
+    fitting = [one for one in mine if _covers_most_of_shot(one.live.frames, live)]
     known = next((one for one in fitting if one.map.is_usable), None)
     state: State = "open"
     off = None
@@ -244,7 +246,7 @@ def judge_replay_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingL
     )
 
 
-def _overlaps_shot(frames: range, shot: Shot) -> bool:
+def _covers_most_of_shot(frames: range, shot: Shot) -> bool:
     """Whether most of a shot's frames are among some."""
     both = min(frames[-1], shot.last) - max(frames[0], shot.first) + 1
     return both > (shot.last - shot.first + 1) / 2

@@ -32,7 +32,7 @@ LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 router = APIRouter(tags=["practice"], route_class=Route)
 
 
-class PracticeBody(BaseModel):
+class StartPracticeRequest(BaseModel):
     """How the practice begins."""
 
     model_config = ConfigDict(extra="forbid")
@@ -132,7 +132,7 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_practice(
-    request: PracticeBody, services: AppServices, actor: Actor, person: Person
+    request: StartPracticeRequest, services: AppServices, actor: Actor, person: Person
 ) -> Job:
     """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
 
@@ -173,7 +173,7 @@ def get_recording_practice(
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_recording_practice(
-    request: PracticeBody, services: AppServices, actor: Actor, person: Person
+    request: StartPracticeRequest, services: AppServices, actor: Actor, person: Person
 ) -> Job:
     """Draw a film with planted faults as a recording of the dataset `recording practice`; with `again` it begins afresh.
 

@@ -118,7 +118,7 @@ def request_practice(
     )
 
 
-def resume_practice(jobs: Jobs, store: Store) -> None:
+def register_practice_resume(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
     jobs.register_resume(KIND, partial(run_practice_job, store))

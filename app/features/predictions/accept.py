@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import find_box_problem
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.edit import SetBalls, require_view, set_ball
+from app.features.groups.edit import SetBalls, make_set_ball_edit, require_view
 from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.view_queries import (
@@ -69,7 +69,7 @@ class AcceptRequest:
 
 
 @dataclass(frozen=True)
-class AcceptedView:
+class ViewAcceptDecision:
     """One view whose prediction is to be accepted, or why not."""
 
     view_id: int
@@ -90,7 +90,7 @@ class AcceptPlan:
     """
 
     predictions: PredictionSet
-    changes: tuple[AcceptedView, ...]
+    changes: tuple[ViewAcceptDecision, ...]
     refused: dict[str, int]
 
     @property
@@ -218,7 +218,7 @@ def accept_box(
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
-    edit = set_ball(view.key, annotation_from_prediction(box, name))
+    edit = make_set_ball_edit(view.key, annotation_from_prediction(box, name))
     if not replace:
         _require_no_other_ball(load_group_state(store, view.group_id), edit, if_match)
     return submit_edit(store, view.group_id, edit, if_match=if_match, actor=actor)
@@ -252,7 +252,7 @@ def _read_views(session: Session, dataset_id: int, request: AcceptRequest) -> li
 
 def _judge_box(
     row: StoredView, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest
-) -> AcceptedView:
+) -> ViewAcceptDecision:
     best = max(boxes, key=lambda box: (box.score, -box.id))
     balls = row.balls
     why = None
@@ -264,7 +264,7 @@ def _judge_box(
         why = "the_same"
     elif balls and not request.replace:
         why = "annotated"
-    return AcceptedView(row.id, row.key, row.group_id, row.group, best, why)
+    return ViewAcceptDecision(row.id, row.key, row.group_id, row.group, best, why)
 
 
 def _find_box_problem(box: PredictedBox, view: StoredView) -> str | None:
@@ -273,8 +273,10 @@ def _find_box_problem(box: PredictedBox, view: StoredView) -> str | None:
     return find_box_problem(place, ImageSize(view.width, view.height))
 
 
-def _group_by_group_id(items: Sequence[AcceptedView]) -> Iterator[tuple[int, list[AcceptedView]]]:
-    groups: dict[int, list[AcceptedView]] = {}
+def _group_by_group_id(
+    items: Sequence[ViewAcceptDecision],
+) -> Iterator[tuple[int, list[ViewAcceptDecision]]]:
+    groups: dict[int, list[ViewAcceptDecision]] = {}
     for item in items:
         groups.setdefault(item.group_id, []).append(item)
     yield from groups.items()
@@ -282,7 +284,7 @@ def _group_by_group_id(items: Sequence[AcceptedView]) -> Iterator[tuple[int, lis
 
 def _submit_accept_edit(
     store: Store,
-    item: AcceptedView,
+    item: ViewAcceptDecision,
     name: str,
     request: AcceptRequest,
     actor: str,
@@ -297,7 +299,7 @@ def _submit_accept_edit(
         if report is not None:
             session.respond(report)
 
-    edit = set_ball(item.view, annotation_from_prediction(item.box, name))
+    edit = make_set_ball_edit(item.view, annotation_from_prediction(item.box, name))
     for _ in range(TRIES):
         try:
             state = load_group_state(store, item.group_id)
@@ -323,7 +325,7 @@ def _submit_accept_edit(
 
 
 def _is_view_still_acceptable(
-    state: GroupState, item: AcceptedView, request: AcceptRequest
+    state: GroupState, item: ViewAcceptDecision, request: AcceptRequest
 ) -> bool:
     view: View | None = state.group.view(item.view)
     return view is not None and (request.replace or not view.balls)

@@ -34,7 +34,7 @@ from app.wording import plural
 if TYPE_CHECKING:
     from app.evaluation.result import Cell, Table
     from app.features.predictions.detect import OnnxModel
-    from app.features.predictions.evaluation_run import SourcesRequest
+    from app.features.predictions.evaluation_run import SourcesEvaluationRequest
 
 
 commands = typer.Typer()
@@ -322,7 +322,7 @@ def _parse_frame_range(text: str) -> range:
         raise typer.BadParameter(f'--frames "{text}" is not FIRST-LAST') from error
 
 
-def print_set(found: Mapping[str, Any]) -> None:
+def print_prediction_set(found: Mapping[str, Any]) -> None:
     """What was read into a set, and what could not be read."""
     say(
         f"{found['source']}: {plural(found['boxes'], 'box', 'boxes')} in {plural(found['frames'], 'frame')}, "
@@ -395,10 +395,10 @@ def evaluate(
     """
     if predictions is None and careful is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --careful")
-    from app.features.predictions.evaluation_run import EvaluationRequest, SourcesRequest
+    from app.features.predictions.evaluation_run import EvaluationRequest, SourcesEvaluationRequest
     from app.features.predictions.reader import PredictionFiles
 
-    request = SourcesRequest(
+    request = SourcesEvaluationRequest(
         EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
         PredictionFiles(predictions, format_, images, cameras, category, size, cameras_size),
         PredictionFiles(careful, careful_format, category=careful_category, size=careful_size),
@@ -410,15 +410,15 @@ def evaluate(
     with show_progress("Evaluating") as progress:
         values, sets = run(dataset, request, out, progress)
     if json_:
-        print_json({**values, "sets": [_make_set_values(item) for item in sets]})
+        print_json({**values, "sets": [_prediction_set_to_values(item) for item in sets]})
         return
     for item in sets:
-        print_set(item)
+        print_prediction_set(item)
     _print_evaluation(values)
 
 
 def _evaluate_locally(
-    dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
+    dataset: str, request: SourcesEvaluationRequest, out: Path | None, progress: ReportProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
     from app.features.predictions.evaluation import evaluation_to_values, write_evaluation
@@ -436,7 +436,7 @@ def _evaluate_locally(
 def _evaluate_on_server(
     server: ServerPlace,
     dataset: str,
-    request: SourcesRequest,
+    request: SourcesEvaluationRequest,
     out: Path | None,
     progress: ReportProgress,
 ) -> tuple[_Values, list[_Values]]:
@@ -446,7 +446,7 @@ def _evaluate_on_server(
     with connect_to_server(server) as client:
         values, sets = remote.evaluate_on_server(client, dataset, request, progress)
         if out is not None:
-            remote.write_evaluation(client, values, out)
+            remote.download_evaluation(client, values, out)
     return values, sets
 
 
@@ -485,7 +485,7 @@ def _format_number(cell: Cell) -> str:
     return f"{cell.value:.3g}{spread} (n {counts})"
 
 
-def _make_set_values(found: _Values) -> _Values:
+def _prediction_set_to_values(found: _Values) -> _Values:
     """What is printed of a set, with what could not be read of it."""
     return {
         "id": found["id"],

@@ -245,7 +245,7 @@ def _build_frame_conditions(query: FrameQuery) -> list[FrameCondition]:
     if query.field is not None:
         field = _validate_field(query.field, "/field")
         where.append(
-            frame_rows.missing_condition(field)
+            frame_rows.ball_without_number_condition(field)
             if query.missing
             else frame_rows.between_condition(field, query.low, query.high)
         )

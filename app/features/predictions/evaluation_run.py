@@ -76,7 +76,7 @@ WARNED = ("detection", "localization", "boxes")
 
 
 @dataclass(frozen=True)
-class AcceptedTruth:
+class AcceptedTruthCounts:
     """How many frames of a run have a ball that a person accepted from a prediction.
 
     Attributes:
@@ -90,10 +90,10 @@ class AcceptedTruth:
     of: int
 
     @staticmethod
-    def count(frames: Sequence[Frame], boxes: str, name: str | None) -> AcceptedTruth:
+    def count(frames: Sequence[Frame], boxes: str, name: str | None) -> AcceptedTruthCounts:
         """Count over frames that have a box of that kind; ``name`` is that of the evaluated set."""
         judged = [frame.predicted_by for frame in frames if boxes in frame.boxes]
-        return AcceptedTruth(
+        return AcceptedTruthCounts(
             sum(map(bool, judged)),
             sum(source == name for source in judged if source),
             len(judged),
@@ -160,10 +160,10 @@ class EvaluationRequest:
             )
         if len(self.name) > MAX_NAME:
             raise InputError(f"a name has at most {MAX_NAME} characters", pointer="/name")
-        check_groups(self.groups, self.version)
+        refuse_group_rule_beside_version(self.groups, self.version)
 
 
-def check_groups(groups: str, version: int | str | None) -> None:
+def refuse_group_rule_beside_version(groups: str, version: int | str | None) -> None:
     """Refuse a rule for groups beside a version, which has its own groups.
 
     Raises:
@@ -224,7 +224,7 @@ def run_evaluation(
         )
         result = evaluate(truth.frames, inputs, options, progress)
         own = sets["predictions"].name if "predictions" in sets else None
-        accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
+        accepted = AcceptedTruthCounts.count(truth.frames, request.boxes, own)
         result = replace(result, tables=tuple(accepted.add_warnings(result.tables)))
         more = {
             "gone": truth.gone,
@@ -246,7 +246,9 @@ def run_evaluation(
     return _save_evaluation(store, values, result)
 
 
-def check_evaluation(store: Store, dataset: str | int, request: EvaluationRequest) -> None:
+def require_valid_evaluation_request(
+    store: Store, dataset: str | int, request: EvaluationRequest
+) -> None:
     """Refuse at once what ``run_evaluation`` would refuse for its sets or its version."""
     request.check()
     with store.read() as session:
@@ -380,7 +382,7 @@ def _save_evaluation(
 
 
 @dataclass(frozen=True)
-class SourcesRequest:
+class SourcesEvaluationRequest:
     """What to evaluate, its sets still to be read or found.
 
     Attributes:
@@ -403,7 +405,7 @@ class SourcesRequest:
         """
         self.predictions.check()
         self.careful.check("careful-")
-        check_groups(self.request.groups, self.version)
+        refuse_group_rule_beside_version(self.request.groups, self.version)
 
 
 @dataclass(frozen=True)
@@ -417,7 +419,7 @@ class EvaluatedSources:
 def evaluate_sources(
     store: Store,
     dataset: str | int,
-    wanted: SourcesRequest,
+    wanted: SourcesEvaluationRequest,
     *,
     actor: str,
     progress: ReportProgress | None = None,

@@ -18,7 +18,7 @@ from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
 from app.formats.manifest import read_software_version
 from app.json_text import quote_text
-from app.soccer.ball_boxes import collect_ball_boxes, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, is_ball_3d_valid_in_view
 from app.soccer.choices import LiveRule
 from app.soccer.codec import digest_json, policy_to_json
 from app.soccer.group import Group
@@ -115,7 +115,7 @@ def iterate_group_frames(
     """
     for view in group.views:
         solved = solution.view(view.key)
-        inside = has_ball_3d(solution, view)
+        inside = is_ball_3d_valid_in_view(solution, view)
         yield Frame(
             id=view_ids[view.key],
             group_id=group_id,

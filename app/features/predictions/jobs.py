@@ -22,7 +22,7 @@ from app.features.predictions.accept import (
 from app.features.predictions.evaluation import list_evaluations
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
-    check_evaluation,
+    require_valid_evaluation_request,
     run_evaluation,
 )
 from app.features.predictions.queries import StoredEvaluation
@@ -40,7 +40,7 @@ def request_evaluation(
         InputError, NotFoundError: As ``run_evaluation`` does.
     """
     found = get_dataset_head(store, dataset)
-    check_evaluation(store, found.id, request)
+    require_valid_evaluation_request(store, found.id, request)
     return jobs.submit(
         EVALUATE,
         f"Evaluate {request.name or 'predictions'} on {found.name}",
@@ -71,7 +71,7 @@ def request_accept(
     )
 
 
-def resume_evaluations(jobs: Jobs, store: Store) -> None:
+def resume_prediction_jobs(jobs: Jobs, store: Store) -> None:
     """Let evaluations that an earlier server was at go on, and another process accept predictions
     than the one that was asked."""
 

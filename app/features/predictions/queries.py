@@ -14,7 +14,7 @@ from app.db.json_columns import (
     compress_json,
     decompress_json,
     parse_json_column,
-    report_damaged_values,
+    translate_shape_errors_to_damage,
 )
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
@@ -219,7 +219,7 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
     """Every camera of a set, by id of the view."""
     model = PredictedCameraModel
     rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return {row.view_id: camera_from_json(parse_json_column(row.camera)) for row in rows}
 
 
@@ -227,7 +227,7 @@ def read_predicted_tracks(session: Session, set_id: int) -> dict[str, PredictedT
     """Every track of a set, by stretch."""
     model = PredictedTrackModel
     rows = session.execute(select(model.stretch, model.body).where(model.set_id == set_id))
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return {row.stretch: PredictedTrack.from_json(decompress_json(row.body)) for row in rows}
 
 
@@ -345,7 +345,7 @@ def between_condition(column: str, low: float | None, high: float | None) -> Fra
     return and_(*where)
 
 
-def missing_condition(column: str) -> FrameCondition:
+def ball_without_number_condition(column: str) -> FrameCondition:
     """The frame has a ball and no such number."""
     return and_(_get_frame_column(column).is_(None), EvaluationFrameModel.ball.is_(True))
 

@@ -16,7 +16,7 @@ from app.evaluation.prediction_files import (
     read_predictions,
 )
 from app.evaluation.prediction_run import LoadedPredictions
-from app.features.imports.upload_queries import upload_path
+from app.features.imports.upload_queries import find_complete_upload_path
 from app.formats.file_tree import ImportLimits
 from app.soccer.frames import ImageSize
 from app.worker_pool import WorkerPool
@@ -118,7 +118,7 @@ def resolve_uploaded_files(
     """
 
     def find_upload_path(upload: str | None) -> Path | None:
-        return None if upload is None else upload_path(settings, upload)
+        return None if upload is None else find_complete_upload_path(settings, upload)
 
     return replace(
         how,

@@ -10,7 +10,7 @@ from app.config import Settings
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
 from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
-from app.features.groups.submit import find_view
+from app.features.groups.submit import find_view_location
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import ACCEPTED, JobDocument, make_job_response
 from app.features.predictions import service as review
@@ -175,7 +175,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
-    find_view(store, view)
+    find_view_location(store, view)
     found = review.read_predictions_of_view(store, view)
     return ViewPredictions(
         items=[ViewPrediction.of(item, box) for item, boxes in found for box in boxes]

@@ -109,7 +109,7 @@ class PredictionProblem(BaseModel):
     problem: str
 
 
-class PredictionReport(BaseModel):
+class PredictionReadingReport(BaseModel):
     """What reading the files met; lists are cut after 100 entries, counts are whole."""
 
     read: int = Field(default=0, description="Boxes that the file holds.")
@@ -138,7 +138,7 @@ class PredictionSetDocument(Document):
     cameras: int
     tracks: int = Field(description="Stretches over which the ball was predicted in 3D.")
     unknown: int = Field(description="Frames that the dataset does not have.")
-    report: PredictionReport
+    report: PredictionReadingReport
 
 
 class PredictionSetList(ListDocument[PredictionSetDocument]):

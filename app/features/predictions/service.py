@@ -39,7 +39,7 @@ from app.formats.file_tree import ImportLimits
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.json_text import canonical_json_text, quote_text
-from app.object_store.path import unseal_address
+from app.object_store.path import split_pinned_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
 
@@ -304,7 +304,7 @@ def _make_picture_name(media: Media | None) -> str:
     """Name of the file of a picture with its last folder; empty where a view has none of its own."""
     if media is None or media.frame is not None:
         return ""
-    return "/".join(PurePosixPath(media.member or unseal_address(media.path)[0]).parts[-2:])
+    return "/".join(PurePosixPath(media.member or split_pinned_address(media.path)[0]).parts[-2:])
 
 
 def _make_reading_report(boxes: LoadedPredictions, cameras: LoadedPredictedCameras) -> Json:

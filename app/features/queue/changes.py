@@ -68,7 +68,7 @@ class NewChanges:
     solved: list[LoggedChange]
 
 
-def read_position(store: Store) -> int:
+def read_newest_entry_id(store: Store) -> int:
     """Id of the log's last entry; 0 for an empty log."""
     with store.read() as session:
         return find_newest_entry_id(session)

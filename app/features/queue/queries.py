@@ -25,7 +25,7 @@ from sqlalchemy.sql.visitors import iterate
 
 from app.db.dialects.dialect import select_from_number_list
 from app.db.session import Session
-from app.features.agreement.queries import select_groups_in_state
+from app.features.agreement.queries import select_groups_in_agreement_state
 from app.features.batches.queries import select_groups_in_batches
 from app.features.comments.queries import select_groups_with_mentions, select_groups_with_threads
 from app.features.independent_annotations.queries import select_groups_with_annotations
@@ -124,7 +124,7 @@ def mentions_person(name: str | None = None) -> Condition:
     return QueueModel.group_id.in_(select_groups_with_mentions(name))
 
 
-def has_annotations(op: str, number: float) -> Condition:
+def has_annotation_count(op: str, number: float) -> Condition:
     """So many people have handed in an annotation of their own; most groups have none."""
     if not _COMPARED[op](0, number):
         return QueueModel.group_id.in_(select_groups_with_annotations(_COMPARED[op], number))
@@ -132,9 +132,9 @@ def has_annotations(op: str, number: float) -> Condition:
     return QueueModel.group_id.not_in(select_groups_with_annotations(_NOT[op], number))
 
 
-def has_outcome(state: str) -> Condition:
+def has_comparison_outcome(state: str) -> Condition:
     """Its annotations were compared, in some batch, and came to that."""
-    return QueueModel.group_id.in_(select_groups_in_state(state))
+    return QueueModel.group_id.in_(select_groups_in_agreement_state(state))
 
 
 def any_condition(conditions: Iterable[Condition]) -> Condition:
@@ -465,7 +465,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[State
     return session.rows(StateCount, statement)
 
 
-def count_groups_to_solve(session: Session) -> tuple[int, int, str | None]:
+def read_solving_backlog(session: Session) -> tuple[int, int, str | None]:
     """How many groups there are, how many wait to be solved, and since when (UTC) the one that
     waits longest does: from its last change, or from that of its dataset's policy where that came
     later; None: none waits."""
@@ -483,7 +483,9 @@ def count_groups_to_solve(session: Session) -> tuple[int, int, str | None]:
     return total, sum(count for _, count, _ in rows), min(since, default=None)
 
 
-def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, str], int]:
+def count_reviewed_by_person_and_status(
+    session: Session, dataset_id: int
+) -> dict[tuple[str | None, str], int]:
     """How many groups have a verdict that counts, by who gave it and their status."""
     statement = (
         select(QueueModel.reviewer, QueueModel.status, func.count())

@@ -173,9 +173,11 @@ def _condition_of_term(term: _QueryTerm) -> Condition:
     if term.field in NUMBERS:
         return _number_condition(term)
     if term.field == "submissions" and term.value == "none":
-        return conditions.has_annotations("=", 0)
+        return conditions.has_annotation_count("=", 0)
     if term.field == "submissions":
-        return conditions.has_annotations("=" if term.op == ":" else term.op, _parse_number(term))
+        return conditions.has_annotation_count(
+            "=" if term.op == ":" else term.op, _parse_number(term)
+        )
     if term.field == "id":
         return conditions.has_group_id(_parse_id(term, text) for text in term.value.split(","))
     if term.field == "batch":
@@ -288,8 +290,8 @@ def _annotations_condition(term: _QueryTerm, value: str) -> Condition:
     """What people's own annotations of it came to."""
     choice = _require_choice(term, value)
     if choice in ("any", "none"):
-        return _any_or_none_condition(choice, conditions.has_annotations(">", 0))
-    return conditions.has_outcome("open" if choice == "waiting" else choice)
+        return _any_or_none_condition(choice, conditions.has_annotation_count(">", 0))
+    return conditions.has_comparison_outcome("open" if choice == "waiting" else choice)
 
 
 def _mentions_condition(_term: _QueryTerm, value: str) -> Condition:

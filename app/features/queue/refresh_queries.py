@@ -42,7 +42,7 @@ from app.features.solutions.queries import (
     read_summary,
     select_current_solution_id,
 )
-from app.features.verdicts.queries import StoredVerdict, is_fixed
+from app.features.verdicts.queries import StoredVerdict, is_group_mended
 from app.features.verdicts.tables import VerdictModel
 from app.soccer.finding import Finding
 
@@ -61,7 +61,7 @@ def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
         _replace_rows(session, group_ids[start : start + _BATCH])
 
 
-def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
+def refresh_verdict_columns(session: Session, group_ids: Sequence[int]) -> None:
     """Bring only what verdicts say in step: a fraction of the work of ``refresh_queue``."""
     for start in range(0, len(group_ids), _BATCH):
         ids = group_ids[start : start + _BATCH]
@@ -112,7 +112,7 @@ def update_row(
     session.execute(_ROW, {"row": stored.id, **values})
 
 
-def update_verdict(
+def update_row_verdict(
     session: Session, stored: StoredGroup, verdict: StoredVerdict, passes: bool | None
 ) -> None:
     """Show a new verdict in a group's row; the rest of it is in step."""
@@ -287,7 +287,7 @@ def _make_verdict_columns(
         "reason": verdict.reason,
         "reviewer": verdict.actor,
         "override": verdict.override,
-        "fixed": is_fixed(verdict, head.id in edited, passes),
+        "fixed": is_group_mended(verdict, head.id in edited, passes),
     }
 
 

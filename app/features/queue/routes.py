@@ -16,15 +16,15 @@ from app.features.groups.history import STATION_EDITS
 from app.features.groups.schemas import url_of_image
 from app.features.groups.solution_schemas import (
     XY,
-    DismissedDocument,
+    DismissalDocument,
+    EditOfferDocument,
     FailingGate,
     FindingDocument,
     FixDocument,
-    GuideDocument,
+    FixGuideDocument,
     Jac,
-    OfferDocument,
 )
-from app.features.groups.submit import find_view
+from app.features.groups.submit import find_view_location
 from app.features.groups.suggested_edits import MarkingInfluence, measure_marking_influences
 from app.features.groups.suggestions import Suggestion, find_suggestions
 from app.features.people.visibility_queries import has_hidden_groups
@@ -32,11 +32,11 @@ from app.features.queue.fields import FIELDS, ORDERS, FieldKind
 from app.features.queue.service import GroupRow as QueueRow
 from app.features.queue.service import Neighbours as QueueNeighbours
 from app.features.queue.statistics import (
+    BallPositionCounts,
+    MatchSplitCounts,
     Measure,
+    MeasureCountsOfSplit,
     MeasureHistogram,
-    MeasureSeries,
-    Positions,
-    Share,
     Statistics,
     Timeline,
     read_statistics,
@@ -192,11 +192,11 @@ class FindingRow(Document):
     confidence: float | None
     sentence: str
     fix: FixDocument | None
-    offers: list[OfferDocument] = Field(description="Edits that correct it.")
-    guide: GuideDocument | None = Field(
+    offers: list[EditOfferDocument] = Field(description="Edits that correct it.")
+    guide: FixGuideDocument | None = Field(
         description="Where a person has to look or draw; null if edits are offered, or nothing."
     )
-    dismissed: DismissedDocument | None = Field(
+    dismissed: DismissalDocument | None = Field(
         description="Person who dismissed the finding; null: not dismissed."
     )
 
@@ -239,7 +239,7 @@ class LogEntryDocument(Document):
         return LogEntryDocument.model_validate({**vars(entry), "body": body})
 
 
-class History(ListDocument[LogEntryDocument]):
+class GroupHistory(ListDocument[LogEntryDocument]):
     """What people and imports did to a group, oldest first."""
 
 
@@ -301,7 +301,7 @@ class StatisticsHistogram(Document, shows=Measure):
         "and all that is smaller than the second edge.",
     )
     queries: list[str] = Field(description="For each bar, the query that finds its groups.")
-    series: list[MeasureSeries]
+    series: list[MeasureCountsOfSplit]
 
     @model_validator(mode="before")
     @classmethod
@@ -325,8 +325,8 @@ class StatisticsDocument(Document):
 
     groups: int
     histograms: list[StatisticsHistogram]
-    positions: Positions
-    matches: list[Share]
+    positions: BallPositionCounts
+    matches: list[MatchSplitCounts]
     splits: list[SplitShare]
 
 
@@ -372,10 +372,10 @@ class SuggestionDocument(Document):
     view: str | None
     sentence: str = Field(description='Reads on after "would pass if".')
     edit: SuggestedEdit
-    offers: list[OfferDocument] = Field(
+    offers: list[EditOfferDocument] = Field(
         description="Edits that carry it out; none where a person has to look or draw."
     )
-    guide: GuideDocument | None = Field(
+    guide: FixGuideDocument | None = Field(
         description="Where that person is led; null where edits are offered."
     )
     value: float | None = Field(description="The gate's value after the edit.")
@@ -389,11 +389,11 @@ class SuggestionDocument(Document):
         return value
 
 
-class Suggestions(ListDocument[SuggestionDocument]):
+class GroupFixSuggestions(ListDocument[SuggestionDocument]):
     """What would make a group pass, the gentlest first; empty when it passes."""
 
 
-class InfluenceDocument(Document, shows=MarkingInfluence):
+class MarkingInfluenceDocument(Document, shows=MarkingInfluence):
     """What the camera would be without one marking."""
 
     jac: Jac | None = Field(description="JaC of the view as it is, by gamma in per cent.")
@@ -406,7 +406,7 @@ class InfluenceDocument(Document, shows=MarkingInfluence):
     )
 
 
-class Influences(ListDocument[InfluenceDocument]):
+class MarkingInfluences(ListDocument[MarkingInfluenceDocument]):
     """The influence of every annotated marking of a view."""
 
 
@@ -453,13 +453,13 @@ def get_timeline(
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(COMPUTE)
 @paged()
-def get_suggestions(group: Id, store: AppStore) -> Suggestions:
+def get_suggestions(group: Id, store: AppStore) -> GroupFixSuggestions:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
     state = submit.load_solved_group(store, group)
     if state.solution is None:
-        return Suggestions(items=[])
+        return GroupFixSuggestions(items=[])
     found = find_suggestions(state.group, state.policy, state.solution)
-    return Suggestions(items=found)
+    return GroupFixSuggestions(items=found)
 
 
 @insight_router.get(
@@ -468,10 +468,10 @@ def get_suggestions(group: Id, store: AppStore) -> Suggestions:
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(COMPUTE)
 @paged()
-def get_influence(view: Id, store: AppStore) -> Influences:
+def get_influence(view: Id, store: AppStore) -> MarkingInfluences:
     """What the camera of a view would be without each of its markings; saves nothing."""
-    found = find_view(store, view)
+    found = find_view_location(store, view)
     state = submit.load_group_state(store, found.group_id)
     seen = next(item for item in state.group.views if state.view_ids[item.key] == view)
     items = measure_marking_influences(seen.station, state.group.pitch, state.policy.calibration)
-    return Influences(items=items)
+    return MarkingInfluences(items=items)

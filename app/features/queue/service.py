@@ -14,7 +14,7 @@ import numpy as np
 
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
-from app.features.agreement.queries import read_group_states
+from app.features.agreement.queries import read_agreement_states
 from app.features.comments.queries import count_open_threads
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
@@ -205,7 +205,7 @@ def list_groups(
             more = len(rows) > limit
         ids = [row.group_id for row in rows[:limit]]
         comments, annotations = count_open_threads(session, ids), count_submitted(session, ids)
-        states = read_group_states(session, list(annotations)) if annotations else {}
+        states = read_agreement_states(session, list(annotations)) if annotations else {}
     rows = rows[:limit]
     following = encode_cursor(parsed, order.keys_of(rows[-1])) if more else None
     found = [
@@ -330,7 +330,7 @@ def find_bin_indices(
 
 
 @dataclass(frozen=True)
-class HistogramColumn:
+class HistogramBins:
     """The bins of a number's histogram; the first bin has no lower end.
 
     Attributes:
@@ -344,12 +344,12 @@ class HistogramColumn:
 
 
 COLUMNS = {
-    "jac": HistogramColumn(make_even_bins(0, 1, 20), open_high=False),
-    "error_percent": HistogramColumn(ERROR_PERCENT, log=True),
-    "sigma": HistogramColumn(SIGMA_M, log=True),
-    "parallax": HistogramColumn(make_even_bins(0, 180, 20), open_high=False),
-    "size_ratio": HistogramColumn(make_even_bins(0, 2, 20)),
-    "agreement": HistogramColumn(make_even_bins(0, 1, 20), open_high=False),
+    "jac": HistogramBins(make_even_bins(0, 1, 20), open_high=False),
+    "error_percent": HistogramBins(ERROR_PERCENT, log=True),
+    "sigma": HistogramBins(SIGMA_M, log=True),
+    "parallax": HistogramBins(make_even_bins(0, 180, 20), open_high=False),
+    "size_ratio": HistogramBins(make_even_bins(0, 2, 20)),
+    "agreement": HistogramBins(make_even_bins(0, 1, 20), open_high=False),
 }
 """The bins are fixed, so that they stay put while one filters."""
 
@@ -358,13 +358,13 @@ COLUMNS = {
 class Histogram:
     """Counts of a column over the groups that match; ``unknown`` ones have no such number."""
 
-    column: HistogramColumn
+    column: HistogramBins
     counts: tuple[int, ...]
     unknown: int
 
 
 @dataclass(frozen=True)
-class Summary:
+class MatchingGroupsSummary:
     """How many groups match, how many of them are in each state, and the histograms."""
 
     groups: int
@@ -377,7 +377,7 @@ class Summary:
     histograms: dict[str, Histogram]
 
 
-def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
+def summarize_groups(store: Store, dataset_id: int, query: str = "") -> MatchingGroupsSummary:
     """Progress and histograms over the groups of a dataset that match a query.
 
     Raises:
@@ -392,7 +392,7 @@ def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
         zip(*rows, strict=True) if rows else ((),) * (3 + len(COLUMNS))
     )
     states = Counter(status)
-    return Summary(
+    return MatchingGroupsSummary(
         groups=len(rows),
         solved=sum(solved),
         stale=sum(stale),
@@ -404,7 +404,7 @@ def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
     )
 
 
-def _make_histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
+def _make_histogram(column: HistogramBins, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
     place = find_bin_indices(column.edges, numbers, open_low=True, open_high=column.open_high)
     counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)

@@ -40,7 +40,7 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class MeasureSeries:
+class MeasureCountsOfSplit:
     """Counts of one split; ``unknown`` groups have no such number.
 
     Attributes:
@@ -58,11 +58,11 @@ class MeasureHistogram:
 
     measure: Measure
     queries: tuple[str, ...]
-    series: tuple[MeasureSeries, ...]
+    series: tuple[MeasureCountsOfSplit, ...]
 
 
 @dataclass(frozen=True)
-class Positions:
+class BallPositionCounts:
     """Balls on the pitch in cells, metres of the pitch frame; ``counts`` by row of y, then x.
 
     Attributes:
@@ -79,7 +79,7 @@ class Positions:
 
 
 @dataclass(frozen=True)
-class Share:
+class MatchSplitCounts:
     """Groups of a match, or of a split (its ``match`` is empty)."""
 
     match: str
@@ -95,9 +95,9 @@ class Statistics:
 
     groups: int
     histograms: tuple[MeasureHistogram, ...]
-    positions: Positions
-    matches: tuple[Share, ...]
-    splits: tuple[Share, ...]
+    positions: BallPositionCounts
+    matches: tuple[MatchSplitCounts, ...]
+    splits: tuple[MatchSplitCounts, ...]
 
 
 MEASURES = (
@@ -177,10 +177,10 @@ def read_statistics(store: Store, dataset_id: int, query: str = "") -> Statistic
     conditions = parse_query(query).conditions
     with store.read() as session:
         rows = GroupListing(session, dataset_id, conditions).columns(COLUMNS)
-    return make_statistics(count_rows(rows))
+    return make_statistics(rows_to_statistics_columns(rows))
 
 
-def count_rows(rows: Sequence[Any]) -> StatisticsColumns:
+def rows_to_statistics_columns(rows: Sequence[Any]) -> StatisticsColumns:
     """Rows of ``COLUMNS`` as they are counted."""
     nothing: list[tuple[Any, ...]] = [()] * len(COLUMNS)
     split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
@@ -214,9 +214,9 @@ def make_statistics(found: StatisticsColumns) -> Statistics:
             _make_histogram(measure, found.bins[place], found)
             for place, measure in enumerate(MEASURES)
         ),
-        positions=_make_positions(found.cell),
-        matches=_make_shares(found, found.match, found.matches),
-        splits=_make_shares(found, np.zeros_like(found.match), ("",)),
+        positions=_count_ball_positions(found.cell),
+        matches=_count_by_match_and_split(found, found.match, found.matches),
+        splits=_count_by_match_and_split(found, np.zeros_like(found.match), ("",)),
     )
 
 
@@ -260,7 +260,7 @@ def _make_histogram(
     code = found.split * width + (place - NOWHERE)
     counts = np.bincount(code, minlength=len(found.splits) * width).reshape(-1, width)
     series = tuple(
-        MeasureSeries(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
+        MeasureCountsOfSplit(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
         for split, row in sorted(zip(found.splits, counts, strict=True), key=_get_pair_name)
         if row.any()
     )
@@ -272,11 +272,11 @@ def _get_pair_name(pair: tuple[str, Any]) -> str:
     return pair[0]
 
 
-def _make_positions(cell: npt.NDArray[np.int16]) -> Positions:
+def _count_ball_positions(cell: npt.NDArray[np.int16]) -> BallPositionCounts:
     rows, columns = len(Y_EDGES) - 1, len(X_EDGES) - 1
     counts = np.bincount(cell.astype(np.int64) - NOWHERE, minlength=rows * columns + 2)
     whole = counts[2:].reshape(rows, columns)
-    return Positions(
+    return BallPositionCounts(
         x_edges=X_EDGES,
         y_edges=Y_EDGES,
         counts=tuple(tuple(row) for row in whole.tolist()),
@@ -284,9 +284,9 @@ def _make_positions(cell: npt.NDArray[np.int16]) -> Positions:
     )
 
 
-def _make_shares(
+def _count_by_match_and_split(
     found: StatisticsColumns, match: npt.NDArray[np.int32], matches: Sequence[str]
-) -> tuple[Share, ...]:
+) -> tuple[MatchSplitCounts, ...]:
     width = max(len(found.splits), 1)
     code = match.astype(np.int64) * width + found.split
     size = len(matches) * width
@@ -295,7 +295,7 @@ def _make_shares(
         for chosen in (slice(None), found.passes, found.accepted)
     )
     shares = [
-        Share(matches[place // width], found.splits[place % width], *counts)
+        MatchSplitCounts(matches[place // width], found.splits[place % width], *counts)
         for place, counts in enumerate(zip(groups, passing, accepted, strict=True))
         if counts[0]
     ]

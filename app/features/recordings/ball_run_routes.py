@@ -8,19 +8,19 @@ from fastapi import APIRouter, Path, Response
 
 from app.features.recordings.ball_run_schemas import (
     BallClickRequest,
-    BallRunChange,
     BallRunDocument,
     BallRunFrames,
     BallRunList,
+    BallRunReviewRequest,
 )
 from app.features.recordings.ball_runs import (
     StoredRun,
     add_ball_run,
-    change_ball_run,
     extend_ball_run,
     get_ball_run,
     list_ball_runs,
     remove_ball_run,
+    review_ball_run,
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
@@ -135,7 +135,7 @@ def mend_one(
 def change_one(
     recording: Id,
     run: RunId,
-    wanted: BallRunChange,
+    wanted: BallRunReviewRequest,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
@@ -149,7 +149,7 @@ def change_one(
     with add_current_state_to_conflicts(
         lambda: BallRunFrames.of(get_ball_run(store, recording, run))
     ):
-        return change_ball_run(
+        return review_ball_run(
             store, recording, run, wanted.value(), if_match, actor=actor, paint=services.paint
         )
 

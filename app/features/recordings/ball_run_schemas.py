@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.recordings.ball_runs import RunChange, StoredRun
+from app.features.recordings.ball_runs import BallRunReview, StoredRun
 from app.features.recordings.follow import EACH_WAY
 from app.features.recordings.schemas import Frame
 from app.http.documents import Document, ListDocument
@@ -32,7 +32,7 @@ class BallClickRequest(BaseModel):
         return BallClick(self.frame, self.x, self.y)
 
 
-class BallRunChange(BaseModel):
+class BallRunReviewRequest(BaseModel):
     """What a person says of a ball run; what is absent stays as it is."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"accepted": True}]})
@@ -45,10 +45,10 @@ class BallRunChange(BaseModel):
         default=None, description="All uncertain frames that are right."
     )
 
-    def value(self) -> RunChange:
+    def value(self) -> BallRunReview:
         """The change as a value."""
         confirmed = None if self.confirmed is None else tuple(self.confirmed)
-        return RunChange(self.accepted, confirmed)
+        return BallRunReview(self.accepted, confirmed)
 
 
 class BallClickDocument(Document, shows=BallClick):

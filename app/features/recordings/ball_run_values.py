@@ -11,7 +11,7 @@ from app.db.json_columns import (
     compress_json,
     decompress_json,
     parse_json_column,
-    report_damaged_values,
+    translate_shape_errors_to_damage,
 )
 from app.soccer.codec import digest_json
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
@@ -109,7 +109,7 @@ def run_from_json(value: Mapping[str, Any]) -> BallRun:
     Raises:
         DamagedError: It is not what was written.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         rows = zip(
             value["frame"],
             *(value[name] for name in _COLUMNS),

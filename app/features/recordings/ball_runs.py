@@ -39,7 +39,7 @@ _BATCH = 100
 
 
 @dataclass(frozen=True)
-class RunChange:
+class BallRunReview:
     """What a person says of a run; what is None stays as it is.
 
     Attributes:
@@ -136,7 +136,7 @@ def extend_ball_run(
         StaleRevisionError: Somebody changed it meanwhile.
     """
     before = get_ball_run(store, recording_id, run_id)
-    _require_open(before, if_match)
+    _require_unaccepted_and_unchanged(before, if_match)
     with follower.mark_frame_being_followed(recording_id, click.frame):
         _, new = _follow_click(store, follower, recording_id, click, before.run)
         return _save_extended_run(store, before, new, if_match, actor)
@@ -149,7 +149,7 @@ def _save_extended_run(
     recording_id, run_id = before.recording, before.id
     with store.write() as session:
         before = _require_ball_run(session, recording_id, run_id)
-        _require_open(before, if_match)
+        _require_unaccepted_and_unchanged(before, if_match)
         run = before.run.merge_run(new)
         kept = [frame for frame in before.confirmed if frame in {ball.frame for ball in run.balls}]
         values = {**run_to_columns(run), "confirmed": canonical_json_text(kept)}
@@ -158,11 +158,11 @@ def _save_extended_run(
     return found
 
 
-def change_ball_run(
+def review_ball_run(
     store: Store,
     recording_id: int,
     run_id: int,
-    change: RunChange,
+    change: BallRunReview,
     if_match: str,
     *,
     actor: str,
@@ -184,10 +184,10 @@ def change_ball_run(
     before = get_ball_run(store, recording_id, run_id)
     require_etag(before.etag, if_match, "this ball run")
     if change.confirmed is not None:
-        _require_open(before, if_match)
+        _require_unaccepted_and_unchanged(before, if_match)
         with store.write() as session, without_pending_response():
             before = _require_ball_run(session, recording_id, run_id)
-            _require_open(before, if_match)
+            _require_unaccepted_and_unchanged(before, if_match)
             text = canonical_json_text(_validate_uncertain_frames(before, change.confirmed))
             before = _save_run_change(session, before, actor, "ball confirmed", confirmed=text)
     groups: Mapping[str, int] = {}
@@ -300,7 +300,7 @@ def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
     return BallAnnotation(box=box, predicted_by=run.name)
 
 
-def _require_open(run: StoredRun, if_match: str) -> None:
+def _require_unaccepted_and_unchanged(run: StoredRun, if_match: str) -> None:
     require_etag(run.etag, if_match, "this ball run")
     if run.accepted_by is not None:
         raise ConflictError("this ball run is accepted", hint="Undo the acceptance first.")

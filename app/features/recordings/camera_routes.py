@@ -12,11 +12,11 @@ from app.features.jobs.schemas import describe_job_response_for_openapi, make_jo
 from app.features.recordings.camera_jobs import request_camera_half_turn, request_camera_tracking
 from app.features.recordings.camera_schemas import (
     CameraFormat,
-    CamerasChange,
     CamerasDocument,
+    CamerasHalfTurnRequest,
     CamerasList,
-    CamerasRequest,
     FrameCamerasDocument,
+    TrackCamerasRequest,
 )
 from app.features.recordings.cameras import (
     MEDIA_TYPES,
@@ -73,7 +73,7 @@ def get_stretches(recording: Id, store: AppStore) -> CamerasList:
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def track_cameras(
-    recording: Id, wanted: CamerasRequest, services: AppServices, actor: Actor
+    recording: Id, wanted: TrackCamerasRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Follow the camera of a stretch without a cut: a camera for each of its frames.
 
@@ -119,7 +119,7 @@ def get_stretch(
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def turn_stretch(
-    recording: Id, frame: Frame, wanted: CamerasChange, services: AppServices, actor: Actor
+    recording: Id, frame: Frame, wanted: CamerasHalfTurnRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Turn the cameras of the stretch that has a frame by half a turn of the pitch, or back.
 
@@ -139,7 +139,7 @@ def turn_stretch(
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @limit(TRANSFER)
-def get_file(
+def get_cameras_file(
     recording: Id,
     frame: Frame,
     store: AppStore,

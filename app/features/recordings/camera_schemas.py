@@ -20,7 +20,7 @@ Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
 CameraFormat = Literal["soccernet", "npz", "opentrackio"]
 
 
-class CamerasRequest(BaseModel):
+class TrackCamerasRequest(BaseModel):
     """A stretch of a recording that is tracked."""
 
     model_config = ConfigDict(
@@ -31,7 +31,7 @@ class CamerasRequest(BaseModel):
     last: Frame = Field(description="Number of its last frame.")
 
 
-class CamerasChange(BaseModel):
+class CamerasHalfTurnRequest(BaseModel):
     """On which side the cameras of a stretch stand."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"turned": True}]})
@@ -41,7 +41,7 @@ class CamerasChange(BaseModel):
     )
 
 
-class ShownPitchSigma(BaseModel):
+class EstimatedPitchSigma(BaseModel):
     """Standard deviations of a pitch that frames show together, metres."""
 
     length: float | None = Field(description="Null where the length is not shown.")
@@ -51,7 +51,7 @@ class ShownPitchSigma(BaseModel):
     tripod: float = Field(description="Of the tripod's position, in the worst direction.")
 
 
-class ShownPitch(BaseModel):
+class EstimatedPitch(BaseModel):
     """The pitch that the frames of a stretch show together: an estimate, which changes nothing."""
 
     length: float | None = Field(description="Metres; null where the frames do not show it.")
@@ -59,7 +59,7 @@ class ShownPitch(BaseModel):
     crown: float = Field(description="How far the grass is raised along the middle, metres.")
     inward: float = Field(description="How far the paint lies inside the plan, metres.")
     tripod: tuple[float, float, float] = Field(description="Where the camera stands, metres.")
-    sigma: ShownPitchSigma = Field(description="Standard deviations of these.")
+    sigma: EstimatedPitchSigma = Field(description="Standard deviations of these.")
     frames: int = Field(description="How many frames it rests on.")
     other: PitchSize | None = Field(
         description="The size, where it certainly is not that of the match's pitch."
@@ -82,7 +82,7 @@ class CameraSummaryDocument(Document, shows=CameraSummary):
     turned: bool = Field(
         description="Whether a person turned them by half a turn of the pitch against what the tracker gave."
     )
-    pitch: ShownPitch | None = Field(
+    pitch: EstimatedPitch | None = Field(
         default=None, description="The pitch that its frames show together."
     )
 
@@ -156,7 +156,7 @@ class FrameCamerasDocument(Document):
             sigma=[
                 None
                 if row["sigma"] is None
-                else [_round_to_three_digits(row["sigma"][name]) for name in _SIGMA]
+                else [_round_to_three_significant_digits(row["sigma"][name]) for name in _SIGMA]
                 for row in rows
             ],
         )
@@ -165,7 +165,7 @@ class FrameCamerasDocument(Document):
 _SIGMA = ("position", "pan", "tilt", "roll", "focal_px")
 
 
-def _round_to_three_digits(value: float) -> float:
+def _round_to_three_significant_digits(value: float) -> float:
     return float(f"{value:.3g}")
 
 

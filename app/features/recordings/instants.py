@@ -27,7 +27,7 @@ from app.features.recordings.link_frames import find_linked_frames
 from app.features.recordings.links import list_links
 from app.features.recordings.match_clock import compute_match_time
 from app.features.recordings.queries import list_views_of_video
-from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
+from app.features.recordings.service import Recording, find_group_ids_by_frame, get_recording
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -150,7 +150,7 @@ def make_groups_of_instants(
     """
     recording = get_recording(store, recording_id)
     numbers = validate_instant_frames(recording, frames)
-    there = find_groups_of_recording(store, recording)
+    there = find_group_ids_by_frame(store, recording)
     replays = _find_linked_views(store, recording, numbers, there) if linked else _LinkedViews()
     wanted = [number for number in numbers if number not in there or number in replays.of]
     index = read_index(store.settings, recording.require_readable())

@@ -13,7 +13,11 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import TooLargeError
-from app.features.imports.upload_queries import get_upload, mark_upload_permanent, upload_path
+from app.features.imports.upload_queries import (
+    find_complete_upload_path,
+    get_upload,
+    mark_upload_permanent,
+)
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
@@ -24,7 +28,7 @@ from app.features.recordings.instants import make_groups_of_instants, validate_i
 from app.features.recordings.service import (
     Recording,
     add_recording,
-    find_groups_of_recording,
+    find_group_ids_by_frame,
     get_recording,
     require_video_file,
 )
@@ -37,7 +41,7 @@ from app.worker_process import WorkerEnded, WorkerLimits
 INDEX, INSTANTS = "recording", "instants"
 
 
-def request_recording(
+def request_recording_import(
     jobs: Jobs,
     store: Store,
     settings: Settings,
@@ -71,7 +75,7 @@ def request_recording(
 def _resolve_video_path(settings: Settings, source: Mapping[str, str]) -> Path:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
-        return require_video_file(upload_path(settings, upload.id).absolute())
+        return require_video_file(find_complete_upload_path(settings, upload.id).absolute())
     found = resolve_folder(settings, source["folder"])
     if not isinstance(found, Path):
         raise TooLargeError(
@@ -103,19 +107,19 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
     name = recording.name
     progress(0, None, f"Reading {name}.")
 
-    def report_instants_step(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_index_step(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
     with leave_work_to_next_server(progress):
         if progress.job.request["shots"] and has_index(store, recording):
             actor = progress.job.actor
             detect_shots_again(
-                store, recording_id, actor=actor, progress=report_instants_step, stop=progress.check
+                store, recording_id, actor=actor, progress=report_index_step, stop=progress.check
             )
             found = get_recording(store, recording_id)
         else:
             found = index_recording_in_worker(
-                store, recording_id, progress=report_instants_step, stop=progress.check
+                store, recording_id, progress=report_index_step, stop=progress.check
             )
     return {
         "recording": found.id,
@@ -140,7 +144,7 @@ class InstantOptions:
     dry_run: bool = False
 
 
-def request_instants(
+def request_groups_of_instants(
     jobs: Jobs,
     store: Store,
     recording_id: int,
@@ -179,7 +183,7 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     asked, actor = progress.job.request, progress.job.actor
     recording = get_recording(store, asked["recording"])
 
-    def report_instants_step(done: int, total: int | None = None, _: str = "") -> None:
+    def report_index_step(done: int, total: int | None = None, _: str = "") -> None:
         progress(done, total, f"{plural(done, 'instant')} of {recording.name} taken.")
 
     with leave_work_to_next_server(progress):
@@ -190,7 +194,7 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
             linked=asked.get("linked", False),
             dry_run=asked.get("dry_run", False),
             actor=actor,
-            progress=report_instants_step,
+            progress=report_index_step,
             stop=progress.check,
         )
     solve = proposals = None
@@ -201,7 +205,7 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
         if asked["propose"] and taken["cameras"] < views:
             number, match = recording.dataset_id, recording.name
             proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
-    groups = find_groups_of_recording(store, recording)
+    groups = find_group_ids_by_frame(store, recording)
     return {
         **taken,
         "dry_run": dry_run,
@@ -242,7 +246,7 @@ def make_groups_in_worker(
     return asdict(taken)
 
 
-def resume_recordings(jobs: Jobs, store: Store) -> None:
+def resume_recording_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on; what is done stays as it is."""
     jobs.register_resume(INDEX, partial(run_index_job, store))
     jobs.register_resume(INSTANTS, partial(run_instants_job, jobs, store))

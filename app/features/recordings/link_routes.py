@@ -10,18 +10,18 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.recordings.link_frames import LinkedFrames, find_linked_frames
 from app.features.recordings.link_schemas import (
-    BallLinkRequest,
     InstantsEdit,
+    LinkByBallRequest,
     LinkDocument,
     LinkList,
-    LiveSuggestions,
+    LiveShotSuggestions,
     NewShotLink,
 )
 from app.features.recordings.link_suggestions import suggest_live_shots
 from app.features.recordings.link_values import ShotLink, format_links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.features.recordings.routes import CSV_FILE
-from app.features.tracks.link_ball import request_ball_link
+from app.features.tracks.link_ball import request_link_by_ball
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.http.documents import make_document_response, make_empty_response, respond_with
@@ -109,9 +109,9 @@ def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -
 @router.get("/links/suggestions/{frame}", operation_id="suggestLive", responses=responses(404, 409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
-def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveSuggestions:
+def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveShotSuggestions:
     """Live shots that the replay at a frame may show, the likeliest first, and why."""
-    return LiveSuggestions(items=suggest_live_shots(store, recording, frame))
+    return LiveShotSuggestions(items=suggest_live_shots(store, recording, frame))
 
 
 @router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
@@ -177,14 +177,16 @@ def put_instants(
 )
 @respond_with(make_job_response)
 def link_by_ball(
-    recording: Id, link: LinkId, wanted: BallLinkRequest, services: AppServices, actor: Actor
+    recording: Id, link: LinkId, wanted: LinkByBallRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Find the times of a link from the ball, near its instants: rays of the same instant meet.
 
     Both shots need cameras over time, or groups with given cameras. What the ball does not tell is refused in words.
     """
     uploads = {"live": wanted.live_upload, "replay": wanted.replay_upload}
-    return request_ball_link(services.jobs, services.store, recording, link, uploads, actor=actor)
+    return request_link_by_ball(
+        services.jobs, services.store, recording, link, uploads, actor=actor
+    )
 
 
 @router.delete(

@@ -7,15 +7,15 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.features.recordings.link_suggestions import LiveSuggestion
-from app.features.recordings.link_values import Instant, LinkedShot, LinkMap
+from app.features.recordings.link_suggestions import LiveShotSuggestion
+from app.features.recordings.link_values import Instant, LinkedShot, LinkTimeMap
 from app.features.recordings.links import MAX_INSTANTS
 from app.features.recordings.schemas import Frame
 from app.http.documents import Document, ListDocument
 from app.json_text import MAX_ID
 
 
-class LinkedLive(BaseModel):
+class LinkedLiveShot(BaseModel):
     """A live shot of the recording."""
 
     model_config = ConfigDict(extra="forbid")
@@ -24,7 +24,7 @@ class LinkedLive(BaseModel):
     last: Frame = Field(description="Number of its last frame.")
 
 
-class LinkedReplay(LinkedLive):
+class LinkedReplay(LinkedLiveShot):
     """A shot that shows it again, of the same recording or of another one of the dataset."""
 
     recording: Annotated[int, Field(ge=1, le=MAX_ID)] = Field(
@@ -47,7 +47,7 @@ class NewShotLink(BaseModel):
         },
     )
 
-    live: LinkedLive = Field(description="The live shot.")
+    live: LinkedLiveShot = Field(description="The live shot.")
     replay: LinkedReplay = Field(description="The replay.")
 
 
@@ -83,7 +83,7 @@ class InstantsEdit(BaseModel):
         return [(one.live, one.replay) for one in self.instants]
 
 
-class BallLinkRequest(BaseModel):
+class LinkByBallRequest(BaseModel):
     """Where the ball is seen in the two shots."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
@@ -108,7 +108,9 @@ class LinkDocument(Document):
     assumed_speed: float | None = Field(
         description="Speed of the replay while one instant is linked; null: that of the live shot."
     )
-    map: LinkMap = Field(description="What follows from the instants, or was found from the ball.")
+    map: LinkTimeMap = Field(
+        description="What follows from the instants, or was found from the ball."
+    )
     created: datetime
     by: str = Field(validation_alias="actor")
     etag: str
@@ -118,5 +120,5 @@ class LinkList(ListDocument[LinkDocument]):
     """Links of a recording, by the frames of their live shots."""
 
 
-class LiveSuggestions(ListDocument[LiveSuggestion]):
+class LiveShotSuggestions(ListDocument[LiveShotSuggestion]):
     """Live shots that a replay may show, the likeliest first."""

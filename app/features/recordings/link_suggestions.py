@@ -16,7 +16,7 @@ from app.features.recordings.cameras import (
     read_cameras_file,
 )
 from app.features.recordings.links import list_links
-from app.features.recordings.match_clock import MatchClock, find_clock_at_frame
+from app.features.recordings.match_clock import MatchClockReading, find_clock_at_frame
 from app.features.recordings.service import Recording, list_recordings
 from app.features.recordings.shots import Shot, get_shots
 from app.tracking.link_fit import SLOWEST
@@ -33,7 +33,7 @@ _ROUND_M = 4.0
 
 
 @dataclass(frozen=True)
-class LiveSuggestion:
+class LiveShotSuggestion:
     """A live shot that a replay may show.
 
     Attributes:
@@ -66,7 +66,7 @@ class _LiveShotCandidate:
     """Seconds from its end to the replay; None: another recording, of which nothing says."""
 
 
-def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[LiveSuggestion]:
+def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[LiveShotSuggestion]:
     """Live shots that the replay at a frame may show, the likeliest first.
 
     They are shots of the main camera: those of the replay's half that end before it in its own recording, then those
@@ -109,7 +109,7 @@ def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[Live
         for one in list_links(store, recording_id)
         if one.replay.recording == recording_id and one.replay.first == replay.first
     }
-    ranked: list[tuple[tuple[float, ...], LiveSuggestion]] = []
+    ranked: list[tuple[tuple[float, ...], LiveShotSuggestion]] = []
     for number, one in enumerate(candidates):
         like = None
         if path is not None and number < LIKENED:
@@ -120,7 +120,7 @@ def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[Live
         ranked.append(
             (
                 (one.before is None and rank[0] > 0, short, *rank, number),
-                LiveSuggestion(
+                LiveShotSuggestion(
                     one.recording.id,
                     one.recording.name,
                     one.shot.first,
@@ -135,7 +135,7 @@ def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[Live
     return [suggestion for _, suggestion in sorted(ranked, key=lambda item: item[0])][:SUGGESTED]
 
 
-def _find_match_half(clocks: Sequence[MatchClock], frame: int) -> int | None:
+def _find_match_half(clocks: Sequence[MatchClockReading], frame: int) -> int | None:
     """The half of the match in a frame; None where nobody read the clock."""
     clock = find_clock_at_frame(clocks, frame)
     return None if clock is None else clock.half

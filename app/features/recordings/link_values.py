@@ -52,7 +52,7 @@ class Instant:
 
 
 @dataclass(frozen=True)
-class LinkPiece:
+class ConstantSpeedPiece:
     """A part of a replay that runs at one speed.
 
     Attributes:
@@ -85,7 +85,7 @@ class RayMiss:
 
 
 @dataclass(frozen=True)
-class LinkMap:
+class LinkTimeMap:
     """Which time of the live shot each time of a replay shows.
 
     Attributes:
@@ -113,7 +113,7 @@ class LinkMap:
     speed_sigma: float | None = None
     sigma_s: float | None = None
     miss_m: float | None = None
-    pieces: tuple[LinkPiece, ...] = ()
+    pieces: tuple[ConstantSpeedPiece, ...] = ()
     misses: tuple[RayMiss, ...] = ()
     ball_reason: str | None = None
     turned: bool = False
@@ -151,7 +151,7 @@ class ShotLink:
     replay: LinkedShot
     instants: tuple[Instant, ...]
     assumed_speed: float | None
-    map: LinkMap
+    map: LinkTimeMap
     actor: str
     created: str
     etag: str
@@ -180,9 +180,9 @@ def format_links_csv(found: Iterable[ShotLink]) -> str:
     return "".join(lines)
 
 
-def make_link_map(
+def make_link_time_map(
     made: TimeMap, replay: LinkedShot, times: FloatArray, found_by: LinkSource | None
-) -> LinkMap:
+) -> LinkTimeMap:
     """A map as it is kept and shown.
 
     Args:
@@ -193,7 +193,7 @@ def make_link_map(
     """
     frames = np.searchsorted(times, [[one.first, one.last] for one in made.pieces])
     pieces = tuple(
-        LinkPiece(
+        ConstantSpeedPiece(
             replay.first + int(ends[0]),
             min(replay.first + int(ends[1]), replay.last),
             one.first,
@@ -209,9 +209,9 @@ def make_link_map(
         known = made.by_hand and made.offset is not None
         outcome = "offset" if known else "none" if found_by is None else "unobservable"
     if outcome in ("none", "unobservable"):
-        return LinkMap(outcome, found_by, made.reason, miss_m=made.miss)
+        return LinkTimeMap(outcome, found_by, made.reason, miss_m=made.miss)
     whole = not pieces
-    return LinkMap(
+    return LinkTimeMap(
         outcome,
         found_by,
         made.reason,
@@ -256,10 +256,10 @@ def build_link_from_row(row: Any) -> ShotLink:
     # Maps of earlier versions do not say it.
     stored.setdefault("too_close", stored["outcome"] == "offset" and len(instants) > 1)
     parts = {
-        "pieces": tuple(LinkPiece(**one) for one in stored["pieces"]),
+        "pieces": tuple(ConstantSpeedPiece(**one) for one in stored["pieces"]),
         "misses": tuple(RayMiss(**one) for one in stored.get("misses", ())),
     }
-    made = LinkMap(**{**stored, **parts})
+    made = LinkTimeMap(**{**stored, **parts})
     return ShotLink(
         id=int(row.id),
         dataset_id=int(row.dataset_id),

@@ -23,11 +23,11 @@ from app.features.groups.state import require_etag
 from app.features.recordings.index import read_frame_times
 from app.features.recordings.link_values import (
     LinkedShot,
-    LinkMap,
+    LinkTimeMap,
     ShotLink,
     build_link_from_row,
     make_link_etag,
-    make_link_map,
+    make_link_time_map,
     parse_linked_shots,
 )
 from app.features.recordings.queries import (
@@ -130,7 +130,7 @@ def add_link(
                 **{f"replay_{name}": value for name, value in zip(_SIDE, replay, strict=True)},
                 instants="[]",
                 assumed_speed=None,
-                map=canonical_json_text(asdict(LinkMap("none"))),
+                map=canonical_json_text(asdict(LinkTimeMap("none"))),
             )
             log_link_event(session, actor, "replay linked", find_link(session, number))
         found = build_link_from_row(find_link(session, number))
@@ -208,7 +208,7 @@ def set_instants(
         require_etag(make_link_etag(seen), if_match, "this link")
     # The map takes a while: others write meanwhile. It depends on the shots alone, which stay as they are.
     pairs = _validate_instants(instants, *parse_linked_shots(seen))
-    made, residuals = _compute_link_map(store.settings, seen, pairs, assumed_speed)
+    made, residuals = _compute_link_time_map(store.settings, seen, pairs, assumed_speed)
     with store.write() as session:
         row = require_link(session, recording_id, link_id)
         if if_match is not None:
@@ -217,18 +217,18 @@ def set_instants(
             raise ConflictError(
                 "the file of a recording has changed since then", hint="Link the shots again."
             )
-        if save_link_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
+        if save_link_time_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
             log_link_event(session, actor, "instants linked", row)
         found = build_link_from_row(find_link(session, link_id))
         session.respond(found)
     return found
 
 
-def save_link_map(
+def save_link_time_map(
     session: Session,
     row: Any,
     pairs: Sequence[tuple[int, int]],
-    made: LinkMap,
+    made: LinkTimeMap,
     residuals: Sequence[float | None],
     **more: Any,
 ) -> bool:
@@ -298,18 +298,18 @@ def compute_frame_interval(seconds: FloatArray) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.04
 
 
-def _compute_link_map(
+def _compute_link_time_map(
     settings: Settings,
     row: Any,
     pairs: Sequence[tuple[int, int]],
     assumed_speed: float | None,
-) -> tuple[LinkMap, list[float | None]]:
+) -> tuple[LinkTimeMap, list[float | None]]:
     """The map of instants, and the residual of each in live frames."""
     _, replay = parse_linked_shots(row)
     live_times, times = read_link_times(settings, row)
     given = compute_instant_times(row, pairs, live_times, times)
     found = fit_map_to_instants(given, compute_frame_interval(live_times), assumed_speed)
-    made = make_link_map(found, replay, times, "instants" if pairs else None)
+    made = make_link_time_map(found, replay, times, "instants" if pairs else None)
     return made, compute_link_residuals(made, given, live_times)
 
 
@@ -331,7 +331,7 @@ def compute_instant_times(
 
 
 def compute_link_residuals(
-    made: LinkMap, given: FloatArray, live: FloatArray
+    made: LinkTimeMap, given: FloatArray, live: FloatArray
 ) -> list[float | None]:
     """Live frames by which a map puts instants later, from their times and those of the live frames."""
     if not made.is_usable:

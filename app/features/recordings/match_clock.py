@@ -16,7 +16,7 @@ Half = Literal[1, 2, 3, 4]
 
 
 @dataclass(frozen=True)
-class MatchClock:
+class MatchClockReading:
     """What the clock of the match shows in one frame; later frames go on from there.
 
     Attributes:
@@ -30,7 +30,9 @@ class MatchClock:
     seconds: float
 
 
-def validate_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchClock]:
+def validate_clock_readings(
+    clocks: Sequence[MatchClockReading], frames: int
+) -> list[MatchClockReading]:
     """The readings by their frames.
 
     Raises:
@@ -56,7 +58,7 @@ def validate_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchCloc
 
 
 def compute_match_time(
-    clocks: Sequence[MatchClock], seconds: FloatArray, frame: int
+    clocks: Sequence[MatchClockReading], seconds: FloatArray, frame: int
 ) -> tuple[int, float] | None:
     """Half and time of the match in a frame; None where nobody has read the clock.
 
@@ -71,7 +73,9 @@ def compute_match_time(
     return clock.half, clock.seconds + float(seconds[frame] - seconds[clock.frame])
 
 
-def find_clock_at_frame(clocks: Sequence[MatchClock], frame: int) -> MatchClock | None:
+def find_clock_at_frame(
+    clocks: Sequence[MatchClockReading], frame: int
+) -> MatchClockReading | None:
     """The reading of the clock that holds in a frame; None where nobody has read it."""
     before = [clock for clock in clocks if clock.frame <= frame]
     return before[-1] if before else next(iter(clocks), None)

@@ -8,14 +8,14 @@ from anyio import to_thread
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.features.datasets.service import dataset_id
-from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
+from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, round_up_and_clamp_width
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.recordings.jobs import (
     InstantOptions,
+    request_groups_of_instants,
     request_index,
-    request_instants,
-    request_recording,
+    request_recording_import,
 )
 from app.features.recordings.schemas import (
     InstantsRequest,
@@ -31,7 +31,7 @@ from app.features.recordings.service import (
     get_recording,
     list_recordings,
     remove_recording,
-    set_clocks,
+    set_clock_readings,
 )
 from app.features.recordings.shots import RecordingShots, format_shots_csv, get_shots, replace_shots
 from app.http.cursor import paged
@@ -100,7 +100,7 @@ def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> 
 
     The file stays where it is. The same file again is the same recording, indexed anew.
     """
-    return request_recording(
+    return request_recording_import(
         services.jobs,
         services.store,
         services.settings,
@@ -135,7 +135,7 @@ def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: A
 
     Groups that are taken afterwards have `match_half` and `match_seconds` in `metadata.recording`.
     """
-    return set_clocks(store, recording, wanted.values(), actor=actor)
+    return set_clock_readings(store, recording, wanted.values(), actor=actor)
 
 
 @router.delete(
@@ -169,7 +169,7 @@ async def get_frame(
 ) -> Response:
     """A frame as JPEG, scaled down when a width is given; exactly the one of that number."""
     found = await to_thread.run_sync(get_recording, services.store, recording)
-    sha256, wide = found.require_readable(), clamp_width(width)
+    sha256, wide = found.require_readable(), round_up_and_clamp_width(width)
     etag = f'"{digest_content(f"{sha256} {frame} {wide}".encode())}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if is_not_modified(request, etag):
@@ -239,7 +239,7 @@ def set_shots(
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
-def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
+def detect_shots_again(recording: Id, services: AppServices, actor: Actor) -> Job:
     """Find the shots of a recording anew, in place of the list that it has.
 
     A file that has changed, or whose index is gone or of an older version, is indexed again; the list stays if it is the
@@ -256,7 +256,7 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
-def take_instants(
+def make_groups_of_instants(
     recording: Id,
     wanted: InstantsRequest,
     services: AppServices,
@@ -270,6 +270,6 @@ def take_instants(
     it is, but for a group of one view that gets linked ones. The recording may be gone afterwards.
     """
     options = InstantOptions(wanted.propose, wanted.linked, dry_run or wanted.dry_run)
-    return request_instants(
+    return request_groups_of_instants(
         services.jobs, services.store, recording, wanted.frames, options, actor=actor
     )

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.imports.schemas import ImportPlace
 from app.features.recordings.instants import MOST_AT_ONCE
-from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClock
+from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClockReading
 from app.features.recordings.shots import MAX_SHOTS, RecordingShots, Shot
 from app.http.documents import Document, ListDocument
 from app.json_text import MAX_ID
@@ -57,7 +57,7 @@ class RecordingDocument(Document):
     shots: int = Field(description="How many shots it has.")
     groups: int = Field(description="How many groups were taken from it.")
     problem: str | None = Field(description="Why its frames cannot be read now.")
-    clocks: list[MatchClock] = Field(
+    clocks: list[MatchClockReading] = Field(
         description="What the clock of the match shows in frames of it, by frame."
     )
     created: datetime
@@ -68,7 +68,7 @@ class RecordingList(ListDocument[RecordingDocument]):
     """Recordings, the newest first."""
 
 
-class ClockEdit(BaseModel):
+class ClockReadingEdit(BaseModel):
     """What the clock of the match shows in one frame."""
 
     model_config = ConfigDict(extra="forbid")
@@ -88,13 +88,13 @@ class RecordingChange(BaseModel):
         json_schema_extra={"examples": [{"clocks": [{"frame": 1200, "half": 1, "seconds": 760}]}]},
     )
 
-    clocks: Annotated[list[ClockEdit], Field(max_length=MAX_CLOCKS)] = Field(
+    clocks: Annotated[list[ClockReadingEdit], Field(max_length=MAX_CLOCKS)] = Field(
         description="All readings of the clock of the match."
     )
 
-    def values(self) -> list[MatchClock]:
+    def values(self) -> list[MatchClockReading]:
         """The readings."""
-        return [MatchClock(**clock.model_dump()) for clock in self.clocks]
+        return [MatchClockReading(**clock.model_dump()) for clock in self.clocks]
 
 
 class ShotEdit(BaseModel):

@@ -20,7 +20,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, require_valid_name
-from app.features.recordings.match_clock import MatchClock, validate_clocks
+from app.features.recordings.match_clock import MatchClockReading, validate_clock_readings
 from app.features.recordings.queries import (
     RecordingRow,
     delete_recording,
@@ -84,7 +84,7 @@ class Recording:
     problem: str | None
     actor: str
     created: str
-    clocks: tuple[MatchClock, ...] = ()
+    clocks: tuple[MatchClockReading, ...] = ()
 
     def require_readable(self) -> str:
         """The sha256 of the file.
@@ -166,18 +166,20 @@ def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
         session.respond(None)
 
 
-def set_clocks(
-    store: Store, recording_id: int, clocks: Sequence[MatchClock], *, actor: str
+def set_clock_readings(
+    store: Store, recording_id: int, clocks: Sequence[MatchClockReading], *, actor: str
 ) -> Recording:
     """Replace the readings of the clock of the match; groups that are taken later tell its time.
 
     Raises:
-        InputError: As ``validate_clocks``.
+        InputError: As ``validate_clock_readings``.
         NotFoundError: There is no such recording.
     """
     with store.write() as session:
         row = require_recording(session, recording_id)
-        found = validate_clocks(clocks, parse_json_column(row.facts)["frames"] if row.facts else 0)
+        found = validate_clock_readings(
+            clocks, parse_json_column(row.facts)["frames"] if row.facts else 0
+        )
         text = canonical_json_text([asdict(clock) for clock in found]) if found else None
         if text != row.clocks:
             update_recording(session, recording_id, clocks=text)
@@ -217,7 +219,7 @@ def choose_name_for_video(session: Session, row: RecordingRow, sha256: str) -> s
     return _make_unused_name(row.name, others | matches)
 
 
-def find_groups_of_recording(store: Store, recording: Recording) -> dict[int, int]:
+def find_group_ids_by_frame(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
         rows = list_group_keys_of_recording(session, recording.dataset_id, recording.name)
@@ -255,7 +257,7 @@ def build_recording_from_row(row: RecordingRow) -> Recording:
         problem=None if row.stamp is None else _describe_file_problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
-        clocks=tuple(MatchClock(**one) for one in parse_json_column(row.clocks or "[]")),
+        clocks=tuple(MatchClockReading(**one) for one in parse_json_column(row.clocks or "[]")),
     )
 
 

@@ -88,7 +88,7 @@ def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: 
 @may(Action.READ, view=OwnedKind.SAVED_VIEW)
 def get_saved_view(view: Id, store: AppStore) -> SavedView:
     """One saved view."""
-    return saved_views.get_view(store, view)
+    return saved_views.read_saved_view(store, view)
 
 
 @router.delete(
@@ -101,7 +101,7 @@ def get_saved_view(view: Id, store: AppStore) -> SavedView:
 @respond_with(make_document_response)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
-    return saved_views.delete_view(store, view)
+    return saved_views.remove_saved_view(store, view)
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))

@@ -89,13 +89,13 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
     return saved
 
 
-def get_view(store: Store, view_id: int) -> SavedView:
+def read_saved_view(store: Store, view_id: int) -> SavedView:
     """A saved view; raises NotFoundError when there is none."""
     with store.read() as session:
         return _read_visible_view(session, view_id)
 
 
-def delete_view(store: Store, view_id: int) -> SavedView:
+def remove_saved_view(store: Store, view_id: int) -> SavedView:
     """Forget a saved view; returns what it was.
 
     Raises:

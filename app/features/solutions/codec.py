@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from app.db.json_columns import report_damaged_values
+from app.db.json_columns import translate_shape_errors_to_damage
 from app.geometry.camera import Camera
 from app.json_text import prepare_msgspec_type
 from app.soccer.codec import camera_from_json, camera_to_json
@@ -48,7 +48,7 @@ def from_json(kind: type[T], value: Any) -> T:
     Raises:
         DamagedError: It is not what ``to_json`` makes.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         result: T = _get_codec(kind)[1](value)
     return result
 
@@ -237,7 +237,7 @@ def summarize_solution(group: Group, solution: Solution) -> SolutionSummary:
     )
 
 
-def summarize_gates(before: SolutionSummary, solution: Solution) -> SolutionSummary:
+def replace_gates_in_summary(before: SolutionSummary, solution: Solution) -> SolutionSummary:
     """The summary of a solution that is that of ``before`` but for what its gates say."""
     return replace(before, **_summarize_gate_columns(solution))
 

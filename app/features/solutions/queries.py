@@ -24,7 +24,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import insert
-from app.db.json_columns import decompress, parse_json_column, report_damaged_values
+from app.db.json_columns import decompress, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Base, Session
 from app.errors import ConflictError
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -278,12 +278,12 @@ def read_solutions(
         if wanted[row.group_id]
         == SolutionKey(row.group_id, row.inputs_hash, row.policy_hash, row.solver_version)
     ]
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         names = {name for row in rows for name in parse_json_column(row.calibrations)}
     decode = decode_calibration if markings else decode_calibration_without_markings
     bodies = read_calibration_bodies(session, names)
     calibrations = {key: decode(body) for key, body in bodies.items()}
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return {
             row.group_id: attach_calibrations(_decode_solution_body(row.body), calibrations)
             for row in rows
@@ -382,7 +382,7 @@ def find_newest_solution_id(session: Session) -> int:
     return session.scalar(select(func.max(SolutionModel.id))) or 0
 
 
-class StoredFacts(NamedTuple):
+class StoredGateFacts(NamedTuple):
     """What the gates read of a group, as it is stored beside its solution."""
 
     group_id: int
@@ -391,11 +391,11 @@ class StoredFacts(NamedTuple):
     facts: bytes | None
 
 
-def read_solution_facts(session: Session, ids: Sequence[int]) -> Sequence[StoredFacts]:
+def read_solution_facts(session: Session, ids: Sequence[int]) -> Sequence[StoredGateFacts]:
     """The facts of solutions."""
     model = SolutionModel
     statement = select(model.group_id, model.inputs_hash, model.calibrations, model.facts)
-    return session.rows(StoredFacts, statement.where(model.id.in_(ids)))
+    return session.rows(StoredGateFacts, statement.where(model.id.in_(ids)))
 
 
 def list_solved_groups(session: Session, dataset_id: int) -> list[int]:

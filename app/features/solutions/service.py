@@ -42,7 +42,11 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
-from app.solving.calibrate import calibrate_station, compute_calibration_key, compute_view_keys
+from app.solving.calibrate import (
+    calibrate_station,
+    compute_calibration_key,
+    compute_view_calibration_keys,
+)
 from app.solving.facts import facts_from_bytes, facts_to_bytes
 from app.solving.solve import (
     differs_only_in_smaller_tau,
@@ -98,7 +102,7 @@ def list_calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
         key
         for group in groups
         for view in group.views
-        for key in compute_view_keys(group, view, part)
+        for key in compute_view_calibration_keys(group, view, part)
     }
 
 

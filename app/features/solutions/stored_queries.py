@@ -14,14 +14,14 @@ from app.db.json_columns import (
     decompress,
     decompress_json,
     parse_json_column,
-    report_damaged_values,
+    translate_shape_errors_to_damage,
 )
 from app.db.session import Session
 from app.errors import StorageError
 from app.features.datasets.tables import DatasetModel, GroupModel, PaintEvidenceModel
 from app.features.paint.queries import decode_paint_reading
 from app.features.solutions import codec as value_codec
-from app.features.solutions.codec import summarize_gates
+from app.features.solutions.codec import replace_gates_in_summary
 from app.features.solutions.queries import (
     CalibrationModel,
     EncodedSolution,
@@ -71,7 +71,7 @@ class ReusableSolution:
             DamagedError: What is stored beside it is not what was written.
         """
         before = self.solution
-        with report_damaged_values():
+        with translate_shape_errors_to_damage():
             value = {
                 **self._body_json,
                 "gates": _update_changed_json(
@@ -83,7 +83,7 @@ class ReusableSolution:
                 "policy_hash": solution.policy_hash,
             }
             keys = tuple(parse_json_column(self.calibrations))
-        summary = summarize_gates(read_summary(self.summary), solution)
+        summary = replace_gates_in_summary(read_summary(self.summary), solution)
         return EncodedSolution({}, keys, summary, compress_json(value), self.facts)
 
 
@@ -159,7 +159,7 @@ def list_calibration_keys_of_row(row: Any) -> list[str]:
     Raises:
         DamagedError: The row is not what was written.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return list(map(str, parse_json_column(row.calibrations)))
 
 
@@ -171,7 +171,7 @@ def decode_solution_row(session: Session, row: Any) -> Solution:
     """
     named = list_calibration_keys_of_row(row)
     calibrations = read_calibrations(session, named)
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         solution = decode_solution(decompress_json(row.body), calibrations)
         if named != [view.calibration_key for view in solution.views]:
             raise ValueError("its calibrations differ from those in its row")

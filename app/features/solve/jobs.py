@@ -14,7 +14,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.queries import list_group_ids, read_dataset_name
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
-from app.features.jobs.job_run import JobProgress, report_counts_in_words
+from app.features.jobs.job_run import JobProgress, make_counts_reporter
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
 from app.features.jobs.runner import Pool
@@ -27,8 +27,8 @@ from app.features.pitches.service import (
 )
 from app.features.policies.noise import (
     choose_noise_sample,
-    is_noise_estimated,
-    update_estimated_noise,
+    is_noise_estimated_when_solving,
+    update_policy_noise,
 )
 from app.features.policies.service import PolicyState, apply_policy
 from app.features.solutions.queries import list_unsolved_groups
@@ -67,9 +67,9 @@ def solve_fully(
         follow: Whether noise is estimated; an edit leaves it as it is.
     """
     ahead = SolveReport()
-    if follow and is_noise_estimated(store, dataset):
+    if follow and is_noise_estimated_when_solving(store, dataset):
         ahead = solve_dataset(store, dataset, executor, progress, stop, choose_noise_sample)
-        if not stop() and update_estimated_noise(store, dataset, actor):
+        if not stop() and update_policy_noise(store, dataset, actor):
             ahead = SolveReport()
     report = solve_dataset(store, dataset, executor, progress, stop).merge_with_earlier(ahead)
     total = report.total
@@ -120,7 +120,7 @@ NAMED = 20
 
 
 @dataclass(frozen=True)
-class PolicyJob:
+class PolicyStateAndJob:
     """A dataset under another policy, the job that solves what that left stale, and how many groups
     that are."""
 
@@ -130,7 +130,7 @@ class PolicyJob:
 
 
 @dataclass(frozen=True)
-class PitchJob:
+class PitchesAndJob:
     """The pitches of a dataset as they are now, and the job that solves what that left stale."""
 
     state: DatasetPitches
@@ -193,7 +193,7 @@ def change_and_request_solve(
     return changed[0]
 
 
-def change_and_return_job(
+def change_and_return_solve_job(
     jobs: Jobs,
     store: Store,
     dataset: str | int,
@@ -218,18 +218,18 @@ def change_and_return_job(
 
 def request_policy_change(
     jobs: Jobs, store: Store, dataset_id: int, policy: Policy, *, if_match: str, actor: str
-) -> PolicyJob:
+) -> PolicyStateAndJob:
     """Judge a dataset by another policy, and solve what that leaves stale, soon.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
     """
 
-    def apply_pitch_change(session: Session, job: Job) -> PolicyJob:
+    def apply_policy_change(session: Session, job: Job) -> PolicyStateAndJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
-        return PolicyJob(state, job, len(list_unsolved_groups(session, dataset_id)))
+        return PolicyStateAndJob(state, job, len(list_unsolved_groups(session, dataset_id)))
 
-    return change_and_request_solve(jobs, store, dataset_id, apply_pitch_change, actor=actor)
+    return change_and_request_solve(jobs, store, dataset_id, apply_policy_change, actor=actor)
 
 
 def request_pitch_change(
@@ -240,7 +240,7 @@ def request_pitch_change(
     *,
     if_match: str,
     actor: str,
-) -> PitchJob:
+) -> PitchesAndJob:
     """Give matches of a dataset another pitch, and solve what that leaves stale, soon.
 
     Raises:
@@ -248,19 +248,19 @@ def request_pitch_change(
         StaleRevisionError: Somebody else was faster.
     """
 
-    def apply_pitch_change(session: Session, job: Job) -> PitchJob:
+    def apply_policy_change(session: Session, job: Job) -> PitchesAndJob:
         state = change_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
-        return PitchJob(state, job)
+        return PitchesAndJob(state, job)
 
-    return change_and_request_solve(jobs, store, dataset_id, apply_pitch_change, actor=actor)
+    return change_and_request_solve(jobs, store, dataset_id, apply_policy_change, actor=actor)
 
 
-def resume_solving(jobs: Jobs, store: Store) -> None:
+def register_solve_resume(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
     jobs.register_resume(KIND, partial(run_solve_job, store, jobs.pool))
 
 
-def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
+def request_solve_of_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
     """Solve whatever an earlier run, of the server or of a command, left undone."""
     for dataset in list_datasets(store):
         if list_stale_groups(store, dataset.id):
@@ -280,7 +280,7 @@ def run_solve_job(store: Store, pool: Pool, progress: JobProgress) -> Json:
         or len(list_matches_to_estimate(store, found.id)) >= MATCHES_WORTH_A_POOL
     )
     with pool() if large else nullcontext() as executor:
-        counter = report_counts_in_words(progress, "groups solved")
+        counter = make_counts_reporter(progress, "groups solved")
         report = solve_fully(store, found.id, executor, counter, actor=actor, follow=follow)
     refresh_yield_table(store, found.id, report, progress)
     progress(report.total, report.total, report.sentence)

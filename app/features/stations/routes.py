@@ -14,11 +14,11 @@ from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
 from app.features.groups.schemas import (
-    DatasetName,
+    DatasetReference,
     GroupDocument,
     LineDocuments,
     LinesEdit,
-    StationEdit,
+    StationCalibrationEdit,
     lines_to_document,
     make_group_response,
 )
@@ -57,7 +57,7 @@ class StationDetail(BaseModel):
     """A camera station: the lines that all its views share."""
 
     id: int
-    dataset: DatasetName
+    dataset: DatasetReference
     key: str
     shared: bool
     width: int
@@ -90,7 +90,7 @@ class StationDetail(BaseModel):
                 **vars(station),
                 **vars(state),
                 **vars(station.size),
-                "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
+                "dataset": DatasetReference(id=state.dataset_id, name=state.dataset),
                 "has_given": station.given is not None,
                 "has_given_covariance": station.given_covariance is not None,
                 "lines": lines_to_document(station.lines),
@@ -150,7 +150,7 @@ def patch_lines(
 @respond_with(make_group_response)
 def patch_station(
     station: Id,
-    change: StationEdit,
+    change: StationCalibrationEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,

@@ -22,7 +22,7 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import (
     GroupState,
-    read_record,
+    read_group_without_solution,
     read_state,
     require_etag,
     station_etag,
@@ -224,7 +224,7 @@ def _plan_change(
 
 def _make_trial_group(session: Session, group_id: int, station: Station) -> _Trial:
     """A group with another station, and what is known of its calibrations."""
-    stored = read_record(session, group_id).stored
+    stored = read_group_without_solution(session, group_id).stored
     view = next(view for view in stored.group.views if view.station.key == station.key)
     group = replace_station_in_group(stored.group, view, station)
     return stored, group, read_known_calibrations(session, [group], stored.policy)

@@ -11,7 +11,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from app.db.json_columns import Json, parse_json_column, report_damaged_values
+from app.db.json_columns import Json, parse_json_column, translate_shape_errors_to_damage
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
@@ -72,17 +72,17 @@ class TrackInputs:
 def make_track(inputs: TrackInputs) -> BallTrack:
     """The track of inputs, with their corrections."""
     track = track_ball(inputs.measurements, inputs.frames, inputs.times, pitch=inputs.pitch)
-    return apply_corrections(inputs, track, solve_corrections(inputs, track))
+    return apply_corrections(inputs, track, solve_corrected_parts(inputs, track))
 
 
 def make_partial_track(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
     """The track of a part of a stretch, with corrections, where the whole says how wrong views are."""
     measured, frames, times = inputs.measurements, inputs.frames, inputs.times
     track = track_ball(measured, frames, times, pitch=inputs.pitch, known=known)
-    return apply_corrections(inputs, track, solve_corrections(inputs, track))
+    return apply_corrections(inputs, track, solve_corrected_parts(inputs, track))
 
 
-def solve_corrections(
+def solve_corrected_parts(
     inputs: TrackInputs, track: BallTrack, known: Sequence[TrackPatch] = ()
 ) -> tuple[TrackPatch, ...]:
     """The parts of a track that corrections change, solved anew.
@@ -103,7 +103,7 @@ def apply_corrections(
     Args:
         inputs: With the corrections.
         track: Made of them without corrections.
-        patches: As ``solve_corrections`` made them.
+        patches: As ``solve_corrected_parts`` made them.
     """
     return apply_patches(track, inputs.measurements, patches, inputs.corrections)
 
@@ -193,7 +193,7 @@ def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
     Raises:
         DamagedError: It is not what was written.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         found, names = value["measurements"], value["views"]
         cameras: list[Camera] = [camera_from_json(item) for item in value["cameras"]]
         times = np.array(value["times"], dtype=float)
@@ -266,7 +266,7 @@ def patches_from_json(value: Iterable[Mapping[str, Any]]) -> tuple[TrackPatch, .
     Raises:
         DamagedError: It is not what was written.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return tuple(
             TrackPatch(
                 corrections_from_json(item["corrections"]),
@@ -283,7 +283,7 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
     Raises:
         DamagedError: It is not what was written.
     """
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         frames = np.array(value["frames"], dtype=np.int64)
         count, left = len(frames), value["left_out"]
         covariance = np.full((count, 6, 6), np.nan)

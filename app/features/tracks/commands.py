@@ -59,7 +59,7 @@ def follow(
         raise typer.BadParameter("place the balls or take them away, one at a time")
     if undo and at is not None:
         raise typer.BadParameter("--undo removes balls wherever they are: leave --at out")
-    place = _parse_place(at)
+    place = _parse_image_point(at)
     with open_store() as store:
         view = _find_view_id(store, dataset, group, camera)
         if undo:
@@ -117,7 +117,7 @@ def _print_result(values: dict[str, Any], as_json: bool, sentence: str) -> None:
         say(sentence)
 
 
-def _parse_place(text: str | None) -> ImagePoint | None:
+def _parse_image_point(text: str | None) -> ImagePoint | None:
     if text is None:
         return None
     try:

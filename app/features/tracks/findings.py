@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from app.db.json_columns import decompress_json, parse_json_column, report_damaged_values
+from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.db.store import Store
-from app.features.findings.queries import UnexplainedBall, replace_track_findings
+from app.features.findings.queries import UnexplainedBall, replace_unexplained_ball_findings
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.tracks.codec import (
@@ -89,7 +89,7 @@ class TrackNotices:
     items: list[UnexplainedBall]
 
 
-def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]) -> None:
+def refresh_track_notices(store: Store, dataset_id: int, matches: Collection[str]) -> None:
     """Bring what tracks say of groups in step with the tracks of matches; rejected ones say nothing.
 
     Tracks are read before the write, and again where they changed meanwhile; after a few times during it.
@@ -128,7 +128,9 @@ def make_track_notices(
 
 def save_notices(session: Session, dataset_id: int, found: TrackNotices) -> None:
     """Store what tracks say of groups, in a write; groups that are no more are passed over."""
-    changed = replace_track_findings(session, dataset_id, found.matches, found.scope, found.items)
+    changed = replace_unexplained_ball_findings(
+        session, dataset_id, found.matches, found.scope, found.items
+    )
     refresh_queue(session, changed)
 
 
@@ -168,7 +170,7 @@ def map_groups_by_frame(
 
 
 def _count_contradicted(row: Any) -> int:
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return int(parse_json_column(row.summary)["contradicted"])
 
 

@@ -16,7 +16,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
 from app.features.groups.bulk_edits import ViewEdits, edit_views
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.state import GroupState, read_etags, read_states
 from app.features.groups.view_queries import StoredView, find_view, list_views_of_camera
 from app.features.people.visibility_queries import COPIES
@@ -46,7 +46,7 @@ FollowEnd = Literal["lost", "left", "known", "end", "limit"]
 
 
 @dataclass(frozen=True)
-class CameraSequence:
+class BallFollowInputs:
     """What a worker process needs to follow a ball.
 
     Attributes:
@@ -80,7 +80,7 @@ class FollowTask:
 
     view: StoredView
     media: Media
-    sequence: CameraSequence
+    sequence: BallFollowInputs
     states: Mapping[int, tuple[StoredView, GroupState]] = field(default_factory=dict)
 
 
@@ -195,7 +195,7 @@ def plan_ball_following(
             f"view {view.key} has {'several balls' if several else 'no ball'}",
             hint="Say which place is meant." if several else "Place it first, or say where it is.",
         )
-    sequence = _build_camera_sequence(view, frame, click, states, each_way, ends)
+    sequence = _build_ball_follow_inputs(view, frame, click, states, each_way, ends)
     return FollowTask(view, media, sequence, states)
 
 
@@ -251,14 +251,14 @@ def _find_visible_ball(state: GroupState, key: str) -> ImagePoint | None:
     return view.ball.center
 
 
-def _build_camera_sequence(
+def _build_ball_follow_inputs(
     view: StoredView,
     frame: int,
     click: ImagePoint,
     states: Mapping[int, tuple[StoredView, GroupState]],
     each_way: int,
     ends: tuple[FollowEnd, FollowEnd],
-) -> CameraSequence:
+) -> BallFollowInputs:
     first, last = _find_follow_bounds(states, frame)
     ends = (
         "known" if first > min(states) else ends[0],
@@ -280,7 +280,7 @@ def _build_camera_sequence(
         elif camera is not None:
             expected[number] = _compute_expected_places(state, one.key, camera, size)
     at = BallClick(frame, click.x, click.y)
-    return CameraSequence(tuple(views), at, tuple(clicks), camera, expected, size, each_way, ends)
+    return BallFollowInputs(tuple(views), at, tuple(clicks), camera, expected, size, each_way, ends)
 
 
 def _find_follow_bounds(
@@ -411,14 +411,14 @@ def follow_ball_from_view(
 
 
 @dataclass(frozen=True)
-class FollowedEdits:
+class FollowedEditCounts:
     """How many views were changed, and how many stay as they are because their groups were changed meanwhile."""
 
     changed: int
     refused: int
 
 
-def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> FollowedEdits:
+def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> FollowedEditCounts:
     """Make the followed balls that are not uncertain those of their views."""
     source = make_followed_source(found.group)
 
@@ -426,13 +426,15 @@ def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> 
         ball, half = one.ball, one.ball.diameter / 2
         box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
         annotation = BallAnnotation(box=box, predicted_by=source)
-        return ViewEdits(one.view, None, one.etag, lambda key: [set_ball(key, annotation)])
+        return ViewEdits(
+            one.view, None, one.etag, lambda key: [make_set_ball_edit(key, annotation)]
+        )
 
     items = [make_view_edits(one) for one in found.items if one.ball.state == "followed"]
     return _apply_edits(store, found.view, items, actor)
 
 
-def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> FollowedEdits:
+def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> FollowedEditCounts:
     """Take away the balls that were followed from that of a view, as far as nobody changed them.
 
     Raises:
@@ -445,7 +447,7 @@ def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> Followed
         mine = [one for one in others if [ball.predicted_by for ball in one.balls] == [source]]
         etags = read_etags(session, [one.group_id for one in mine])
     items = [
-        ViewEdits(one.id, None, etags[one.group_id], lambda key: [set_ball(key, None)])
+        ViewEdits(one.id, None, etags[one.group_id], lambda key: [make_set_ball_edit(key, None)])
         for one in mine
     ]
     return _apply_edits(store, view_id, items, actor)
@@ -453,12 +455,12 @@ def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> Followed
 
 def _apply_edits(
     store: Store, view_id: int, items: Sequence[ViewEdits], actor: str
-) -> FollowedEdits:
+) -> FollowedEditCounts:
     with store.read() as session:
         _, dataset = _require_view(session, view_id)
     report = edit_views(store, dataset, items, actor=actor)
     outcomes = [one.outcome for one in report.items]
-    return FollowedEdits(outcomes.count("changed"), outcomes.count("refused"))
+    return FollowedEditCounts(outcomes.count("changed"), outcomes.count("refused"))
 
 
 def _require_view(session: Session, view_id: int) -> tuple[StoredView, int]:
@@ -472,7 +474,7 @@ def _require_view(session: Session, view_id: int) -> tuple[StoredView, int]:
 
 
 def follow_ball_in_sequence(
-    _: Media, flipped: bool, settings: Settings, asked: CameraSequence
+    _: Media, flipped: bool, settings: Settings, asked: BallFollowInputs
 ) -> FollowedSequence:
     """The work of the process."""
     media = map_frames_by_number(asked.views, settings)

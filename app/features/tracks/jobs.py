@@ -9,7 +9,7 @@ from typing import Any
 from app.db.database_worker import ServerProxy
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.features.jobs.job_run import JobProgress, report_counts_in_words, run_job_in_worker
+from app.features.jobs.job_run import JobProgress, make_counts_reporter, run_job_in_worker
 from app.features.match_estimates.jobs import MatchJob, MatchJobContext
 from app.features.tracks.service import make_tracks
 
@@ -37,7 +37,7 @@ def _run_track_job(call: MatchJobContext, progress: JobProgress) -> Json:
         call.job.actor,
         dataset_id=call.dataset_id,
         progress=progress,
-        report=report_counts_in_words(progress, "groups read"),
+        report=make_counts_reporter(progress, "groups read"),
     )
 
 

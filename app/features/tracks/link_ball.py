@@ -20,17 +20,17 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
 from app.features.file_tools.shots import read_ball_rows
 from app.features.groups.queries import read_groups
-from app.features.imports.upload_queries import get_upload, upload_path
+from app.features.imports.upload_queries import find_complete_upload_path, get_upload
 from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.recordings.cameras import read_cameras_of_frames
 from app.features.recordings.link_values import (
     LinkedShot,
-    LinkMap,
+    LinkTimeMap,
     RayMiss,
     make_link_etag,
-    make_link_map,
+    make_link_time_map,
     parse_linked_shots,
 )
 from app.features.recordings.links import (
@@ -40,16 +40,16 @@ from app.features.recordings.links import (
     log_link_event,
     read_link_times,
     require_link,
-    save_link_map,
+    save_link_time_map,
 )
-from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
+from app.features.recordings.service import Recording, find_group_ids_by_frame, get_recording
 from app.features.tracks.service import list_tracks, read_track
 from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, build_ball_rays
-from app.tracking.link import check_half_turn, fit_time_map, measure_ray_distances
+from app.tracking.link import explain_by_half_turn, fit_time_map, measure_ray_distances
 from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
 
@@ -62,7 +62,7 @@ _Seen = tuple[tuple[float, float], Camera | None]
 
 
 @dataclass(frozen=True)
-class BallLinkResult:
+class LinkByBallResult:
     """What became of a link that was sought from the ball.
 
     Attributes:
@@ -82,7 +82,7 @@ class BallLinkResult:
     left_out: int
 
 
-def request_ball_link(
+def request_link_by_ball(
     jobs: Jobs,
     store: Store,
     recording_id: int,
@@ -107,18 +107,18 @@ def request_ball_link(
     link = get_link(store, recording_id, link_id)
     for upload in uploads.values():
         if upload is not None:
-            upload_path(store.settings, upload)
+            find_complete_upload_path(store.settings, upload)
     return jobs.submit(
         KIND,
         f"Link frames {link.replay.first} to {link.replay.last} of {link.replay.name} by the ball",
-        partial(run_ball_link_job, store),
+        partial(run_link_by_ball_job, store),
         dataset_id=link.dataset_id,
         actor=actor,
         request={"recording": recording_id, "link": link_id, "uploads": dict(uploads)},
     )
 
 
-def run_ball_link_job(store: Store, progress: JobProgress) -> Json:
+def run_link_by_ball_job(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result says what the ball told."""
     asked, settings = progress.job.request, store.settings
     limits = WorkerLimits(settings.import_memory, settings.import_seconds, SILENCE)
@@ -142,9 +142,9 @@ def run_ball_link_job(store: Store, progress: JobProgress) -> Json:
     return asdict(found)
 
 
-def resume_ball_links(jobs: Jobs, store: Store) -> None:
+def resume_link_by_ball_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at begin again."""
-    jobs.register_resume(KIND, partial(run_ball_link_job, store))
+    jobs.register_resume(KIND, partial(run_link_by_ball_job, store))
 
 
 def link_by_ball(
@@ -154,7 +154,7 @@ def link_by_ball(
     uploads: Mapping[str, str | None],
     actor: str,
     _progress: ReportProgress,
-) -> BallLinkResult:
+) -> LinkByBallResult:
     """Find the map of a link from the ball, near its instants, and keep it; in a worker process.
 
     Where the ball does not tell it, a map of instants stays, with the reason beside it.
@@ -178,10 +178,10 @@ def link_by_ball(
     before = get_link(store, recording_id, link_id)
     pairs = [(one.live, one.replay) for one in before.instants]
     given = compute_instant_times(row, pairs, live_times, times)
-    found = check_half_turn(fit_time_map(live_rays, rays, given), live_rays, rays, given)
+    found = explain_by_half_turn(fit_time_map(live_rays, rays, given), live_rays, rays, given)
     reason = None if found.pieces else found.reason
     if reason is None:
-        made = make_link_map(found, replay, times, "ball")
+        made = make_link_time_map(found, replay, times, "ball")
         at, misses = measure_ray_distances(live_rays, rays, found)
         frames = replay.first + np.searchsorted(times, at)
         each = zip(frames.tolist(), misses.tolist(), strict=True)
@@ -189,7 +189,7 @@ def link_by_ball(
     elif before.map.is_usable and before.map.found_by == "instants":
         made = replace(before.map, ball_reason=reason, turned=found.turned)
     else:
-        made = LinkMap("unobservable", "ball", reason, miss_m=found.miss, turned=found.turned)
+        made = LinkTimeMap("unobservable", "ball", reason, miss_m=found.miss, turned=found.turned)
     with store.write() as session:
         present = require_link(session, recording_id, link_id)
         if make_link_etag(present) != make_link_etag(row):
@@ -198,10 +198,10 @@ def link_by_ball(
                 hint="Start it again: it uses the link as it is now.",
             )
         residuals = compute_link_residuals(made, given, live_times)
-        if save_link_map(session, present, pairs, made, residuals):
+        if save_link_time_map(session, present, pairs, made, residuals):
             log_link_event(session, actor, "link found from the ball", present)
     left = live_left + replay_left + len(report.problems)
-    return BallLinkResult(
+    return LinkByBallResult(
         link_id, live.recording, made.outcome, reason, (len(live_rays), len(rays)), left
     )
 
@@ -223,7 +223,9 @@ def _collect_ball_rays(
     inside = {number: one for number, one in seen.items() if number in shot.frames}
     recording = get_recording(store, shot.recording)
     places = (
-        {} if upload or shot != shots[0] else read_ball_positions(store, recording, shot, link_id)
+        {}
+        if upload or shot != shots[0]
+        else read_tracked_ball_positions(store, recording, shot, link_id)
     )
     tracked = read_cameras_of_frames(store, recording, inside.keys() | places.keys())
     for number in places.keys() - inside.keys():
@@ -254,7 +256,7 @@ def _collect_ball_rays(
     return rays_found, left_out + len(inside) - len(rays)
 
 
-def read_ball_positions(
+def read_tracked_ball_positions(
     store: Store, recording: Recording, shot: LinkedShot, link_id: int
 ) -> dict[int, FloatArray]:
     """Where tracks put the ball in frames of a shot, pitch frame, metres, shape (3,), by frame.
@@ -285,7 +287,9 @@ def _read_balls_from_file(
     settings: Settings, upload: str, report: ReaderReport
 ) -> dict[int, _Seen]:
     """Where a ``ball.csv`` says that the ball is, by frame of its recording."""
-    rows = read_ball_rows(upload_path(settings, upload), get_upload(settings, upload).name, report)
+    rows = read_ball_rows(
+        find_complete_upload_path(settings, upload), get_upload(settings, upload).name, report
+    )
     return {frame: (pixel, None) for frame, _, pixel in rows}
 
 
@@ -296,7 +300,7 @@ def _iterate_balls_of_groups(
     sha256 = get_recording(store, shot.recording).require_readable()
     ids: set[int] = set()
     for number in {one.recording for one in shots}:
-        ids |= set(find_groups_of_recording(store, get_recording(store, number)).values())
+        ids |= set(find_group_ids_by_frame(store, get_recording(store, number)).values())
     wanted = sorted(ids)
     for start in range(0, len(wanted), _BATCH):
         with store.read() as session:

@@ -21,11 +21,11 @@ from app.features.tracks.codec import (
     inputs_to_json,
     make_track,
     patches_to_json,
-    solve_corrections,
+    solve_corrected_parts,
     track_from_json,
     track_to_json,
 )
-from app.features.tracks.findings import TRIES, refresh_all_findings
+from app.features.tracks.findings import TRIES, refresh_track_notices
 from app.features.tracks.queries import (
     TrackGroup,
     delete_tracks,
@@ -129,7 +129,7 @@ def make_tracks(
             made.without.append({"stretch": stretch.key, "reason": reason})
         progress(done, total, f"{tracked} of {len(stretches)} stretches tracked.")
     _delete_obsolete_tracks(store, found, stretches, matches)
-    refresh_all_findings(store, found.id, groups.keys())
+    refresh_track_notices(store, found.id, groups.keys())
     return made
 
 
@@ -195,7 +195,7 @@ def _compute_columns(
 ) -> dict[str, Any]:
     """The columns of a track with what was said of its events."""
     whole = replace(inputs, corrections=corrections_from_json(parse_json_column(said)))
-    patches = solve_corrections(whole, base)
+    patches = solve_corrected_parts(whole, base)
     track = apply_corrections(whole, base, patches)
     told = format_unused_balls(stretch.unused), format_view_jumps(track.jumps)
     warnings = [*filter(None, told), *(item.sentence for item in track.untracked)]

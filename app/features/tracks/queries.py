@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Select, delete, insert, select, update
 
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import find_next_row_id
@@ -65,7 +65,7 @@ def read_recording_shots(session: Session, dataset_id: int) -> dict[str, list[tu
     statement = select(RecordingModel.name, RecordingModel.shots).where(
         RecordingModel.dataset_id == dataset_id
     )
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return {
             row.name: [(shot["first"], shot["last"]) for shot in parse_json_column(row.shots)]
             for row in session.execute(statement)

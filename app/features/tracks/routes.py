@@ -16,9 +16,9 @@ from app.features.tracks.listing import TrackChoice, TrackOrder, choose_tracks
 from app.features.tracks.schemas import (
     MOST_FRAMES,
     GroupTrackList,
-    TrackAround,
     TrackDocument,
     TrackEdit,
+    TrackExcerptDocument,
     TrackFrames,
     TrackList,
 )
@@ -135,12 +135,12 @@ def get_track_around(
         int | None,
         Query(ge=0, le=MAX_ID, description="In the middle; default: the worst, else the first."),
     ] = None,
-) -> TrackAround:
+) -> TrackExcerptDocument:
     """The frames around one as they come out of the groups as they are now; nothing is stored.
 
     What an edit makes of the ball is known at once; the track is stale until it is made again.
     """
-    return TrackAround.around(compute_track_excerpt(store, track, frame))
+    return TrackExcerptDocument.around(compute_track_excerpt(store, track, frame))
 
 
 @router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
@@ -171,4 +171,4 @@ def change_track(
     with add_current_state_to_conflicts(
         lambda: TrackDocument.model_validate(tracks.get_track(store, track))
     ):
-        return tracks.change_track(store, track, edit.change(), if_match, actor=actor)
+        return tracks.review_track(store, track, edit.change(), if_match, actor=actor)

@@ -14,8 +14,8 @@ from app.features.tracks.findings import find_contradicting_balls
 from app.features.tracks.listing import ListedTrack
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
-    TrackChange,
     TrackedFrames,
+    TrackReview,
     TrackSummary,
 )
 from app.formats.tracks_writer import position_sigma
@@ -126,7 +126,7 @@ class TrackEventDocument(Document):
     added: bool = Field(description="Whether a person added it.")
 
 
-class JumpDocument(Document):
+class ViewJumpDocument(Document):
     """Where views that take over put the ball elsewhere: their cameras contradict each other."""
 
     frame: int = Field(description="The nearest frame.")
@@ -178,7 +178,7 @@ class TrackFrames(Document):
     )
     group: list[int | None] = Field(description="Ids of groups.")
     events: list[TrackEventDocument] = Field(description="Those of these frames, by time.")
-    jumps: list[JumpDocument] = Field(
+    jumps: list[ViewJumpDocument] = Field(
         description="Where the ball jumps in these frames because other views take over; no event of the ball."
     )
     contradicted: list[ContradictionDocument] = Field(
@@ -229,22 +229,22 @@ class TrackFrames(Document):
                 if event.frame in inside
             ],
             jumps=[
-                JumpDocument.model_validate(jump) for jump in ball.jumps if jump.frame in inside
+                ViewJumpDocument.model_validate(jump) for jump in ball.jumps if jump.frame in inside
             ],
             contradicted=[item for item in _build_contradictions(detail) if item.frame in inside],
         )
 
 
-class TrackAround(TrackFrames):
+class TrackExcerptDocument(TrackFrames):
     """Frames of a track as they come out of their groups as they are now."""
 
     reason: str | None = Field(description="Why no track comes of them; null: one does.")
 
     @staticmethod
-    def around(found: TrackExcerpt) -> TrackAround:
+    def around(found: TrackExcerpt) -> TrackExcerptDocument:
         """The document of what was tracked around a frame."""
         frames = TrackFrames.of(found, found.frame - AROUND, found.frame + AROUND)
-        return TrackAround(**vars(frames), reason=found.ball.reason)
+        return TrackExcerptDocument(**vars(frames), reason=found.ball.reason)
 
 
 class GroupTrackDocument(Document):
@@ -273,13 +273,13 @@ class TrackEdit(BaseModel):
         Field(default=None, description="All events that are added and removed; it is judged anew.")
     )
 
-    def change(self) -> TrackChange:
+    def change(self) -> TrackReview:
         """The change."""
         found = self.corrections
         corrections = (
             None if found is None else tuple(EventCorrection(**vars(item)) for item in found)
         )
-        return TrackChange(self.verdict, self.note, corrections)
+        return TrackReview(self.verdict, self.note, corrections)
 
 
 def _build_contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:

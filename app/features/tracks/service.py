@@ -23,7 +23,7 @@ from app.features.tracks.codec import (
     inputs_from_json,
     patches_from_json,
     patches_to_json,
-    solve_corrections,
+    solve_corrected_parts,
     track_from_json,
 )
 from app.features.tracks.export import StoredStretchTrack, TrackSource, parse_frozen_track
@@ -89,7 +89,7 @@ class TrackDetail(TrackedFrames):
 
 
 @dataclass(frozen=True)
-class TrackChange:
+class TrackReview:
     """What a person says of a track; what is None stays as it is.
 
     Attributes:
@@ -146,8 +146,8 @@ def read_track(store: Store, track_id: int) -> TrackDetail:
     return TrackDetail(track.etag, ball, inputs, near, track)
 
 
-def change_track(
-    store: Store, track_id: int, change: TrackChange, if_match: str, *, actor: str
+def review_track(
+    store: Store, track_id: int, change: TrackReview, if_match: str, *, actor: str
 ) -> Track:
     """Accept or reject a track, or correct its events.
 
@@ -194,7 +194,7 @@ def change_track(
 
 
 def _solve_track_change(
-    store: Store, track_id: int, change: TrackChange, if_match: str
+    store: Store, track_id: int, change: TrackReview, if_match: str
 ) -> tuple[dict[str, Any], TrackNotices | None]:
     """Columns that come of corrections, and what the track says of its groups then where that may differ; all
     that takes time is done before the write."""
@@ -308,7 +308,7 @@ def _recompute_corrected_track(
         corrections=corrections_from_json(parse_json_column(text)),
     )
     base = track_from_json(decompress_json(body.body))
-    patches = solve_corrections(inputs, base, _parse_patches(body))
+    patches = solve_corrected_parts(inputs, base, _parse_patches(body))
     ball = apply_corrections(inputs, base, patches)
     summary = summarize_track(ball, track.summary)
     columns = {

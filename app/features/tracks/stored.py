@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.db.json_columns import parse_json_column, report_damaged_values
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
 from app.features.tracks.queries import TrackGroup, TrackGroupState
 from app.features.tracks.run_measurements import FollowedRun, list_run_states
@@ -151,7 +151,7 @@ def build_track_from_row(
 
 def parse_track_summary(row: Any) -> TrackSummary:
     """What a list says of a row's track."""
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return TrackSummary(**parse_json_column(row.summary))
 
 
@@ -162,7 +162,7 @@ def make_track_etag(row: Any) -> str:
 
 def parse_corrections(row: Any) -> tuple[EventCorrection, ...]:
     """What people said of the events of a row's track."""
-    with report_damaged_values():
+    with translate_shape_errors_to_damage():
         return corrections_from_json(parse_json_column(row.corrections))
 
 

@@ -22,7 +22,7 @@ from app.features.people.visibility_queries import COPIES, sees_all_work
 from app.features.queue.fields import query_reveals_hidden_work
 from app.features.queue.queries import GroupListing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
-from app.features.queue.refresh_queries import filter_edited_groups, refresh_verdicts
+from app.features.queue.refresh_queries import filter_edited_groups, refresh_verdict_columns
 from app.features.solutions.queries import list_unsolved_groups, read_current_solution_keys
 from app.features.verdicts.queries import (
     Spans,
@@ -32,7 +32,7 @@ from app.features.verdicts.queries import (
     find_batch,
     find_next_verdict_id,
     insert_batch,
-    insert_verdicts,
+    insert_verdicts_and_end_work,
     read_batches,
     split_spans,
     update_batch,
@@ -53,7 +53,7 @@ picture, and nobody says why it shall be accepted all the same."""
 
 
 @dataclass(frozen=True)
-class Refusal:
+class RefusedGroups:
     """Groups that a bulk verdict leaves alone.
 
     Attributes:
@@ -87,7 +87,7 @@ class BulkPlan:
 
     matches: int
     would_change: int
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedGroups, ...]
     sample: tuple[SampleGroup, ...]
 
 
@@ -97,7 +97,7 @@ class BatchReport:
 
     batch: int | None
     changed: int
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedGroups, ...]
 
 
 ASKED = (
@@ -179,7 +179,7 @@ def give_verdicts(
             return BatchReport(None, 0, refused)
     else:
         left = _filter_remaining_rows(found.change, begun)
-        refused = tuple(Refusal(*item) for item in begun["refused"])
+        refused = tuple(RefusedGroups(*item) for item in begun["refused"])
     places = [(row.number, row.group_id) for row in left]
     # Of a million groups, what the queue says of each is much.
     del rows, found, left
@@ -252,7 +252,7 @@ class VerdictSelection:
     """Rows that a verdict changes, and those that it is refused for."""
 
     change: list[Any]
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedGroups, ...]
 
 
 def select_groups_for_verdict(
@@ -278,7 +278,7 @@ def select_groups_for_verdict(
             refused[NO_PICTURE] += 1
         else:
             change.append(row)
-    refusals = (Refusal(reason, count) for reason, count in refused.items() if count)
+    refusals = (RefusedGroups(reason, count) for reason, count in refused.items() if count)
     return VerdictSelection(change, tuple(refusals))
 
 
@@ -432,5 +432,5 @@ def save_verdicts(
     session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
     """Insert verdicts, log them under who gives them, and show them in the queue."""
-    insert_verdicts(session, dataset_id, given, actor=actor, at=at)
-    refresh_verdicts(session, list({verdict.group_id: None for verdict in given}))
+    insert_verdicts_and_end_work(session, dataset_id, given, actor=actor, at=at)
+    refresh_verdict_columns(session, list({verdict.group_id: None for verdict in given}))

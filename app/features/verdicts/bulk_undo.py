@@ -15,7 +15,7 @@ from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.bulk import (
     ASKED,
     BatchRun,
-    Refusal,
+    RefusedGroups,
     save_verdicts,
     select_groups_for_verdict,
     split_for_transactions,
@@ -79,7 +79,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
                     # Another run has been at it meanwhile.
                     restored = _count_groups(session, spans)
                 report = UndoReport(batch_id, restored, batch.changed - restored)
-                _close_batch(session, batch, report, actor)
+                _mark_batch_taken_back(session, batch, report, actor)
                 session.respond(report)
                 return report
 
@@ -106,7 +106,7 @@ def _read_active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     return batch
 
 
-def _close_batch(
+def _mark_batch_taken_back(
     session: Session, batch: StoredBulkVerdict, report: UndoReport, actor: str
 ) -> None:
     """Say of a batch, and in the log, that it was taken back."""
@@ -177,7 +177,7 @@ class RedoReport:
     batch: int | None
     changed: int
     kept: int
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedGroups, ...]
 
 
 def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
@@ -223,7 +223,7 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
 
 def _redo_report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
-    reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
+    reasons = tuple(RefusedGroups(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 

@@ -17,7 +17,7 @@ from app.db.session import Session
 from app.features.batches.completion_queries import complete_judged_groups
 from app.features.datasets.tables import GroupModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.independent_annotations.submission_queries import record_copy_verdict
+from app.features.independent_annotations.submission_queries import submit_copy_on_verdict
 from app.features.people.visibility_queries import (
     COPIES,
     shown_actor_column,
@@ -145,7 +145,7 @@ def find_next_verdict_id(session: Session) -> int:
     return find_next_row_id(session, VerdictModel)
 
 
-def insert_verdicts(
+def insert_verdicts_and_end_work(
     session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
     """Insert verdicts on groups of a dataset, and log them under who gives them; work on these groups
@@ -167,7 +167,7 @@ def insert_verdicts(
         complete_judged_groups(session, states, actor=actor, at=at)
         return
     for row in rows:
-        record_copy_verdict(session, row["group_id"], row["state"], actor=actor, at=at)
+        submit_copy_on_verdict(session, row["group_id"], row["state"], actor=actor, at=at)
 
 
 def find_newest_verdict_id(session: Session) -> int:
@@ -287,7 +287,7 @@ def split_spans(spans: Spans, most: int) -> list[tuple[int, int]]:
     ]
 
 
-def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
+def is_group_mended(verdict: Any, edited: bool, passes: bool | None) -> bool:
     """Whether a group was mended: edited, accepted as such, and not failing as it is now.
 
     What was edited when the verdict was given may have been undone since; a group that was

@@ -16,7 +16,7 @@ from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGroup
+from app.features.verdicts.bulk import BatchReport, BulkPlan, RefusedGroups, SampleGroup
 from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import set_verdict
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
@@ -125,7 +125,7 @@ class BulkResult(Document):
         description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
     )
     changed: int
-    refused: list[Refusal]
+    refused: list[RefusedGroups]
 
     @staticmethod
     def planned(plan: BulkPlan) -> BulkResult:

@@ -10,14 +10,14 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.state import GroupState, require_unchanged, require_unchanged_content
-from app.features.groups.submit import read_solved_group
-from app.features.queue.queries import count_reviewed
-from app.features.queue.refresh_queries import update_verdict
+from app.features.groups.submit import ensure_group_solution
+from app.features.queue.queries import count_reviewed_by_person_and_status
+from app.features.queue.refresh_queries import update_row_verdict
 from app.features.verdicts.queries import (
     StoredVerdict,
     count_groups_by_judge,
     find_next_verdict_id,
-    insert_verdicts,
+    insert_verdicts_and_end_work,
 )
 from app.json_text import Moment
 from app.soccer.choices import VerdictState
@@ -61,20 +61,22 @@ def set_verdict(
     verdict = check_verdict(state, reason, note)
     while True:
         # Accepting weighs the gates, so they must be known.
-        record, solution = read_solved_group(store, group_id, needed=state == "accepted")
+        record, solution = ensure_group_solution(store, group_id, needed=state == "accepted")
         stored, what = record.stored, f"group {record.stored.group.key}"
         override = _overridden_gate(solution, verdict)
         _require_usable_ball(solution, verdict)
-        _require_visible_group(stored.group, verdict)
+        _require_picture_to_accept(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_unchanged_content(session, group_id, record.content, if_match, what)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
                 given = _make_verdict(session, stored, verdict, override, actor)
-                insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
+                insert_verdicts_and_end_work(
+                    session, stored.dataset_id, [given], actor=actor, at=given.at
+                )
                 passes = None if solution is None else solution.passes
-                update_verdict(session, stored, given, passes)
+                update_row_verdict(session, stored, given, passes)
                 after = replace(record, verdicts=(given, *record.verdicts)).make_state(solution)
                 session.respond(after)
                 return after
@@ -126,7 +128,7 @@ def _require_usable_ball(solution: Solution | None, verdict: Verdict) -> None:
         )
 
 
-def _require_visible_group(group: Group, verdict: Verdict) -> None:
+def _require_picture_to_accept(group: Group, verdict: Verdict) -> None:
     """Refuse a bare acceptance of a group that nobody can have looked at."""
     seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
@@ -177,7 +179,7 @@ def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:
     """Everybody who has judged a group of a dataset, the most active first."""
     with store.read() as session:
         people = count_groups_by_judge(session, dataset_id, since=now()[:10])
-        counts = count_reviewed(session, dataset_id)
+        counts = count_reviewed_by_person_and_status(session, dataset_id)
     reviewers = [
         Reviewer(
             name=row.actor,

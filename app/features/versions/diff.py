@@ -49,7 +49,7 @@ class ChangedGroup:
 
 
 @dataclass(frozen=True)
-class Setting:
+class ChangedSetting:
     """A value of the policy, the solver or the split that differs."""
 
     name: str
@@ -67,7 +67,7 @@ class VersionDiff:
     dropped: tuple[MembershipChange, ...]
     moved: tuple[BallMove, ...]
     changed: tuple[ChangedGroup, ...]
-    settings: tuple[Setting, ...]
+    settings: tuple[ChangedSetting, ...]
     unchanged: int
 
     def values(self, most: int | None = None) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def _parse_point(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _iterate_changed_settings(older: Version, newer: Version) -> Iterable[Setting]:
+def _iterate_changed_settings(older: Version, newer: Version) -> Iterable[ChangedSetting]:
     pairs = [
         (
             _flatten_policy(policy_to_json(older.policy)),
@@ -241,7 +241,7 @@ def _iterate_changed_settings(older: Version, newer: Version) -> Iterable[Settin
     for before, after in pairs:
         for name in sorted({*before, *after}):
             if before.get(name) != after.get(name):
-                yield Setting(name, before.get(name), after.get(name))
+                yield ChangedSetting(name, before.get(name), after.get(name))
 
 
 def _flatten_policy(policy: Json) -> dict[str, Json]:

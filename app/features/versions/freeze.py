@@ -52,7 +52,7 @@ from app.features.versions.service import (
 )
 from app.formats.manifest import read_software_version
 from app.json_text import canonical_json_text, digest_content, quote_text
-from app.media.files import read_media_facts
+from app.media.files import read_media_size_and_crc
 from app.progress import ReportProgress
 from app.soccer.codec import policy_to_json
 from app.soccer.finding import Finding
@@ -403,7 +403,9 @@ def _select_dismissed_findings(findings: Sequence[Finding], dismissals: GroupDis
 
 def _collect_media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
     return {
-        view.key: read_media_facts(view.media) for view in group.views if view.media is not None
+        view.key: read_media_size_and_crc(view.media)
+        for view in group.views
+        if view.media is not None
     }
 
 

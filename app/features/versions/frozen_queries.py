@@ -68,7 +68,7 @@ def _station_to_json_without_mirroring(station: Station) -> Json:
     return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
 
 
-class OutlineStation(msgspec.Struct):
+class StationFileNaming(msgspec.Struct):
     """What names the files of a frozen station."""
 
     key: str
@@ -76,23 +76,23 @@ class OutlineStation(msgspec.Struct):
     shared: bool
 
 
-class OutlineView(msgspec.Struct):
+class ViewFileNaming(msgspec.Struct):
     """The same of a view; a shared station stands as its key."""
 
     key: str
-    station: str | OutlineStation
+    station: str | StationFileNaming
 
 
-class FrozenOutline(msgspec.Struct):
+class GroupFileNaming(msgspec.Struct):
     """The same of a group."""
 
     key: str
     match: str
     split: str
-    views: list[OutlineView]
+    views: list[ViewFileNaming]
 
 
-for _kind in (FrozenOutline, OutlineStation):
+for _kind in (GroupFileNaming, StationFileNaming):
     prepare_msgspec_type(_kind)
 
 
@@ -127,8 +127,10 @@ def thaw_group(annotations: Json, texts: Mapping[str, Json], frames: Frames | No
     )
 
 
-def thaw_outline(
-    outline: FrozenOutline, stations: Mapping[str, OutlineStation], frames: Frames | None = None
+def thaw_group_without_annotations(
+    outline: GroupFileNaming,
+    stations: Mapping[str, StationFileNaming],
+    frames: Frames | None = None,
 ) -> Group:
     """What names the files of a frozen group: no lines, no cameras, no balls, no paint."""
     views = []

@@ -152,7 +152,7 @@ def make_version_manifest(store: Store, version_id: int) -> dict[str, Json]:
             "licence": version.licence,
             "verdicts": verdicts,
             "overrides": overrides,
-            **make_version_stamp(session, version),
+            **describe_frozen_version(session, version),
         }
 
 
@@ -174,7 +174,7 @@ def describe_policy_settings(policy: Policy, solver_version: str) -> dict[str, J
     }
 
 
-def make_version_stamp(session: Session, version: Version) -> dict[str, Json]:
+def describe_frozen_version(session: Session, version: Version) -> dict[str, Json]:
     """Hash, note, counts and changelog of a version, and who is not in it and why."""
     return {
         "frozen": {

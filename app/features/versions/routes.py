@@ -28,8 +28,8 @@ from app.features.versions import jobs as version_jobs
 from app.features.versions import service as versions
 from app.features.versions.diff import (
     BallMove,
+    ChangedSetting,
     MembershipChange,
-    Setting,
     diff_versions,
     make_version_changelog,
 )
@@ -199,7 +199,7 @@ class Changelog(BaseModel):
     lines: list[str]
 
 
-class VersionName(BaseModel):
+class VersionReference(BaseModel):
     """Which version."""
 
     id: int
@@ -214,7 +214,7 @@ class BallMoveDocument(Document, shows=BallMove):
     after: Point
 
 
-class ChangeDocument(BaseModel):
+class ChangedGroupDocument(BaseModel):
     """A group of both versions that is not the same in them."""
 
     group: str
@@ -224,16 +224,16 @@ class ChangeDocument(BaseModel):
 class VersionDiffDocument(BaseModel):
     """What changed from one version to another; lists may be cut, counts are whole."""
 
-    older: VersionName
-    newer: VersionName
+    older: VersionReference
+    newer: VersionReference
     same: bool = Field(description="Whether both versions have the same hash.")
     counts: dict[str, int]
     lines: list[str] = Field(description="In sentences.")
     added: list[MembershipChange]
     dropped: list[MembershipChange]
     moved: list[BallMoveDocument] = Field(description="The farthest first.")
-    changed: list[ChangeDocument]
-    settings: list[Setting]
+    changed: list[ChangedGroupDocument]
+    settings: list[ChangedSetting]
 
 
 router = APIRouter(tags=["versions"], route_class=Route)

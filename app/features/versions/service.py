@@ -19,13 +19,13 @@ from app.features.people.ownership import MIN_HASH, find_versions
 from app.features.solutions.queries import decode_calibration_without_markings, decode_solution
 from app.features.versions.frozen_queries import (
     CALIBRATION,
-    FrozenOutline,
-    OutlineStation,
+    GroupFileNaming,
+    StationFileNaming,
     collect_shared_keys,
     decode_frozen_json,
     read_frozen,
     thaw_group,
-    thaw_outline,
+    thaw_group_without_annotations,
 )
 from app.features.versions.queries import Verification as Verification
 from app.features.versions.queries import (
@@ -227,27 +227,30 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
     ]
 
 
-def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
+def thaw_groups_without_annotations(
+    session: Session, version: Version, rows: Sequence[VersionGroup]
+) -> list[Group]:
     """The same without what was annotated: what names the files of the groups.
 
     Raises:
         StorageError: Content is missing.
     """
     bodies = _read_contents(session, version, {row.said or "" for row in rows})
-    outlines = [parse_json_as(decompress(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    outlines = [parse_json_as(decompress(bodies[row.said or ""]), GroupFileNaming) for row in rows]
     shared = {
         view.station for one in outlines for view in one.views if isinstance(view.station, str)
     }
     more = _read_contents(session, version, shared)
-    stations = {key: parse_json_as(decompress(more[key]), OutlineStation) for key in shared}
+    stations = {key: parse_json_as(decompress(more[key]), StationFileNaming) for key in shared}
     return [
-        thaw_outline(one, stations, row.frames) for row, one in zip(rows, outlines, strict=True)
+        thaw_group_without_annotations(one, stations, row.frames)
+        for row, one in zip(rows, outlines, strict=True)
     ]
 
 
 def _read_contents(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:
     found = read_frozen(session, version.dataset_id, keys)
-    require_frozen(keys, found)
+    require_frozen_contents(keys, found)
     return found
 
 
@@ -256,7 +259,7 @@ def collect_calibration_keys(solved: Json) -> set[str]:
     return {CALIBRATION + view["calibration_key"] for view in solved["views"]}
 
 
-def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
+def require_frozen_contents(keys: set[str], found: Mapping[str, bytes]) -> None:
     """Raise StorageError where content that a version names is not there."""
     missing = keys - found.keys()
     if missing:

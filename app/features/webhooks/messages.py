@@ -86,7 +86,7 @@ class WebhookMessage:
     job_id: int = 0
 
 
-def read_messages(session: Session, webhook: Any, dataset: str) -> list[WebhookMessage]:
+def make_new_messages(session: Session, webhook: Any, dataset: str) -> list[WebhookMessage]:
     """What has happened since a webhook was told last, its kinds and others."""
     entries = list_log_entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
     place = (webhook.jobs_until, webhook.job_id)

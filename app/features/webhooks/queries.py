@@ -251,7 +251,7 @@ def has_delivered_since(session: Session, webhook_id: int, at: str) -> bool:
     return session.scalar(statement.limit(1)) is not None
 
 
-def has_old_deliveries(session: Session, before: str) -> bool:
+def has_finished_deliveries(session: Session, before: str) -> bool:
     """Whether anything arrived or was given up before a time."""
     return (
         session.scalar(select(DeliveryModel.id).where(*_make_finished_conditions(before)).limit(1))
@@ -259,7 +259,7 @@ def has_old_deliveries(session: Session, before: str) -> bool:
     )
 
 
-def forget_deliveries(session: Session, before: str) -> int:
+def delete_finished_deliveries(session: Session, before: str) -> int:
     """Delete what arrived or was given up before a time; returns how many."""
     gone = session.execute(delete(DeliveryModel).where(*_make_finished_conditions(before)))
     return int(cast(Any, gone).rowcount)

@@ -24,7 +24,7 @@ from app.features.datasets.queries import read_dataset_names
 from app.features.webhooks.messages import (
     WebhookMessage,
     derive_webhook_secret,
-    read_messages,
+    make_new_messages,
     sign_message,
 )
 from app.features.webhooks.queries import (
@@ -209,7 +209,7 @@ class WebhookSender:
         with self._store.read() as session:
             rows = list_active_webhooks(session)
             names = read_dataset_names(session) if rows else {}
-            found = [(row, read_messages(session, row, names[row.dataset_id])) for row in rows]
+            found = [(row, make_new_messages(session, row, names[row.dataset_id])) for row in rows]
         if not any(messages for _, messages in found):
             return 0
         with self._store.write() as session:

@@ -26,7 +26,7 @@ from app.solving.judgement import (
     find_first_failed_gates,
     find_views_in_pairs,
     judge_groups,
-    judge_known_failures,
+    judge_with_known_view_failures,
     recompare_thresholds,
     widen_covariances,
 )
@@ -132,7 +132,7 @@ class BlockResults:
             views, pairs = new[facts.view_group], new[facts.pair_group]
             standing = view_failed[views], pair_failed[pairs]
             uncertainty = MeanCovariance(some)
-            found = judge_known_failures(
+            found = judge_with_known_view_failures(
                 some, policy, uncertainty, jac[views], standing, first_alone=True
             )
             failed[:, new] = found.failed

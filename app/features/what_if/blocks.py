@@ -17,13 +17,13 @@ from app.db.log import find_newest_entry_id, read_entry_hash
 from app.db.session import Session
 from app.features.groups.queries import read_groups
 from app.features.groups.revision_queries import (
-    count_changes,
+    count_changed_groups,
     count_groups,
     find_newest_change_id,
     list_changed_groups,
     list_groups_after,
 )
-from app.features.solutions.queries import StoredFacts, read_calibrations, read_solution_facts
+from app.features.solutions.queries import StoredGateFacts, read_calibrations, read_solution_facts
 from app.features.what_if.cache import (
     CachedBlock,
     CachedTable,
@@ -74,7 +74,7 @@ def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, byte
 
 
 def _recompute_facts(
-    session: Session, rows: Sequence[StoredFacts]
+    session: Session, rows: Sequence[StoredGateFacts]
 ) -> Iterator[tuple[int, GroupFacts]]:
     """Facts of solutions from before they were kept, where they still fit their group."""
     keys = {row.group_id: json.loads(row.calibrations) for row in rows}
@@ -160,7 +160,7 @@ class DatasetBlocks:
         total = (
             count_groups(session, self.dataset_id) - self.groups if self.through is not None else 0
         )
-        return total + count_changes(session, self.dataset_id, self.mark)
+        return total + count_changed_groups(session, self.dataset_id, self.mark)
 
     def read_next_block(self, session: Session) -> bool:
         """Come a block of groups closer to the database; False: it is in step with the session."""

@@ -53,7 +53,7 @@ class ThresholdCurve:
 
 
 @dataclass(frozen=True)
-class FunnelPart:
+class YieldPart:
     """Groups of one split, one bin of distance or with one finding, and how many pass."""
 
     name: str
@@ -81,9 +81,9 @@ class Yield:
     funnel: tuple[FunnelStep, ...]
     given_not_measured: int
     curves: tuple[ThresholdCurve, ...]
-    splits: tuple[FunnelPart, ...]
-    distances: tuple[FunnelPart, ...]
-    findings: tuple[FunnelPart, ...]
+    splits: tuple[YieldPart, ...]
+    distances: tuple[YieldPart, ...]
+    findings: tuple[YieldPart, ...]
     leakage: tuple[SplitLeak, ...]
     gained: int
     lost: int
@@ -151,7 +151,7 @@ def _make_yield(
         splits=_yield_by_split(snapshot, total),
         distances=_yield_by_distance(snapshot, total),
         findings=tuple(
-            FunnelPart(kind, groups, passing)
+            YieldPart(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
         leakage=find_split_leaks(snapshot.places),
@@ -181,21 +181,21 @@ def _funnel_steps(
     return tuple(steps)
 
 
-def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.places.items():
         everyone[split] += groups
     return tuple(
-        FunnelPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
+        YieldPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
     )
 
 
-def _yield_by_distance(snapshot: TableSnapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_distance(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
-        FunnelPart("", groups[bin_], passing[bin_], low, ends[bin_])
+        YieldPart("", groups[bin_], passing[bin_], low, ends[bin_])
         for bin_, low in enumerate([*DISTANCES, None])
     )

@@ -57,7 +57,7 @@ def _threshold_type(item: Threshold) -> Any:
     return Annotated[float, Field(ge=item.minimum, le=item.maximum)]
 
 
-class CalibrationValues(_optional_thresholds_model(CalibrationPolicy)):  # type: ignore[misc]
+class CalibrationThresholds(_optional_thresholds_model(CalibrationPolicy)):  # type: ignore[misc]
     """What a view's calibration depends on; only solving again tells what another value does."""
 
 
@@ -72,7 +72,7 @@ class WhatIf(_optional_thresholds_model(Policy)):  # type: ignore[misc]
         json_schema_extra={"examples": [{"min_jac": 0.8, "min_parallax_degrees": 5.0}]}
     )
 
-    calibration: CalibrationValues | None = None
+    calibration: CalibrationThresholds | None = None
 
     def values(self) -> dict[str, Any]:
         """The fields of a policy that shall differ."""

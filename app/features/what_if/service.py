@@ -16,7 +16,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
 from app.features.datasets.queries import find_dataset, parse_stored_policy, read_dataset_names
-from app.features.groups.revision_queries import count_changes, count_groups
+from app.features.groups.revision_queries import count_changed_groups, count_groups
 from app.features.what_if.block_results import (
     BlockResults,
     GroupCounts,
@@ -262,7 +262,7 @@ class YieldStore:
         known = kept.gathered
         if known is not None and known.calibration != calibration:
             known = None
-        if known is None or count_changes(session, dataset_id, known.mark) > FAR_BEHIND:
+        if known is None or count_changed_groups(session, dataset_id, known.mark) > FAR_BEHIND:
             found = DatasetBlocks.load(session, folder, dataset_id, calibration)
             if found is not None and (known is None or found.mark > known.mark):
                 known = found
@@ -327,7 +327,7 @@ def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
     )
 
 
-def examine_yields(settings: Settings) -> CheckResult:
+def examine_yield_cache(settings: Settings) -> CheckResult:
     """Read every file of the cache; one that a server deletes meanwhile is none any more."""
     files = [path for ending in ARRAYS for path in sorted(settings.yields.glob(f"*/*{ending}"))]
     damaged = [path for path in files if not _is_file_readable(path)]

@@ -30,8 +30,8 @@ from app.features.queue.statistics import (
     COLUMNS,
     Statistics,
     StatisticsColumns,
-    count_rows,
     make_statistics,
+    rows_to_statistics_columns,
 )
 from app.features.verdicts.queries import find_newest_verdict_id, list_groups_judged_since
 from app.features.what_if.cache import map_arrays, write_arrays
@@ -138,12 +138,12 @@ def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _Datase
     ids, parts = [], []
     for rows in _column_batches(session, dataset_id):
         ids.append(np.array([row[0] for row in rows], np.int64))
-        parts.append(count_rows([row[1:] for row in rows]))
+        parts.append(rows_to_statistics_columns([row[1:] for row in rows]))
     return _DatasetColumns(
         policy,
         **_read_current_marks(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
-        counted=_join_columns(parts) if parts else count_rows([]),
+        counted=_join_columns(parts) if parts else rows_to_statistics_columns([]),
     )
 
 
@@ -179,7 +179,7 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     stays = ~np.isin(kept.group_id, np.array(ids, np.int64))
     group_id = np.concatenate([kept.group_id[stays], new])
     joined = _join_columns(
-        [_select_groups(kept.counted, stays), count_rows([row[1:] for row in rows])]
+        [_select_groups(kept.counted, stays), rows_to_statistics_columns([row[1:] for row in rows])]
     )
     order = np.argsort(group_id, kind="stable")
     return _DatasetColumns(

@@ -16,12 +16,12 @@ import pytest
 from app.config import Settings
 from app.errors import InputError, NotFoundError, ReviewError, StorageError
 from app.features.imports.uploads import list_folder, resolve_folder
-from app.features.integrity.checks import examine_stores
+from app.features.integrity.checks import examine_object_stores
 from app.formats.file_tree import ImportLimits
 from app.formats.frames_reader import read_frame_list
 from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.media.files import guess_content_type, read_frame
+from app.media.files import guess_content_type, read_encoded_frame
 from app.media.object_frames import is_cached
 from app.object_store.path import find_path, split_address
 from app.object_store.store import open_store
@@ -103,9 +103,9 @@ class TestReading:
             for view, stored in zip(one.views, other.views, strict=True):
                 assert view.media is not None and stored.media is not None
                 assert stored.media.member == view.media.member
-                assert read_frame(stored.media, None, False, settings) == read_frame(
-                    view.media, None, False, settings
-                )
+                assert read_encoded_frame(
+                    stored.media, None, False, settings
+                ) == read_encoded_frame(view.media, None, False, settings)
 
     def test_a_member_is_fetched_without_its_archive(
         self, settings: Settings, proxy: StoreProxy, tmp_path: Path
@@ -119,24 +119,24 @@ class TestReading:
         proxy.reset()
         media = Media("s3://frames/big.zip", "3.bin")
         with contextlib.suppress(ReviewError):
-            read_frame(media, None, False, settings)
+            read_encoded_frame(media, None, False, settings)
         assert is_cached(media, settings)
         assert len(frame) < proxy.sent < len(frame) + 3 * 128 * 1024
         # Its list is known here; no range of another zip is taken for one of it.
         sealed = Media(find_path(settings, "s3://frames/big.zip").make_sealed_address(), "1.bin")
         with contextlib.suppress(ReviewError):
-            read_frame(replace(sealed, member="2.bin"), None, False, settings)
+            read_encoded_frame(replace(sealed, member="2.bin"), None, False, settings)
         store.put("big.zip", bytes(len(frame) * 5 + 1000))
         with pytest.raises(NotFoundError, match="was changed in its store"):
-            read_frame(sealed, None, False, settings)
+            read_encoded_frame(sealed, None, False, settings)
 
     def test_a_frame_is_fetched_once_and_kept_for_its_owner_alone(
         self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
         media = first_media(settings, filled_store)
-        first = read_frame(media, None, False, settings)
+        first = read_encoded_frame(media, None, False, settings)
         proxy.reset()
-        assert read_frame(media, None, False, settings) == first
+        assert read_encoded_frame(media, None, False, settings) == first
         assert proxy.asked == []
         kept = [path for path in (settings.cache / "objects").rglob("*") if path.is_file()]
         assert [stat.S_IMODE(path.stat().st_mode) for path in kept] == [0o600]
@@ -151,7 +151,7 @@ class TestReading:
         open_store(settings, "frames").put("all.zip", (tmp_path / "all.zip").read_bytes())
         media = first_media(settings, "s3://frames/all.zip")
         assert media.member is not None and "Frames-v3.zip/" in media.member
-        assert guess_content_type(read_frame(media, None, False, settings)) == "image/png"
+        assert guess_content_type(read_encoded_frame(media, None, False, settings)) == "image/png"
 
 
 class TestFrameLists:
@@ -164,7 +164,7 @@ class TestFrameLists:
         media = groups_of(settings, filled_store)[0].views
         assert media[0].media is not None and media[1].media is not None
         archive = media[0].media.path.partition("#")[0]
-        frame = read_frame(media[0].media, None, False, settings)
+        frame = read_encoded_frame(media[0].media, None, False, settings)
         entry = {"group": first.key, "path": archive, "member": media[0].media.member}
         entries = [
             {**entry, "view": first.views[0].key, "sha256": sha256(frame).hexdigest()},
@@ -189,10 +189,10 @@ class TestFrameLists:
         assert report.problems[-1].problem == "1 entry names no view of what was read: gone/x"
         placed, wrong = groups[0].views, groups[1].views[0].media
         assert placed[0].media is not None and placed[1].media is not None and wrong is not None
-        assert read_frame(placed[0].media, None, False, settings) == frame
+        assert read_encoded_frame(placed[0].media, None, False, settings) == frame
         assert placed[1].media == media[0].media
         with pytest.raises(NotFoundError, match="its SHA-256 differs"):
-            read_frame(wrong, None, False, settings)
+            read_encoded_frame(wrong, None, False, settings)
         assert not is_cached(wrong, settings)
 
 
@@ -217,20 +217,23 @@ class TestBadDays:
     ) -> None:
         proxy.mode = mode
         with pytest.raises(StorageError) as caught:
-            read_frame(picture_object, None, False, settings)
+            read_encoded_frame(picture_object, None, False, settings)
         assert said in caught.value.message
         assert "secret" not in f"{caught.value.message} {caught.value.hint}"
         assert "soccer-data" not in caught.value.message
         assert not is_cached(picture_object, settings)
         proxy.mode = "open"
-        assert guess_content_type(read_frame(picture_object, None, False, settings)) == "image/png"
+        assert (
+            guess_content_type(read_encoded_frame(picture_object, None, False, settings))
+            == "image/png"
+        )
 
     def test_an_object_that_was_changed_is_not_shown_in_the_place_of_the_first(
         self, settings: Settings, picture_object: Media
     ) -> None:
         open_store(settings, "frames").put("loose/7.png", b"another")
         with pytest.raises(NotFoundError, match="was changed in its store"):
-            read_frame(picture_object, None, False, settings)
+            read_encoded_frame(picture_object, None, False, settings)
 
     def test_an_archive_that_was_changed_is_not_read(
         self, settings: Settings, tree: Path, tmp_path: Path
@@ -242,23 +245,23 @@ class TestBadDays:
             archive.writestr("7.png", b"x")
         store.put(name, (tmp_path / "other.zip").read_bytes())
         with pytest.raises(NotFoundError, match="was changed in its store"):
-            read_frame(media, None, False, settings)
+            read_encoded_frame(media, None, False, settings)
 
     def test_an_object_that_is_gone_is_said_to_be_gone(
         self, settings: Settings, picture_object: Media
     ) -> None:
         open_store(settings, "frames").delete("loose/7.png")
         with pytest.raises(NotFoundError, match="is not in its store"):
-            read_frame(picture_object, None, False, settings)
+            read_encoded_frame(picture_object, None, False, settings)
 
     def test_a_frame_that_is_damaged_on_this_disk_is_fetched_again(
         self, settings: Settings, picture_object: Media, proxy: StoreProxy
     ) -> None:
-        first = read_frame(picture_object, None, False, settings)
+        first = read_encoded_frame(picture_object, None, False, settings)
         (kept,) = [path for path in (settings.cache / "objects").rglob("*") if path.is_file()]
         kept.write_bytes(kept.read_bytes()[:-100])
         proxy.reset()
-        assert read_frame(picture_object, None, False, settings) == first
+        assert read_encoded_frame(picture_object, None, False, settings) == first
         assert len(proxy.asked) == 1
 
     def test_keys_in_a_file_are_its_owners_and_read_again_when_they_change(
@@ -294,20 +297,20 @@ class TestDoctor:
     def test_says_what_a_store_can_do_and_what_it_cannot(
         self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
-        (check,) = examine_stores(settings)
+        (check,) = examine_object_stores(settings)
         assert (check.ok, check.sentence) == (True, "lists, reads, writes")
         proxy.writes_fail_after = 0
-        (check,) = examine_stores(settings)
+        (check,) = examine_object_stores(settings)
         assert not check.ok
         assert check.sentence.endswith("(AccessDenied); it lists and reads")
         proxy.mode = "expired"
-        (check,) = examine_stores(settings)
+        (check,) = examine_object_stores(settings)
         assert "ExpiredToken" in check.sentence
 
     def test_a_store_that_gives_out_whatever_is_there_is_told(
         self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
         proxy.mode = "unconditional"
-        (check,) = examine_stores(settings)
+        (check,) = examine_object_stores(settings)
         assert not check.ok
         assert "If-Match" in check.sentence and "soccer-data" not in check.sentence

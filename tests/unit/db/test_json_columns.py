@@ -9,7 +9,7 @@ from app.db.json_columns import (
     compress_json,
     decompress_json,
     parse_json_column,
-    report_damaged_values,
+    translate_shape_errors_to_damage,
 )
 from app.errors import DamagedError
 
@@ -33,7 +33,7 @@ def test_what_is_not_as_it_was_written_is_damage() -> None:
 
 @pytest.mark.parametrize("spoilt", [{}, {"ball": None}, {"ball": ["a"]}, {"ball": []}])
 def test_a_value_of_another_shape_than_was_written_is_damage(spoilt: object) -> None:
-    with pytest.raises(DamagedError, match="cannot be decoded"), report_damaged_values():
+    with pytest.raises(DamagedError, match="cannot be decoded"), translate_shape_errors_to_damage():
         float(spoilt["ball"][0])  # type: ignore[index]
 
 

@@ -7,7 +7,7 @@ import pytest
 from app.config import Settings
 from app.db import locks
 from app.db.locks import (
-    DatabaseLock,
+    DatabaseOpenLock,
     hold_exclusive_database_lock,
     hold_practice_lock,
     hold_server_lock,
@@ -22,13 +22,13 @@ class TestDatabaseLock:
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
-        first = DatabaseLock(settings)
+        first = DatabaseOpenLock(settings)
         assert first.alone
         with pytest.raises(BusyError, match="has been opening the database") as refused:
-            DatabaseLock(settings)
+            DatabaseOpenLock(settings)
         assert "Ctrl-Z" in str(refused.value.hint)
         first.share()
-        second, third = DatabaseLock(settings), DatabaseLock(settings)
+        second, third = DatabaseOpenLock(settings), DatabaseOpenLock(settings)
         assert not (first.alone or second.alone or third.alone)
         for lock in (first, second, third):
             lock.release()
@@ -37,14 +37,14 @@ class TestDatabaseLock:
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
-        first, waited = DatabaseLock(settings), []
+        first, waited = DatabaseOpenLock(settings), []
 
         def with_a_gap(handle: int, operation: int) -> None:
             """Lets go before it shares, as the system may, and somebody opens just then."""
             FLOCK(handle, fcntl.LOCK_UN)
             monkeypatch.setattr(fcntl, "flock", FLOCK)
             try:
-                DatabaseLock(settings).release()
+                DatabaseOpenLock(settings).release()
             except BusyError:
                 waited.append(True)
             FLOCK(handle, operation)
@@ -57,7 +57,7 @@ class TestDatabaseLock:
     def test_what_must_be_alone_is_refused_beside_others_and_runs_after_them(
         self, settings: Settings
     ) -> None:
-        first = DatabaseLock(settings)
+        first = DatabaseOpenLock(settings)
         first.share()
         refused = pytest.raises(StorageError, match="has the database open: not now")
         with refused, hold_exclusive_database_lock(settings, "not now"):

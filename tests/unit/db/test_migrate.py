@@ -18,7 +18,7 @@ from app.config import Settings
 from app.db.backup import verify_backup
 from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseOpenLock
 from app.db.migrate import (
     KNOWN_REVISIONS,
     find_migrations_folder,
@@ -196,7 +196,7 @@ class TestOldHomes:
 
     def test_is_refused_while_somebody_has_the_database_open(self, settings: Settings) -> None:
         make_old(settings, "0009")
-        lock = DatabaseLock(settings)
+        lock = DatabaseOpenLock(settings)
         lock.share()
         with pytest.raises(StorageError, match="another Touchline process has the database open"):
             migrate_database(settings)

@@ -12,7 +12,11 @@ from app.evaluation.annotation_distance import (
     compare_balls_3d,
     compare_lines,
 )
-from app.evaluation.rater_agreement import AgreementLimits, find_disagreements, measure_spreads
+from app.evaluation.rater_agreement import (
+    AgreementLimits,
+    compute_medians_and_tails,
+    find_disagreements,
+)
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
@@ -127,7 +131,7 @@ class TestCompareAnnotations:
 
 class TestSpreads:
     def test_hold_what_was_measured_and_say_of_how_many(self, group: Group) -> None:
-        found = measure_spreads([compare_annotations(group, group, None, None)])
+        found = compute_medians_and_tails([compare_annotations(group, group, None, None)])
         assert (found["ball_m"].count, found["ball_m"].median) == (0, None)
         assert found["ball_px"].median == 0
         assert found["line_px"].tail == pytest.approx(0, abs=1e-9)

@@ -17,14 +17,14 @@ from app.evaluation.average_precision import (
     area_under_curve,
     coco_average_precision,
     interpolated_average_precision,
-    make_detection_table,
+    make_detection_table_by_bin,
     make_error_figure,
     match_detections_to_balls,
     mean_average_precision_over_ious,
     precision_recall_curve,
 )
 from app.evaluation.frame import Detection, JudgedFrame
-from app.evaluation.localization import measure_frame
+from app.evaluation.localization import make_frame_result
 from app.evaluation.result import FrameResult
 from app.soccer.frames import Box
 from tests.unit.evaluation.conftest import DIAMETER
@@ -232,8 +232,8 @@ class TestDetectionTable:
             JudgedFrame(near, near.boxes["optimized"], (Detection(near.boxes["optimized"], 0.9),)),
             JudgedFrame(far, far.boxes["optimized"], ()),
         ]
-        results = [measure_frame(item, DIAMETER) for item in judged]
-        table = make_detection_table(judged, results, DISTANCE)
+        results = [make_frame_result(item, DIAMETER) for item in judged]
+        table = make_detection_table_by_bin(judged, results, DISTANCE)
         assert [row.label for row in table.rows] == ["20 to 30 m", "80 to 100 m"]
         assert [row.cells[0].value for row in table.rows] == [1, 0]
         assert [row.cells[2].value for row in table.rows] == [1, 0]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.frame import Detection, JudgedFrame
-from app.evaluation.localization import measure_frame, measure_position_error
+from app.evaluation.localization import make_frame_result, measure_position_error
 from app.soccer.frames import Box, ImagePoint
 from tests.unit.evaluation.conftest import DIAMETER, camera_at
 
@@ -46,7 +46,7 @@ class TestMeasureFrame:
         away = Detection(Box(5, 5, 9, 9), 0.9)
         near = Detection(Box.square(ImagePoint(center.x + 2, center.y), 10.0), 0.6)
         exact = Detection(frame.boxes["optimized"], 0.5)
-        found = measure_frame(judged(frame, away, near, exact), DIAMETER)
+        found = make_frame_result(judged(frame, away, near, exact), DIAMETER)
         assert (found.score, found.iou) == (0.9, 0)
         assert found.hit_score == 0.6
         assert found.hit_iou is not None
@@ -55,7 +55,7 @@ class TestMeasureFrame:
 
     def test_numbers_by_hand(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
-        found = measure_frame(judged(frame, Detection(frame.boxes["annotated"], 0.8)), DIAMETER)
+        found = make_frame_result(judged(frame, Detection(frame.boxes["annotated"], 0.8)), DIAMETER)
         assert found.distance_m == pytest.approx(50)
         assert found.error_m == pytest.approx(10)
         assert found.error_percent == pytest.approx(20)
@@ -65,7 +65,7 @@ class TestMeasureFrame:
 
     def test_a_predicted_camera_has_its_own_error_of_the_true_distance(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
-        found = measure_frame(
+        found = make_frame_result(
             judged(frame, Detection(frame.boxes["optimized"])), DIAMETER, camera_at(55.0)
         )
         # The same ball, seen from five metres farther back.
@@ -75,14 +75,14 @@ class TestMeasureFrame:
 
     def test_unsure_detections_take_no_part(self, make_frame) -> None:
         frame = make_frame()
-        found = measure_frame(
+        found = make_frame_result(
             judged(frame, Detection(frame.boxes["optimized"], 0.2)), DIAMETER, min_score=0.5
         )
         assert (found.detections, found.score, found.error_m) == (1, None, None)
 
     def test_a_frame_without_ball_has_no_hit(self, make_frame) -> None:
         frame = replace(make_frame(), absent=True, point=None)
-        found = measure_frame(
+        found = make_frame_result(
             JudgedFrame(frame, None, (Detection(Box(5, 5, 9, 9), 0.9),)), DIAMETER
         )
         assert (found.ball, found.score, found.iou, found.hit_iou) == (False, 0.9, None, None)

@@ -20,10 +20,10 @@ from app.evaluation.rater_agreement import (
     Disagreement,
     MedianAndTail,
     cohen_kappa,
+    compute_medians_and_tails,
     find_disagreements,
     fleiss_kappa,
     krippendorff_alpha,
-    measure_spreads,
 )
 
 # Fleiss 1971, table 1: six psychiatrists, thirty patients, five diagnoses.
@@ -292,7 +292,7 @@ class TestSpreads:
             )
             for px in range(101)
         )
-        found = measure_spreads([GroupDistance(views, Ball3DDistance(True, True, 0.25))])
+        found = compute_medians_and_tails([GroupDistance(views, Ball3DDistance(True, True, 0.25))])
         assert tuple(found) == MEASURES
         for name in ("line_px", "ball_px", "diameter_px", "position_m"):
             assert found[name] == MedianAndTail(101, 50.0, 95.0), name
@@ -300,4 +300,4 @@ class TestSpreads:
         assert found["ball_m"] == MedianAndTail(1, 0.25, 0.25)
 
     def test_of_nothing_there_is_none(self) -> None:
-        assert set(measure_spreads([]).values()) == {MedianAndTail(0)}
+        assert set(compute_medians_and_tails([]).values()) == {MedianAndTail(0)}

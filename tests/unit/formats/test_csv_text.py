@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from app.errors import DatasetFormatError
 from app.formats.csv_text import (
-    CsvTable,
+    CsvTableWriter,
     format_csv_cell,
     format_number_list,
     is_missing,
@@ -57,7 +57,7 @@ class TestPlainList:
 class TestTable:
     def test_the_index_column_comes_first_and_has_no_name(self) -> None:
         file = io.StringIO()
-        table = CsvTable(file, ["a", "b"])
+        table = CsvTableWriter(file, ["a", "b"])
         table.add([1.5, None])
         table.add(["x,y", False])
         assert file.getvalue() == ',a,b\n0,1.5,\n1,"x,y",False\n'
@@ -90,14 +90,14 @@ class TestReadRows:
     @given(st.text(st.characters(exclude_categories=["Cs"])))
     def test_any_text_comes_back_through_a_table(self, text: str) -> None:
         file = io.StringIO(newline="")
-        CsvTable(file, ("a",)).add([text])
+        CsvTableWriter(file, ("a",)).add([text])
         ((_, row),) = read_rows(file.getvalue().encode(), "f", ("a",), DEFAULT_LIMITS)
         assert row["a"] == text.replace("\r\n", "\n").replace("\r", "\n")
 
     @pytest.mark.parametrize("text", ["=x", "'=x", "''+x", "'t Veld", "-5", "'-5", "\nx"])
     def test_an_apostrophe_of_the_text_itself_stays(self, text: str) -> None:
         file = io.StringIO(newline="")
-        CsvTable(file, ("a",)).add([text])
+        CsvTableWriter(file, ("a",)).add([text])
         ((_, row),) = read_rows(file.getvalue().encode(), "f", ("a",), DEFAULT_LIMITS)
         assert row["a"] == text
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.guess_format import HEAD_BYTES, guess_from_content
+from app.formats.guess_format import HEAD_BYTES, guess_other_format
 from tests.unit.formats.foreign_coco import coco, write
 
 VOC = "<annotation><filename>a.jpg</filename><object><name>ball</name></object></annotation>"
@@ -43,7 +43,7 @@ class TestLooksLike:
     def test_it_says_what_the_files_are(
         self, tmp_path: Path, files: dict[str, Any], name: str
     ) -> None:
-        look = guess_from_content(write(tmp_path, files), "none of them")
+        look = guess_other_format(write(tmp_path, files), "none of them")
         assert look is not None
         assert look.sentence.startswith("It looks like ")
         assert name in look.sentence
@@ -54,14 +54,14 @@ class TestLooksLike:
             assert look.format is None
 
     def test_what_it_was_given_for_is_no_news(self, tmp_path: Path) -> None:
-        assert guess_from_content(write(tmp_path, {"x.json": coco()}), "coco") is None
-        assert guess_from_content(write(tmp_path / "y", {"notes.md": "x"}), "coco") is None
-        assert guess_from_content(tmp_path / "none", "coco") is None
+        assert guess_other_format(write(tmp_path, {"x.json": coco()}), "coco") is None
+        assert guess_other_format(write(tmp_path / "y", {"notes.md": "x"}), "coco") is None
+        assert guess_other_format(tmp_path / "none", "coco") is None
 
     @pytest.mark.parametrize("name", ["camera_1.json", "0001.json", "Labels-v3.json"])
     def test_what_a_file_holds_counts_before_its_name(self, tmp_path: Path, name: str) -> None:
-        assert guess_from_content(write(tmp_path, {name: coco()}), "coco") is None
-        look = guess_from_content(tmp_path, "issia")
+        assert guess_other_format(write(tmp_path, {name: coco()}), "coco") is None
+        look = guess_other_format(tmp_path, "issia")
         assert look is not None
         assert look.format == "coco"
 
@@ -69,7 +69,7 @@ class TestLooksLike:
         value = coco()
         value["annotations"] *= HEAD_BYTES // 10
         write(tmp_path, {"x.json": {"info": {}, **value}})
-        look = guess_from_content(tmp_path / "x.json", "gamestate")
+        look = guess_other_format(tmp_path / "x.json", "gamestate")
         assert look is not None
         assert look.format == "coco"
 
@@ -78,5 +78,5 @@ class TestLooksLike:
     def test_hostile_text_takes_no_time(self, tmp_path: Path, suffix: str, unit: str) -> None:
         write(tmp_path, {f"x.{suffix}": unit * (HEAD_BYTES // len(unit))})
         start = time.process_time()
-        guess_from_content(tmp_path, "coco")
+        guess_other_format(tmp_path, "coco")
         assert time.process_time() - start < 2

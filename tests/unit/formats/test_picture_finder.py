@@ -9,7 +9,7 @@ from app.formats.picture_finder import (
     LabelLocation,
     PictureFinder,
     PictureSearchResult,
-    assign_pictures,
+    drop_contested_pictures,
 )
 
 ANNOTATIONS = LabelLocation("annotations")
@@ -95,7 +95,7 @@ class TestPictureFinder:
 class TestOwnPictures:
     def test_a_picture_belongs_to_the_name_that_fits_it_best(self) -> None:
         one, two = ("clip1", "a.jpg"), ("clip2", "a.jpg")
-        found = assign_pictures(
+        found = drop_contested_pictures(
             {one: PictureSearchResult("clip2/a.jpg", 1), two: PictureSearchResult("clip2/a.jpg", 2)}
         )
         assert found == {
@@ -105,7 +105,7 @@ class TestOwnPictures:
 
     def test_two_names_that_fit_alike_have_none(self) -> None:
         one, two = ("x", "clip1", "a.jpg"), ("x", "clip2", "a.jpg")
-        found = assign_pictures(
+        found = drop_contested_pictures(
             {one: PictureSearchResult("a.jpg", 1), two: PictureSearchResult("a.jpg", 1)}
         )
         assert [item.place for item in found.values()] == [None, None]
@@ -113,16 +113,20 @@ class TestOwnPictures:
     @pytest.mark.parametrize("places", ["images/a.jpg", "deep/down/a.jpg"])
     def test_a_name_in_its_own_case_goes_before_one_in_another(self, places: str) -> None:
         names = [("A.JPG",), ("a.jpg",), ("clip", "A.jpg")]
-        found = assign_pictures({name: find(places, "/".join(name)) for name in names})
+        found = drop_contested_pictures({name: find(places, "/".join(name)) for name in names})
         assert found[("a.jpg",)].place == places
         assert [found[name].rivals for name in (names[0], names[2])] == [(places,)] * 2
 
     def test_names_that_fit_in_another_case_alone_have_none(self) -> None:
         names = [("A.JPG",), ("A.jpg",)]
-        found = assign_pictures({name: find("images/a.jpg", "/".join(name)) for name in names})
+        found = drop_contested_pictures(
+            {name: find("images/a.jpg", "/".join(name)) for name in names}
+        )
         assert [item.place for item in found.values()] == [None, None]
 
     def test_a_longer_end_in_another_case_does_not_go_before_the_whole_name(self) -> None:
         names = [("a.jpg",), ("images", "A.JPG")]
-        found = assign_pictures({name: find("images/a.jpg", "/".join(name)) for name in names})
+        found = drop_contested_pictures(
+            {name: find("images/a.jpg", "/".join(name)) for name in names}
+        )
         assert [item.place for item in found.values()] == ["images/a.jpg", None]

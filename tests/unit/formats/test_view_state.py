@@ -14,7 +14,7 @@ from app.formats.view_state import (
     GroupAssembler,
     GroupHead,
     PlacedView,
-    StateReader,
+    RecordFieldReader,
     extras_from_json,
     group_head_to_json,
     view_to_json,
@@ -30,8 +30,8 @@ Make = Callable[..., Group]
 COVARIANCE = tuple(np.outer(*2 * [np.arange(1, 9) / 7]).ravel().tolist())
 
 
-def read(value: Any) -> StateReader:
-    return StateReader(value, "file", "record")
+def read(value: Any) -> RecordFieldReader:
+    return RecordFieldReader(value, "file", "record")
 
 
 class TestStateReader:

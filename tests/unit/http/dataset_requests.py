@@ -8,7 +8,7 @@ from typing import Any
 
 from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
-from app.features.imports.upload_queries import upload_path
+from app.features.imports.upload_queries import find_complete_upload_path
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.paint.proposal_queries import Proposal, save_proposals
 from app.features.people.logins import Login
@@ -20,7 +20,7 @@ from app.features.predictions.service import add_predictions
 from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.service import get_recording
 from app.formats.frame_names import frame_path_in_split
-from app.http.team import get_team
+from app.http.team import get_team_login
 from app.json_text import json_text
 from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
@@ -289,7 +289,7 @@ def predictions(api: Any) -> Request:
 def predicted(api: Any) -> int:
     """Id of a set of predictions, read in this process."""
     store = store_of(api)
-    files = PredictionFiles(upload_path(store.settings, table(api)), format="csv")
+    files = PredictionFiles(find_complete_upload_path(store.settings, table(api)), format="csv")
     return add_predictions(store, "broadcast", "yolo", files, actor="local").id
 
 
@@ -435,5 +435,5 @@ def bell(api: Any) -> Request:
     person, _ = invite(store, "ann", Role.LEAD, actor="local")
     send(api, ("POST", "/groups/1/threads", {"text": "@ann look"}, {}))
     login = Login(1, person.id, "ann", DatasetRoles(Role.LEAD), datetime.now(UTC))
-    api.app.dependency_overrides |= {get_login: lambda: login, get_team: lambda: None}
+    api.app.dependency_overrides |= {get_login: lambda: login, get_team_login: lambda: None}
     return "POST", "/notifications/read", {"ids": None}, {}

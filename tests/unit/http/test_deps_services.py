@@ -99,7 +99,7 @@ class TestStart:
                 raise answer
             done.set()
 
-        monkeypatch.setattr(module, "solve_leftovers", leftovers)
+        monkeypatch.setattr(module, "request_solve_of_leftovers", leftovers)
         monkeypatch.setattr(module, "LEFTOVERS_AGAIN_S", 0.01)
         services = Services.open(Settings(home=tmp_path / "home"))
         services.start()

@@ -28,7 +28,7 @@ from app.errors import (
 )
 from app.features.batches.service import Presence
 from app.features.groups.schemas import LinesEdit
-from app.features.people.schemas import NewSession
+from app.features.people.schemas import LoginCredentials
 from app.http.errors import (
     PreconditionRequiredError,
     StaleStateError,
@@ -97,7 +97,7 @@ def client(plain_app: FastAPI, client_of):
     ) -> None: ...
 
     @plain_app.post("/session")
-    def log_in(said: NewSession) -> None: ...
+    def log_in(said: LoginCredentials) -> None: ...
 
     install_error_handlers(plain_app)
     return client_of(plain_app)

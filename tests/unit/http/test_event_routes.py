@@ -16,7 +16,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.db.store import Store
-from app.features.groups.edit import IncludeView
+from app.features.groups.edit import SetViewInclusion
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -148,7 +148,7 @@ class TestListen:
     ) -> None:
         store, (address, _) = app.state.services.store, served
         with opened(address) as stream:
-            edit = IncludeView("7.png", False)
+            edit = SetViewInclusion("7.png", False)
             edited = submit_edit(
                 store, 1, edit, if_match=load_group_state(store, 1).etag, actor="bob"
             )
@@ -268,7 +268,7 @@ class TestListen:
         monkeypatch.setattr(module, "MAX_FEEDS", 1)
         with opened(address):
             # Who is turned away costs the database nothing.
-            monkeypatch.setattr(module, "read_position", None)
+            monkeypatch.setattr(module, "read_newest_entry_id", None)
             refused = httpx.get(f"{address}{EVENTS}", timeout=SECONDS)
             assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
 

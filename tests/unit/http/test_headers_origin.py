@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fastapi import FastAPI
 
-from app.http.headers import KnownHosts, SameOrigin, is_same_origin, parse_host_name
+from app.http.headers import HostNameGuard, SameOriginGuard, is_same_origin, parse_host_name
 
 ALLOWED = ["127.0.0.1", "localhost", "[::1]"]
 
@@ -89,8 +89,8 @@ def guarded(plain_app: FastAPI, client_of):
     def answer() -> str:
         return "reached"
 
-    plain_app.add_middleware(SameOrigin)
-    plain_app.add_middleware(KnownHosts, allowed=ALLOWED)
+    plain_app.add_middleware(SameOriginGuard)
+    plain_app.add_middleware(HostNameGuard, allowed=ALLOWED)
     return client_of(plain_app)
 
 
@@ -103,7 +103,7 @@ class TestOwnAddress:
         def answer() -> str:
             return "reached"
 
-        plain_app.add_middleware(SameOrigin, url="https://touchline.example.org")
+        plain_app.add_middleware(SameOriginGuard, url="https://touchline.example.org")
         return client_of(plain_app)
 
     def test_its_default_port_may_be_written_out(self, plain_app: FastAPI, client_of) -> None:
@@ -111,7 +111,7 @@ class TestOwnAddress:
         def answer() -> str:
             return "reached"
 
-        plain_app.add_middleware(SameOrigin, url="https://touchline.example.org:443")
+        plain_app.add_middleware(SameOriginGuard, url="https://touchline.example.org:443")
         sent = {"Origin": "https://touchline.example.org", "Host": "touchline.example.org"}
         assert client_of(plain_app).post("/x", headers=sent).status_code == 200
 

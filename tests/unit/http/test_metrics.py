@@ -108,7 +108,9 @@ def test_counts_windows_that_listen(app: FastAPI, read, event_loop_of_all: Block
         return [number, *(read("touchline_event_stream_total", what=what) for what in told)]
 
     assert counted() == [0, 0, 0, 0]
-    feed = event_loop_of_all.call(lambda: events.subscribe(None, events.read_log_position, resumed=True))
+    feed = event_loop_of_all.call(
+        lambda: events.subscribe(None, events.read_log_position, resumed=True)
+    )
     assert counted() == [1, 1, 1, 0]
     feed.lost = True
     events.unsubscribe(feed)

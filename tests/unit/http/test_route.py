@@ -106,7 +106,9 @@ class Exchange:
 class KeyLess:
     """Repetitions, of requests that have no key."""
 
-    async def answer_once(self, request: Any, digest: Any, actor: str, hidden: Any, work: Any) -> Any:
+    async def answer_once(
+        self, request: Any, digest: Any, actor: str, hidden: Any, work: Any
+    ) -> Any:
         return await work()
 
 

@@ -20,8 +20,8 @@ from app.media.files import (
     describe_frame,
     guess_content_type,
     has_member,
-    read_frame,
-    read_media_facts,
+    read_encoded_frame,
+    read_media_size_and_crc,
 )
 from app.media.object_frames import ArchiveMembers
 from app.soccer.group import Media
@@ -81,9 +81,11 @@ class TestFrameOfAZipInsideAZip:
     ) -> None:
         upload = nested(tmp_path, archive, compression)
         media = Media(str(upload), "league/Frames-v3.zip/v3_frames/7.png")
-        assert read_frame(media, None, False, settings) == PNG
-        assert read_frame(media, 40, True, settings) == read_frame(media, 40, True, settings)
-        assert read_media_facts(media) == {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
+        assert read_encoded_frame(media, None, False, settings) == PNG
+        assert read_encoded_frame(media, 40, True, settings) == read_encoded_frame(
+            media, 40, True, settings
+        )
+        assert read_media_size_and_crc(media) == {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
 
     def test_real_bytes_are_counted(self, tmp_path, archive) -> None:
         upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
@@ -143,42 +145,46 @@ class TestFrameOfAZipInsideAZip:
 
 class TestReadFrame:
     def test_a_file_comes_as_it_is(self, file, settings) -> None:
-        data = read_frame(Media(str(file)), None, False, settings)
+        data = read_encoded_frame(Media(str(file)), None, False, settings)
         assert data == PNG
         assert guess_content_type(data) == "image/png"
 
     def test_a_member_of_an_archive_is_read_in_place(self, archive, settings) -> None:
         media = Media(str(archive), "v3_frames/7.png")
-        assert read_frame(media, None, False, settings) == PNG
+        assert read_encoded_frame(media, None, False, settings) == PNG
         assert not settings.cache.exists()
 
     def test_is_made_small_and_cached(self, archive, settings) -> None:
         media = Media(str(archive), "v3_frames/7.png")
-        data = read_frame(media, 40, False, settings)
+        data = read_encoded_frame(media, 40, False, settings)
         assert decoded(data).shape == (22, 40, 3)
         assert guess_content_type(data) == "image/jpeg"
         (cached,) = (path for path in settings.cache.rglob("*") if path.is_file())
         assert cached.read_bytes() == data
         cached.write_bytes(b"from the cache")
-        assert read_frame(media, 40, False, settings) == b"from the cache"
+        assert read_encoded_frame(media, 40, False, settings) == b"from the cache"
 
     def test_another_file_in_its_place_is_another_picture(self, file, settings) -> None:
-        first = read_frame(Media(str(file)), 40, False, settings)
+        first = read_encoded_frame(Media(str(file)), 40, False, settings)
         file.write_bytes(cv2.imencode(".png", 255 - PICTURE)[1].tobytes())
-        assert read_frame(Media(str(file)), 40, False, settings) != first
+        assert read_encoded_frame(Media(str(file)), 40, False, settings) != first
 
     def test_a_frame_is_never_enlarged(self, file, settings) -> None:
-        assert decoded(read_frame(Media(str(file)), 4000, False, settings)).shape == (90, 160, 3)
+        assert decoded(read_encoded_frame(Media(str(file)), 4000, False, settings)).shape == (
+            90,
+            160,
+            3,
+        )
 
     def test_a_mirrored_camera_is_turned_right(self, file, settings) -> None:
-        plain = decoded(read_frame(Media(str(file)), 40, False, settings))
-        turned = decoded(read_frame(Media(str(file)), 40, True, settings))
+        plain = decoded(read_encoded_frame(Media(str(file)), 40, False, settings))
+        turned = decoded(read_encoded_frame(Media(str(file)), 40, True, settings))
         assert plain[:, 5].mean() < 60 < 200 < turned[:, 5].mean()
 
     def test_a_full_disk_costs_the_cache_and_no_picture(self, file, settings) -> None:
         settings.home.mkdir()
         settings.cache.write_text("a file where the cache should be")
-        assert decoded(read_frame(Media(str(file)), 40, False, settings)).shape[1] == 40
+        assert decoded(read_encoded_frame(Media(str(file)), 40, False, settings)).shape[1] == 40
 
     def test_a_frame_of_a_video(self, tmp_path, settings) -> None:
         path = tmp_path / "cam1.avi"
@@ -186,10 +192,10 @@ class TestReadFrame:
         for level in (10, 90, 200):
             video.write(np.full((96, 160, 3), level, np.uint8))
         video.release()
-        data = read_frame(Media(str(path), frame=2), None, False, settings)
+        data = read_encoded_frame(Media(str(path), frame=2), None, False, settings)
         assert decoded(data).mean() == pytest.approx(200, abs=6)
         with pytest.raises(NotFoundError, match="no frame 7"):
-            read_frame(Media(str(path), frame=7), None, False, settings)
+            read_encoded_frame(Media(str(path), frame=7), None, False, settings)
 
     def test_a_video_of_too_many_pixels_is_refused(self, tmp_path, settings) -> None:
         path = tmp_path / "wide.mp4"
@@ -198,7 +204,7 @@ class TestReadFrame:
         writer.release()
         small = settings.model_copy(update={"max_pixels": 64 * 48 - 1})
         with pytest.raises(TooLargeError, match=r"wide\.mp4 declares 64 x 48 pixels"):
-            read_frame(Media(str(path), frame=0), None, False, small)
+            read_encoded_frame(Media(str(path), frame=0), None, False, small)
 
     def test_a_list_of_other_files_is_no_video(self, tmp_path, settings) -> None:
         hidden = tmp_path / "hidden.avi"
@@ -209,7 +215,7 @@ class TestReadFrame:
         path = tmp_path / "cam1.mp4"
         path.write_text(f"ffconcat version 1.0\nfile {hidden.name}\n")
         with pytest.raises(ImageError, match=r"cam1\.mp4 is not a video that can be read"):
-            read_frame(Media(str(path), frame=1), None, False, settings)
+            read_encoded_frame(Media(str(path), frame=1), None, False, settings)
 
     def test_a_video_that_grows_on_its_way_is_refused(self, tmp_path, settings) -> None:
         class Growing:
@@ -232,7 +238,7 @@ class TestReadFrame:
                 patch.setattr(module, "open_video", lambda _: nullcontext(Growing()))
             patch.setattr(media_module, "read_video_times", lambda *_: np.arange(2.0))
             with pytest.raises(TooLargeError, match="8000 x 8000"):
-                read_frame(Media(str(path), frame=1), None, False, settings)
+                read_encoded_frame(Media(str(path), frame=1), None, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_a_file_swapped_for_a_link_is_not_followed(self, tmp_path, settings, width) -> None:
@@ -240,7 +246,7 @@ class TestReadFrame:
         secret.write_bytes(PNG)
         path.symlink_to(secret)
         with pytest.raises(NotFoundError, match=r"7\.png is now a symbolic link"):
-            read_frame(Media(str(path)), width, False, settings)
+            read_encoded_frame(Media(str(path)), width, False, settings)
 
     def test_an_archive_swapped_for_a_link_is_not_followed(
         self, tmp_path, archive, settings
@@ -249,13 +255,13 @@ class TestReadFrame:
         path.symlink_to(archive)
         media = Media(str(path), "v3_frames/7.png")
         for asked in (
-            lambda: read_frame(media, None, False, settings),
-            lambda: read_frame(media, 40, False, settings),
+            lambda: read_encoded_frame(media, None, False, settings),
+            lambda: read_encoded_frame(media, 40, False, settings),
             lambda: has_member(media, "v3_frames/7.png"),
         ):
             with pytest.raises(NotFoundError, match=r"swapped\.zip is now a symbolic link"):
                 asked()
-        assert read_media_facts(media) == {}
+        assert read_media_size_and_crc(media) == {}
 
     def test_a_folder_swapped_for_a_link_does_not_lead_out(self, tmp_path, settings) -> None:
         outside, root = tmp_path / "outside", tmp_path / "root"
@@ -265,7 +271,7 @@ class TestReadFrame:
         (root / "match").symlink_to(outside)
         allowed = settings.model_copy(update={"import_folders": [root]})
         with pytest.raises(NotFoundError, match="leads out of its folder"):
-            read_frame(Media(str(root / "match" / "7.png")), None, False, allowed)
+            read_encoded_frame(Media(str(root / "match" / "7.png")), None, False, allowed)
 
     def test_a_root_that_is_a_link_itself_is_the_operators_own(self, tmp_path, settings) -> None:
         real, root = tmp_path / "real", tmp_path / "root"
@@ -273,7 +279,7 @@ class TestReadFrame:
         (real / "7.png").write_bytes(PNG)
         root.symlink_to(real)
         allowed = settings.model_copy(update={"import_folders": [root]})
-        assert read_frame(Media(str(root / "7.png")), None, False, allowed) == PNG
+        assert read_encoded_frame(Media(str(root / "7.png")), None, False, allowed) == PNG
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_a_bomb_is_refused_before_it_is_decoded(
@@ -283,7 +289,7 @@ class TestReadFrame:
         path.write_bytes(bomb(16_000, 16_000))
         monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
         with pytest.raises(TooLargeError, match="16000 x 16000"):
-            read_frame(Media(str(path)), width, False, settings)
+            read_encoded_frame(Media(str(path)), width, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_so_is_a_picture_that_is_drawn_over_and_over(
@@ -296,7 +302,7 @@ class TestReadFrame:
         with pytest.raises(
             TooLargeError, match=r"^frame slow\.jpg is drawn in more than 100 scans"
         ):
-            read_frame(Media(str(path)), width, False, settings)
+            read_encoded_frame(Media(str(path)), width, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
     @pytest.mark.parametrize("data", [b"", b"hello", b"<svg/>", PNG[:60], b"\xff\xd8\xff\xe0" * 9])
@@ -304,7 +310,7 @@ class TestReadFrame:
         path = tmp_path / "x.png"
         path.write_bytes(data)
         with pytest.raises(ImageError, match=r"^frame x\.png is "):
-            read_frame(Media(str(path)), width, False, settings)
+            read_encoded_frame(Media(str(path)), width, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_a_member_that_is_no_image_is_named_with_its_archive(
@@ -321,13 +327,13 @@ class TestReadFrame:
             ("9.png", ImageError, "is damaged"),
         ):
             with pytest.raises(error, match=f"^frame {member} of Frames-v3.zip {what}"):
-                read_frame(Media(str(path), member), width, False, settings)
+                read_encoded_frame(Media(str(path), member), width, False, settings)
 
     def test_a_file_beyond_the_limit_is_not_read(self, file, archive, settings) -> None:
         small = settings.model_copy(update={"max_file_bytes": 50})
         for media in (Media(str(file)), Media(str(archive), "v3_frames/7.png")):
             with pytest.raises(TooLargeError, match="larger than 50 bytes"):
-                read_frame(media, None, False, small)
+                read_encoded_frame(media, None, False, small)
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_a_missing_file_is_named_without_its_folder(
@@ -341,20 +347,20 @@ class TestReadFrame:
             Media(str(tmp_path)),
         ):
             with pytest.raises(NotFoundError) as caught:
-                read_frame(media, width, False, settings)
+                read_encoded_frame(media, width, False, settings)
             assert str(tmp_path) not in caught.value.message
 
     def test_a_truncated_archive_is_said(self, archive, settings) -> None:
         archive.write_bytes(archive.read_bytes()[:-30])
         with pytest.raises(ImageError, match="not a complete zip"):
-            read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
+            read_encoded_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
 
     def test_a_damaged_member_is_said(self, archive, settings) -> None:
         data = bytearray(archive.read_bytes())
         data[80] ^= 0xFF
         archive.write_bytes(data)
         with pytest.raises(ImageError, match="cannot be read"):
-            read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
+            read_encoded_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
 
 
 class TestFrameName:
@@ -369,15 +375,15 @@ class TestFrameName:
 
 class TestMediaFacts:
     def test_an_archive_knows_size_and_checksum(self, file, archive) -> None:
-        assert read_media_facts(Media(str(archive), "v3_frames/7.png")) == {
+        assert read_media_size_and_crc(Media(str(archive), "v3_frames/7.png")) == {
             "bytes": len(PNG),
             "crc32": zlib.crc32(PNG),
         }
-        assert read_media_facts(Media(str(file))) == {"bytes": len(PNG)}
+        assert read_media_size_and_crc(Media(str(file))) == {"bytes": len(PNG)}
 
     def test_a_missing_file_has_no_facts(self, tmp_path, archive) -> None:
-        assert read_media_facts(Media(str(tmp_path / "gone.png"))) == {}
-        assert read_media_facts(Media(str(archive), "gone.png")) == {}
+        assert read_media_size_and_crc(Media(str(tmp_path / "gone.png"))) == {}
+        assert read_media_size_and_crc(Media(str(archive), "gone.png")) == {}
 
 
 class TestArchives:

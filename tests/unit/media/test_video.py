@@ -12,7 +12,7 @@ from app.config import Settings
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.media import files as media_module
 from app.media import video as video_index
-from app.media.files import decode_frame, has_index, read_frame, read_video_times
+from app.media.files import decode_frame, has_video_index, read_encoded_frame, read_video_times
 from app.media.frames import FrameProvider, find_neighbouring_frames
 from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
@@ -114,10 +114,10 @@ class TestVideoTimes:
         self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
-        assert not has_index(media, settings)
+        assert not has_video_index(media, settings)
         times = read_video_times(media, settings)
         assert times.tolist() == pytest.approx([40.0 * number for number in range(20)])
-        assert has_index(media, settings)
+        assert has_video_index(media, settings)
         monkeypatch.setattr(media_module, "make_index", lambda *_: pytest.fail("decoded again"))
         assert (read_video_times(media, settings) == times).all()
 
@@ -143,7 +143,7 @@ class TestVideoTimes:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
         for number in (-1, 20):
             with pytest.raises(NotFoundError, match=f"no frame {number}; it has 20 frames"):
-                read_frame(Media(str(path), frame=number), None, False, settings)
+                read_encoded_frame(Media(str(path), frame=number), None, False, settings)
 
     def test_a_video_without_end_is_refused(
         self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
@@ -161,7 +161,7 @@ class TestVideoTimes:
 
 def is_indexed(media: Media, _flipped: bool, settings: Settings) -> bool:
     """What a reader is called with: whether it need not decode the whole video."""
-    return has_index(media, settings)
+    return has_video_index(media, settings)
 
 
 def decode_frame_of(media: Media, flipped: bool, settings: Settings) -> int:
@@ -169,7 +169,7 @@ def decode_frame_of(media: Media, flipped: bool, settings: Settings) -> int:
 
 
 def is_indexed_here(media: Media, settings: Settings) -> bool:
-    return has_index(media, settings)
+    return has_video_index(media, settings)
 
 
 class TestFramesOfTheServer:
@@ -196,7 +196,7 @@ class TestFramesOfTheServer:
             indexing = frames.request_fetch(media)
             assert indexing is None or indexing.future.result(60)
             assert asked.future.cancelled() and frames._readers.tasks == 0
-            assert has_index(media, settings)
+            assert has_video_index(media, settings)
         finally:
             frames.close()
 
@@ -255,7 +255,7 @@ class TestFramesOfTheServer:
             assert frames._videos.pool.tasks == 1
             first.abandon()
             assert second.future.result(60) and first.future.cancelled()
-            assert has_index(media, settings)
+            assert has_video_index(media, settings)
         finally:
             frames.close()
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.camera import Camera
-from app.paint.search import ScoredPicture
+from app.paint.search import PictureToScore
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings
@@ -46,7 +46,7 @@ def lawn(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
     return np.clip(noisy, 0, 255).astype(np.uint8)
 
 
-def picture_of(camera: Camera) -> ScoredPicture:
+def picture_of(camera: Camera) -> PictureToScore:
     """The drawn markings of a camera as scoring reads them."""
     mask = drawn(camera)
-    return ScoredPicture.of(mask, np.ones(mask.shape, np.bool_), camera.principal_point)
+    return PictureToScore.of(mask, np.ones(mask.shape, np.bool_), camera.principal_point)

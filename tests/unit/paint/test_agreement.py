@@ -9,8 +9,8 @@ import pytest
 
 from app.paint.agreement import (
     measure_agreement,
-    measure_clear_agreement,
-    measure_explained_strength,
+    measure_agreement_with_clear_paint,
+    measure_strength_near_markings,
 )
 from app.paint.ridges import find_line_like_pixels, measure_line_strength
 from app.soccer.pitch import Pitch
@@ -55,8 +55,10 @@ class TestClearPaint:
         return measure_line_strength(rendered.image, rendered.field)
 
     def explained(self, rendered, strength) -> tuple[float, float]:
-        paint = measure_explained_strength(rendered.truth, rendered.field, strength, Pitch())
-        clear = measure_clear_agreement(rendered.truth, rendered.field, strength, Pitch(), paint)
+        paint = measure_strength_near_markings(rendered.truth, rendered.field, strength, Pitch())
+        clear = measure_agreement_with_clear_paint(
+            rendered.truth, rendered.field, strength, Pitch(), paint
+        )
         known = measure_agreement(rendered.truth, rendered.field, strength > 0)
         assert (clear.supported, clear.points) == (known.supported, known.points)
         return known.explained, clear.explained
@@ -70,7 +72,7 @@ class TestClearPaint:
         return rows[kept], columns[kept]
 
     def test_faint_ridges_are_left_out_and_strong_ones_are_not(self, rendered, strength):
-        paint = measure_explained_strength(rendered.truth, rendered.field, strength, Pitch())
+        paint = measure_strength_near_markings(rendered.truth, rendered.field, strength, Pitch())
         rows, columns = (axis[::40] for axis in self.places(rendered, on_pitch=True))
         before = self.explained(rendered, strength)
         faint, strong = strength.copy(), strength.copy()
@@ -93,5 +95,5 @@ class TestClearPaint:
 
     def test_without_paint_nothing_is_explained(self, rendered, strength):
         nothing = np.zeros_like(strength)
-        assert measure_explained_strength(rendered.truth, rendered.field, nothing, Pitch()) == 0
+        assert measure_strength_near_markings(rendered.truth, rendered.field, nothing, Pitch()) == 0
         assert self.explained(rendered, nothing) == (0, 0)

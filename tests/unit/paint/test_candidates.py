@@ -9,15 +9,15 @@ from app.paint.candidates import (
     KNOWN,
     MAIN,
     WIDE,
-    CameraLibrary,
+    CameraSearchSpace,
     find_candidate_cameras,
-    make_library_of_known_cameras,
+    make_search_space_of_known_cameras,
 )
 from app.soccer.pitch import Segment
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE
 
 FOCAL = TRUE.focal_length[0]
-EXACT = CameraLibrary(
+EXACT = CameraSearchSpace(
     "exact",
     # A copy, as the product's: for an array that is only read all would be compiled once more.
     np.array([TRUE.position]),
@@ -70,7 +70,7 @@ class TestKnownLibrary:
         bent = parameters_from_camera(TRUE, half)
         bent[KAPPA] = 0.08
         near = camera_from_parameters(bent, TRUE.principal_point, half)
-        found = make_library_of_known_cameras([near, near.scaled(2.0, 2.0)])
+        found = make_search_space_of_known_cameras([near, near.scaled(2.0, 2.0)])
         assert found.name == KNOWN
         assert found.stands.tolist() == [pytest.approx(TRUE.position.tolist())]
         low, high = found.focal_range

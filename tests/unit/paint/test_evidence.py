@@ -8,12 +8,12 @@ import pytest
 from app.paint.evidence import (
     find_paint,
     has_grass_beside,
-    read_picture,
+    prepare_picture,
     to_paint_evidence,
     trace_visible_markings,
 )
 from app.paint.profile_kernels import find_stripes
-from app.paint.tracing import TracedPlaces, painted_marking_mask
+from app.paint.tracing import TracedPlaces, which_markings_are_painted
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.unit.paint.test_grass import GRASS, picture
@@ -35,7 +35,7 @@ def striped(middle: float, width: float, left: int = 60, right: int = 60) -> np.
 
 
 def offsets(image: np.ndarray, expected: float, width: float, window: float = 6.0) -> np.ndarray:
-    reading = read_picture(image, np.ones(image.shape[:2], np.bool_))
+    reading = prepare_picture(image, np.ones(image.shape[:2], np.bool_))
     pixels = np.column_stack([np.full(COUNT, expected), np.linspace(20, 80, COUNT)])
     normals = np.tile([1.0, 0.0], (COUNT, 1))
     found, sigmas, strengths = np.empty(COUNT), np.empty(COUNT), np.empty(COUNT)
@@ -70,10 +70,10 @@ class TestFindStripes:
 
 class TestTrace:
     def test_places_lie_on_the_markings_and_derivatives_match_differences(self, rendered):
-        reading = read_picture(rendered.image, rendered.field)
+        reading = prepare_picture(rendered.image, rendered.field)
         traced = trace_visible_markings(reading, rendered.truth, Pitch())
         assert len(traced.pixels) > 300
-        assert painted_marking_mask()[traced.marking].all()
+        assert which_markings_are_painted()[traced.marking].all()
         apart = np.hypot(*(rendered.truth.project(traced.places) - traced.pixels).T)
         # The lens of the truth has one term, that of the trace a second one tied to it.
         assert np.percentile(apart, 95) < 0.4
@@ -81,7 +81,7 @@ class TestTrace:
     def test_the_jacobian_meets_its_finite_difference(self, rendered):
         from app.geometry.resection import camera_from_parameters, parameters_from_camera
 
-        reading = read_picture(rendered.image, rendered.field)
+        reading = prepare_picture(rendered.image, rendered.field)
         truth, half = rendered.truth, reading.half_diagonal
         traced = trace_visible_markings(reading, truth, Pitch())
         base = parameters_from_camera(truth, half)
@@ -103,7 +103,7 @@ class TestShowsGrassBeside:
     def test_nothing_is_asked_beside_a_person_or_along_the_border(self):
         image = np.full((100, 200, 3), GRASS, np.uint8)
         image[:, 120:140] = (180, 30, 30)
-        reading = read_picture(image, np.ones(image.shape[:2], np.bool_))
+        reading = prepare_picture(image, np.ones(image.shape[:2], np.bool_))
         x = np.array([3.0, 60.0, 116.0, 130.0, 160.0, 195.0])
         none = np.zeros((len(x), 3))
         traced = TracedPlaces(
@@ -116,14 +116,14 @@ class TestShowsGrassBeside:
 
 class TestSeek:
     def test_paint_of_the_true_camera_lies_within_its_sigmas(self, rendered):
-        reading = read_picture(rendered.image, rendered.field)
+        reading = prepare_picture(rendered.image, rendered.field)
         found = find_paint(reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0)
         assert found.painted_fraction > 0.5
         assert 0.5 < np.median(np.abs(found.offsets / found.sigmas)) / 0.6745 < 1.6
 
     def test_nothing_is_believed_in_a_hidden_box(self, rendered):
         box = Box(400.0, 300.0, 500.0, 300.0)
-        reading = read_picture(rendered.image, rendered.field, [box])
+        reading = prepare_picture(rendered.image, rendered.field, [box])
         x, y = find_paint(
             reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0
         ).pixels.T
@@ -131,7 +131,7 @@ class TestSeek:
 
     def test_grass_alone_gives_no_evidence(self, rendered):
         image = picture(GRASS, 720, 1280)
-        reading = read_picture(image, np.ones((720, 1280), np.bool_))
+        reading = prepare_picture(image, np.ones((720, 1280), np.bool_))
         assert (
             len(
                 find_paint(
@@ -144,7 +144,7 @@ class TestSeek:
 
 class TestToPaintEvidence:
     def test_every_place_is_kept_under_its_marking(self, rendered):
-        reading = read_picture(rendered.image, rendered.field)
+        reading = prepare_picture(rendered.image, rendered.field)
         found = find_paint(reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0)
         kept = to_paint_evidence(found)
         assert kept.count == len(found.offsets)

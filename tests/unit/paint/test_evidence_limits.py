@@ -17,7 +17,7 @@ from app.paint.evidence import (
     exclude_hidden_boxes,
     find_paint,
     has_grass_beside,
-    read_picture,
+    prepare_picture,
     to_paint_evidence,
     trace_visible_markings,
 )
@@ -35,7 +35,7 @@ HEIGHT, WIDTH = 100, 200
 
 
 def read(image: np.ndarray) -> PreparedPicture:
-    return read_picture(image, np.ones(image.shape[:2], np.bool_))
+    return prepare_picture(image, np.ones(image.shape[:2], np.bool_))
 
 
 def upright(x: object, width: float = 5.0, marking: object = 0) -> TracedPlaces:
@@ -72,7 +72,7 @@ class TestReadPicture:
         field = np.zeros((HEIGHT, WIDTH), np.bool_)
         field[:, 80:] = True
         image[:, :80] = noisy(picture(CROWD, HEIGHT, 80), 60.0)
-        reading = read_picture(image, field)
+        reading = prepare_picture(image, field)
         assert reading.noise == pytest.approx(float(reading.level[:, 84:].std()), rel=0.15)
 
     def test_a_drawn_picture_has_half_a_grey_level_of_noise(self) -> None:
@@ -130,7 +130,7 @@ class TestTrace:
         camera = looking((0.0, 62.0, -9.0), (0.0, -10.0, 0.0), 700.0)
         # Every second pixel is field, so that it matters which is meant.
         field = np.indices((size.height, size.width)).sum(axis=0) % 2 == 0
-        reading = read_picture(picture(GRASS, size.height, size.width), field)
+        reading = prepare_picture(picture(GRASS, size.height, size.width), field)
         every = trace_places(camera, Pitch(), size.width, size.height, SPACING_PX, MOST_PLACES)
         columns, rows = np.rint(every.pixels).astype(int).T
         on_field = field[rows, columns]
@@ -283,7 +283,7 @@ class TestShowsGrassBeside:
     ) -> None:
         image = picture(GRASS, HEIGHT, WIDTH)
         hidden = [Box(column, 0.0, 1.0, HEIGHT)]
-        reading = read_picture(image, np.ones((HEIGHT, WIDTH), np.bool_), hidden)
+        reading = prepare_picture(image, np.ones((HEIGHT, WIDTH), np.bool_), hidden)
         assert has_grass_beside(reading, upright([x] * 4, width), 3.0).all() == shown
 
 
@@ -349,7 +349,7 @@ class TestEvidence:
 
 
 def found_with(rendered, camera: Camera) -> DetectedPaint:
-    reading = read_picture(rendered.image, rendered.field)
+    reading = prepare_picture(rendered.image, rendered.field)
     return find_paint(reading, trace_visible_markings(reading, camera, Pitch()), 6.0)
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.frame_pitch import find_agreed_pitch, group_by_position, make_pitch_frame
+from app.paint.frame_pitch import collect_pitch_size_evidence, find_agreed_pitch, group_by_position
 from app.paint.propose import propose_camera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
-from app.solving.pitch_size import PitchFrame
+from app.solving.pitch_size import PitchSizeFrameLines
 from tests.cameras import looking
 from tests.unit.paint.lawns import PITCH, SMALL, drawn, lawn
 
@@ -24,11 +24,15 @@ def camera(x: float, y: float) -> Camera:
     return looking((1.0, 62.0, -16.0), (x, y, 0.0), 1150.0, size=SMALL)
 
 
-def frames(pitch: Pitch) -> list[PitchFrame]:
+def frames(pitch: Pitch) -> list[PitchSizeFrameLines]:
     """Frames of one camera, with the places of paint beside those that are found on 105 x 68 m."""
     pictures = [lawn(drawn(camera(*target), 2, pitch)) for target in TARGETS]
     found = [(picture, propose_camera(picture).camera) for picture in pictures]
-    return [make_pitch_frame(picture, one, PITCH) for picture, one in found if one is not None]
+    return [
+        collect_pitch_size_evidence(picture, one, PITCH)
+        for picture, one in found
+        if one is not None
+    ]
 
 
 class TestPitchOf:

@@ -9,8 +9,13 @@ import pytest
 
 from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.paint.agreement import PaintAgreement
-from app.paint.candidates import CameraLibrary
-from app.paint.evidence import find_paint, read_picture, to_paint_evidence, trace_visible_markings
+from app.paint.candidates import CameraSearchSpace
+from app.paint.evidence import (
+    find_paint,
+    prepare_picture,
+    to_paint_evidence,
+    trace_visible_markings,
+)
 from app.paint.propose import (
     RankedCamera,
     SearchedFrame,
@@ -24,7 +29,7 @@ from app.paint.propose import (
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.sample.render import render_view
 from app.sample.scene import Scene
-from app.sample.scenes import make_match
+from app.sample.scenes import make_match_scenes
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT
@@ -38,7 +43,7 @@ Image = npt.NDArray[np.uint8]
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return make_match(0, 2, 20_260_101, faults=False, numbers=[0])[0]
+    return make_match_scenes(0, 2, 20_260_101, faults=False, numbers=[0])[0]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +66,9 @@ class TestPropose:
     def test_what_the_match_knows_is_enough(
         self, scene: Scene, frame: Image, monkeypatch: pytest.MonkeyPatch
     ):
-        nowhere = CameraLibrary("nowhere", np.array([[0.0, 500.0, -5.0]]), (1.0, 1.0), np.ones(3))
+        nowhere = CameraSearchSpace(
+            "nowhere", np.array([[0.0, 500.0, -5.0]]), (1.0, 1.0), np.ones(3)
+        )
         monkeypatch.setattr("app.paint.propose.MAIN", nowhere)
         monkeypatch.setattr("app.paint.propose.WIDE", nowhere)
         true = scene.truth.views[0].camera
@@ -120,7 +127,7 @@ class TestPropose:
     def test_the_centre_circle_tells_as_much_as_two_lines(self):
         true = looking((0.5, 66.0, -17.0), (3.0, -2.0, 0.0), 1750.0, size=SMALL)
         picture = lawn(marked(true, "Circle central", "Middle line"))
-        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        reading = prepare_picture(picture, np.ones(picture.shape[:2], np.bool_))
         asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
         assert snap_to_prepared_picture(*asked).reason == NO_PAINT
         assert snap_to_prepared_picture(*asked, circles_count_twice=True).reason is None
@@ -143,7 +150,7 @@ class TestPropose:
         assert last[2] == {"circles_count_twice": True, "position_is_known": False}
 
     def test_what_was_found_in_the_small_picture_is_told_in_pixels_of_the_large_one(self):
-        reading = read_picture(lawn(drawn(TRUE, 3)), np.ones((540, 960), np.bool_))
+        reading = prepare_picture(lawn(drawn(TRUE, 3)), np.ones((540, 960), np.bool_))
         pan, tilt, roll = np.radians(TRUE.pan_tilt_roll_degrees)
         aside = replace(TRUE, rotation=rotation_from_pan_tilt_roll(pan + 0.004, tilt, roll))
         seen = find_paint(reading, trace_visible_markings(reading, aside, PITCH), 12.0)
@@ -180,7 +187,7 @@ class TestPropose:
     def test_a_known_position_counts_for_a_marking(self):
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
         picture = lawn(marked(true, "Side line right", "Small rect. right top"))
-        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        reading = prepare_picture(picture, np.ones(picture.shape[:2], np.bool_))
         spread = np.diag(np.array([0.05, 0.05, 0.01, 0.5, 0.5, 0.5, 0.2, 0.01]) ** 2)
         asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy(), spread)
         assert snap_to_prepared_picture(*asked).reason == NO_PAINT
@@ -238,7 +245,7 @@ class TestPropose:
             30,
             30,
         )
-        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        reading = prepare_picture(picture, np.ones(picture.shape[:2], np.bool_))
         snapped = snap_to_prepared_picture(
             reading, TRUE, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy()
         )

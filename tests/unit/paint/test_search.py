@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from app.geometry.resection import PAN, TILT, camera_from_parameters, parameters_from_camera
-from app.paint.search import refine_cameras, score_coarsely, score_fully
+from app.paint.search import compute_coarse_costs, compute_cost_terms, refine_cameras
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE, picture_of
 
 HALF = SMALL.diagonal / 2
@@ -22,7 +22,9 @@ def _turned(degrees: float) -> np.ndarray:
 
 class TestLooks:
     def test_the_true_camera_leaves_no_paint_unexplained_and_no_marking_unsupported(self):
-        unexplained, unsupported, on, off = score_fully(ROW[None], PICTURE, PITCH, 8.0, EXECUTOR)[0]
+        unexplained, unsupported, on, off = compute_cost_terms(
+            ROW[None], PICTURE, PITCH, 8.0, EXECUTOR
+        )[0]
         assert unexplained < 0.15
         assert unsupported < 0.15
         assert on > 1000
@@ -31,15 +33,15 @@ class TestLooks:
     def test_the_farther_a_camera_is_turned_away_the_worse_it_looks(self):
         rows = np.array([ROW, _turned(0.3), _turned(1.0)])
         for cost in (
-            score_coarsely(rows, PICTURE, PITCH, 20.0, EXECUTOR),
-            *score_fully(rows, PICTURE, PITCH, 20.0, EXECUTOR)[:, :2].T,
+            compute_coarse_costs(rows, PICTURE, PITCH, 20.0, EXECUTOR),
+            *compute_cost_terms(rows, PICTURE, PITCH, 20.0, EXECUTOR)[:, :2].T,
         ):
             assert cost[0] < cost[1] < cost[2]
 
     def test_a_camera_that_looks_at_the_sky_explains_nothing(self):
         row = ROW.copy()
         row[TILT] = np.radians(130)
-        assert score_coarsely(row[None], PICTURE, PITCH, 20.0, EXECUTOR)[0] == 1.0
+        assert compute_coarse_costs(row[None], PICTURE, PITCH, 20.0, EXECUTOR)[0] == 1.0
 
 
 class TestRefine:

@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
-from app.paint.evidence import DetectedPaint, PreparedPicture, read_picture, trace_visible_markings
+from app.paint.evidence import (
+    DetectedPaint,
+    PreparedPicture,
+    prepare_picture,
+    trace_visible_markings,
+)
 from app.paint.snap import SnappedCamera, _has_enough_paint, snap_camera
 from app.paint.tracing import PAINTED, TracedPlaces
 from app.soccer.frames import ImageSize
@@ -78,7 +83,7 @@ def photographed(image: np.ndarray) -> np.ndarray:
 
 
 def read(image: np.ndarray) -> PreparedPicture:
-    return read_picture(image, np.ones(image.shape[:2], np.bool_))
+    return prepare_picture(image, np.ones(image.shape[:2], np.bool_))
 
 
 def known(camera: Camera, *, pan_px: float = 1e-5, tilt_px: float = 1e-5) -> np.ndarray:

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from app.geometry.camera import Camera
 from app.sample import cameras as observability
-from app.sample.cameras import COARSE, estimate_certainty, is_inside_image
+from app.sample.cameras import COARSE, estimate_ball_certainty, is_inside_image
 from app.sample.scene import Scene
 
 
@@ -48,20 +48,20 @@ class TestCertainty:
         fewer = seen & (COARSE.marking != COARSE.marking[np.flatnonzero(seen)[0]])
         ball = np.array(view.ball)
         assert (
-            estimate_certainty(view.camera, ball, seen).ball_sigma_m
-            < estimate_certainty(view.camera, ball, fewer).ball_sigma_m
+            estimate_ball_certainty(view.camera, ball, seen).ball_sigma_m
+            < estimate_ball_certainty(view.camera, ball, fewer).ball_sigma_m
         )
 
     def test_parallel_lines_alone_leave_the_camera_open(self, clean_scenes: list[Scene]):
         view = clean_scenes[0].truth.views[0]
         seen = is_inside_image(view.camera.project(COARSE.points))
         only = seen & COARSE.runs_along_x[COARSE.marking]
-        assert estimate_certainty(view.camera, np.array(view.ball), only).ball_sigma_m > 1.0
+        assert estimate_ball_certainty(view.camera, np.array(view.ball), only).ball_sigma_m > 1.0
 
     def test_every_view_of_a_clean_scene_is_determined(self, clean_scenes: list[Scene]):
         for scene in clean_scenes:
             for view in scene.truth.views:
                 seen = is_inside_image(view.camera.project(COARSE.points), 4.0)
-                known = estimate_certainty(view.camera, np.array(view.ball), seen)
+                known = estimate_ball_certainty(view.camera, np.array(view.ball), seen)
                 assert known.ball_sigma_m < 0.06
                 assert known.size_sigma == pytest.approx(0, abs=0.04)

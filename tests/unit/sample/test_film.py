@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.evidence import find_paint, read_picture, trace_visible_markings
+from app.paint.evidence import find_paint, prepare_picture, trace_visible_markings
 from app.paint.grass import find_field_of_play
 from app.sample.cameras import CENTER, CORNER_RADIUS
 from app.sample.film import (
@@ -62,7 +62,7 @@ class TestBackdrop:
     ) -> None:
         for camera in cameras:
             image = np.ascontiguousarray(backdrop.render_from(camera)[..., ::-1])
-            reading = read_picture(image, find_field_of_play(image))
+            reading = prepare_picture(image, find_field_of_play(image))
             evidence = find_paint(reading, trace_visible_markings(reading, camera, Pitch()), 4.0)
             assert len(evidence.offsets) > 60
             assert np.median(np.abs(evidence.offsets)) < 0.12

@@ -10,7 +10,7 @@ from app.sample.scenes import (
     BOX_EXCESS,
     compute_true_ball_box,
     find_visible_paths,
-    make_match,
+    make_match_scenes,
     simulate_loose_box,
 )
 from app.soccer.frames import Box
@@ -73,14 +73,14 @@ class TestMakeScenes:
 
 class TestMakeMatch:
     def test_some_groups_alone_are_the_same_as_among_all(self):
-        whole = make_match(1, 6, 11)
-        some = make_match(1, 6, 11, numbers=[4])
+        whole = make_match_scenes(1, 6, 11)
+        some = make_match_scenes(1, 6, 11, numbers=[4])
         assert some[0].group == whole[4].group
         assert some[0].truth == whole[4].truth
 
     def test_of_the_sample_a_group_that_lacks_two_stubs_passes_without_a_click(self):
         """Half a pixel of either cost its main camera a quarter of JaC."""
-        [scene] = make_match(1, 15, SEED, numbers=[2])
+        [scene] = make_match_scenes(1, 15, SEED, numbers=[2])
         paper, curated = (solve_group(scene.group, policy) for policy in (PAPER, TOUCHLINE))
         missing = {fit.marking: fit.length_px for fit in paper.views[0].calibration.markings}
         for fit in curated.views[0].calibration.markings:

@@ -14,8 +14,8 @@ from app.soccer.paint_evidence import (
     PaintReading,
     evidence_from_json,
     evidence_to_json,
+    reading_from_canonical_json,
     reading_from_json,
-    reading_from_text,
     reading_to_json,
 )
 
@@ -52,7 +52,7 @@ class TestReading:
     def test_every_digit_comes_back_and_so_does_the_digest(self):
         again = reading_from_json(reading_to_json(READING))
         assert (again, again.digest) == (READING, READING.digest)
-        again = reading_from_text(READING.text)
+        again = reading_from_canonical_json(READING.text)
         assert (again, again.digest) == (READING, READING.digest)
 
     @pytest.mark.parametrize(
@@ -77,4 +77,4 @@ class TestReading:
         with pytest.raises(InputError):
             reading_from_json(value)
         with pytest.raises(InputError):
-            reading_from_text("{")
+            reading_from_canonical_json("{")

@@ -15,7 +15,7 @@ from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import Ball3D, Calibration
-from app.solving.ball_box import fit_ball, predict_ball_in_view
+from app.solving.ball_box import measure_ball_fit, predict_ball_in_view
 
 SIZE = ImageSize(600, 800)  # a diagonal of 1000 px
 BALL_M = 0.2
@@ -35,7 +35,7 @@ def boxed(x: float, y: float, width: float, height: float) -> BallAnnotation:
 
 
 def fit(ball: BallAnnotation, point=ORIGIN, camera: Camera = CAMERA):
-    return fit_ball(camera, SIZE, ball, np.array(point), BALL_M)
+    return measure_ball_fit(camera, SIZE, ball, np.array(point), BALL_M)
 
 
 def ball3d(*point: float, variance: float = 0.0) -> Ball3D:

@@ -14,11 +14,11 @@ from app.solving.ball_noise import RayResidual
 from app.solving.dataset_noise import (
     BallSource,
     DatasetNoise,
-    NoiseGroup,
-    SourceFactors,
+    GroupNoiseInputs,
     SourceNoise,
+    SourceNoiseFactors,
     estimate_noise,
-    estimate_sources,
+    estimate_source_noise,
 )
 from app.solving.solve import solve_group
 from tests.bench.cases import Case, Made, make_case
@@ -35,7 +35,7 @@ def fine() -> list[Made]:
 
 
 def told(made: list[Made], policy: Policy) -> DatasetNoise:
-    seen = [NoiseGroup.of(one.group, solve_group(one.group, policy), policy) for one in made]
+    seen = [GroupNoiseInputs.of(one.group, solve_group(one.group, policy), policy) for one in made]
     return estimate_noise(seen, policy)
 
 
@@ -52,7 +52,7 @@ def test_what_is_estimated_once_it_is_used_is_the_same(fine: list[Made]) -> None
 
 def test_balls_are_asked_with_the_cameras_that_the_lines_make(fine: list[Made]) -> None:
     """Believed to be worse than they are, cameras would explain what the clicks are off."""
-    seen = [NoiseGroup.of(one.group, solve_group(one.group, PAPER), PAPER) for one in fine]
+    seen = [GroupNoiseInputs.of(one.group, solve_group(one.group, PAPER), PAPER) for one in fine]
     found = estimate_noise(seen, PAPER)
     alone = [miss for group in seen for miss in group.ray_residuals(PAPER)]
     asked = [miss for some in found.misses for miss in some]
@@ -64,8 +64,8 @@ def test_the_covariances_are_those_that_solving_makes(fine: list[Made]) -> None:
     calibration = replace(PAPER.calibration, line_sigma_px=0.3, line_share=0.2)
     policy = replace(PAPER, calibration=calibration)
     group = fine[0].group
-    quick = NoiseGroup.of(group, solve_group(group, PAPER), PAPER).ray_residuals(policy)
-    whole = NoiseGroup.of(group, solve_group(group, policy), policy).ray_residuals(policy)
+    quick = GroupNoiseInputs.of(group, solve_group(group, PAPER), PAPER).ray_residuals(policy)
+    whole = GroupNoiseInputs.of(group, solve_group(group, policy), policy).ray_residuals(policy)
     for one, other in zip(quick, whole, strict=True):
         assert one.known == pytest.approx(other.known, rel=1e-6)
         assert abs(one.miss) == pytest.approx(abs(other.miss), rel=1e-6)
@@ -128,8 +128,8 @@ def filmed(seed: int, placed: Mapping[str, Sequence[str]], true: Mapping[str, fl
     return found
 
 
-def factors(seen: Sequence[Seen], click: float = 1.2) -> SourceFactors:
-    return estimate_sources(seen, click, 0.0, 0.0)
+def factors(seen: Sequence[Seen], click: float = 1.2) -> SourceNoiseFactors:
+    return estimate_source_noise(seen, click, 0.0, 0.0)
 
 
 def estimated(*seen: Seen) -> dict[str, SourceNoise]:
@@ -221,7 +221,7 @@ class TestEstimateSources:
             by_view = (("left", 0.0, 0.0, 0.5), ("right", 0.0, 0.0, 0.5))
             of = {"left": [camera(str(a))], "right": [camera(str(b))]}
             seen.append((RayResidual(miss, 0.0, 0.0, 1.0, 0.0, by_view), of))
-        worst, *_ = estimate_sources(seen, 0.0, 0.0, 2.6).of("camera")
+        worst, *_ = estimate_source_noise(seen, 0.0, 0.0, 2.6).of("camera")
         assert worst.source == "3" and worst.low < 4.0 < worst.high
 
     def test_balls_that_nobody_placed_add_their_own(self) -> None:

@@ -20,7 +20,7 @@ from app.solving.judgement import (
     compute_view_jac,
     find_first_failed_gates,
     judge_groups,
-    judge_known_failures,
+    judge_with_known_view_failures,
     recompare_thresholds,
 )
 from tests.unit.solving.random_groups import random_policy, random_views
@@ -124,7 +124,9 @@ class TestJudge:
         found = join_facts([collect_facts_of_views(*random_views(seed)) for seed in seeds])
         jac = compute_view_jac(found, policy.jac_gamma_percent)
         standing, uncertainty = find_first_failed_gates(found, jac, policy), MeanCovariance(found)
-        told = judge_known_failures(found, policy, uncertainty, jac, standing, first_alone=True)
+        told = judge_with_known_view_failures(
+            found, policy, uncertainty, jac, standing, first_alone=True
+        )
         assert told.first_failed_gate.tolist() == judged(found, policy).first_failed_gate.tolist()
 
     def test_a_view_that_does_not_count_has_no_part_in_sigma_and_residuals(self):

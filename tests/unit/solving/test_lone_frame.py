@@ -20,10 +20,10 @@ from app.solving.calibrate import (
     analyse_lone_frame,
     calibrate,
     calibrate_view,
-    compute_view_keys,
+    compute_view_calibration_keys,
 )
 from app.solving.calibration_findings import find_pitch_findings_of_lone_frame
-from app.solving.lone_frame import PRIORS, LoneFrame
+from app.solving.lone_frame import PRIORS, LoneFrameUncertainty
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, PITCH, click
 
@@ -35,7 +35,9 @@ END = looking((3.0, 62.0, -16.0), (44.0, 0.0, 0.0), 3400.0, bend=0.02)
 INSIDE = float(chi2.ppf(0.95, 3))
 
 
-def alone(lines: Lines, policy: CalibrationPolicy = ANY) -> tuple[Camera, FloatArray, LoneFrame]:
+def alone(
+    lines: Lines, policy: CalibrationPolicy = ANY
+) -> tuple[Camera, FloatArray, LoneFrameUncertainty]:
     """The camera, its covariance by the clicks, and what nobody says of the frame."""
     found = calibrate(lines, PITCH, SIZE, policy)
     lone = analyse_lone_frame(found, lines, PITCH, SIZE, policy)
@@ -134,9 +136,9 @@ class TestOfDataset:
     def test_a_single_view_without_a_match_is_alone(self) -> None:
         group = self.group(self.view("a"))
         assert self.sigma(group, TOUCHLINE.calibration) > 2 * self.sigma(group, PAPER.calibration)
-        key, clicks = compute_view_keys(group, group.views[0], TOUCHLINE.calibration)
+        key, clicks = compute_view_calibration_keys(group, group.views[0], TOUCHLINE.calibration)
         exact = replace(TOUCHLINE.calibration, lone_frames="exact")
-        assert compute_view_keys(group, group.views[0], exact) == (clicks,) != (key,)
+        assert compute_view_calibration_keys(group, group.views[0], exact) == (clicks,) != (key,)
 
     @pytest.mark.parametrize("kind", ["of a match", "two views", "said picture", "other pitch"])
     def test_others_are_as_they_were(self, kind: str) -> None:
@@ -150,5 +152,5 @@ class TestOfDataset:
             group = replace(group, pitch=Pitch(104.0, 68.0))
         policies = (TOUCHLINE.calibration, replace(TOUCHLINE.calibration, lone_frames="exact"))
         assert self.sigma(group, policies[0]) == self.sigma(group, policies[1])
-        keys = [compute_view_keys(group, group.views[0], policy) for policy in policies]
+        keys = [compute_view_calibration_keys(group, group.views[0], policy) for policy in policies]
         assert keys[0] == keys[1]

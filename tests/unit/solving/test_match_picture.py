@@ -9,7 +9,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import (
     PictureEstimate,
-    PictureFrame,
+    PictureFrameLines,
     estimate_match_picture,
     select_informative_frames,
 )
@@ -27,7 +27,9 @@ def frames(picture, count=6, noise_px=0.8):
         for index in range(count)
     ]
     return [
-        PictureFrame(click(picture.camera_of_annotated_picture(camera, SIZE), noise_px, seed), SIZE)
+        PictureFrameLines(
+            click(picture.camera_of_annotated_picture(camera, SIZE), noise_px, seed), SIZE
+        )
         for seed, camera in enumerate(cameras)
     ]
 
@@ -80,7 +82,7 @@ class TestChooseFrames:
     def test_frames_with_the_most_markings_are_taken(self, monkeypatch):
         monkeypatch.setattr("app.solving.match_picture.MAX_FRAMES", 3)
         many = frames(WIDE, 4)
-        poor = PictureFrame(make_lines(dict(list(many[0].lines.items())[:3])), SIZE)
+        poor = PictureFrameLines(make_lines(dict(list(many[0].lines.items())[:3])), SIZE)
         chosen = select_informative_frames([poor, *many])
         assert len(chosen) == 3 and chosen == sorted(chosen)
         assert 0 not in chosen

@@ -9,8 +9,8 @@ from app.solving.calibrate import calibrate, calibrate_near_position
 from app.solving.camera_positions import PositionPrior, make_match_position_prior
 from app.solving.match_position import (
     NO_PLACES,
-    FramePlace,
-    FramePlaces,
+    FrameCameraPlace,
+    FrameCameraPlaces,
     calibrate_with_match_position,
     find_camera_place,
     guess_matches,
@@ -23,7 +23,7 @@ STAND = np.array([1.0, 60.0, -14.0])
 
 
 def place(position, sigma=0.4, pan=0.5):
-    return FramePlace(np.array(position, dtype=float), sigma**2 * np.eye(3), pan)
+    return FrameCameraPlace(np.array(position, dtype=float), sigma**2 * np.eye(3), pan)
 
 
 def off(x, y, z):
@@ -52,7 +52,7 @@ def few(seed, stand=STAND):
 def others(stand=STAND):
     frames = [frame(x, seed=seed, stand=stand) for seed, x in enumerate((-38, -30, 28, 34, 38, 40))]
     places = [find_camera_place(calibrate(lines, PITCH, SIZE, POLICY), SIZE) for lines in frames]
-    return FramePlaces([found for found in places if found is not None])
+    return FrameCameraPlaces([found for found in places if found is not None])
 
 
 @pytest.fixture(scope="module")
@@ -72,43 +72,47 @@ class TestPlaceOf:
 
 class TestPrior:
     def test_many_frames_say_together_where_the_camera_stands(self):
-        prior = FramePlaces(around(STAND, 20)).position_prior(0.5)
+        prior = FrameCameraPlaces(around(STAND, 20)).position_prior(0.5)
         assert prior.mean == pytest.approx(STAND, abs=0.3)
         assert (prior.sigma < 0.3).all()
 
     def test_a_bad_frame_carries_nothing_away(self):
-        clean = FramePlaces(around(STAND, 10)).position_prior(0.5)
-        spoilt = FramePlaces([*around(STAND, 10), place(off(0.0, 9.0, -3.0))]).position_prior(0.5)
+        clean = FrameCameraPlaces(around(STAND, 10)).position_prior(0.5)
+        spoilt = FrameCameraPlaces([*around(STAND, 10), place(off(0.0, 9.0, -3.0))]).position_prior(
+            0.5
+        )
         assert spoilt.mean == pytest.approx(clean.mean, abs=0.1)
 
     def test_the_place_moves_with_the_direction_of_view(self):
         turned = [
-            FramePlace(it.position + np.array([2.0 * pan, 0.0, 0.0]), it.covariance, pan)
+            FrameCameraPlace(it.position + np.array([2.0 * pan, 0.0, 0.0]), it.covariance, pan)
             for pan in (-0.6, -0.3, 0.3, 0.6)
             for it in around(STAND, 5, seed=int(10 * pan) + 9)
         ]
-        left, right = (FramePlaces(turned).position_prior(pan).mean for pan in (-0.5, 0.5))
+        left, right = (FrameCameraPlaces(turned).position_prior(pan).mean for pan in (-0.5, 0.5))
         assert right - left == pytest.approx([2.0, 0.0, 0.0], abs=0.4)
 
     def test_frames_that_look_elsewhere_say_less(self):
-        turned = [FramePlace(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
-        there, elsewhere = (FramePlaces(turned).position_prior(pan).sigma for pan in (-0.6, 0.5))
+        turned = [FrameCameraPlace(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
+        there, elsewhere = (
+            FrameCameraPlaces(turned).position_prior(pan).sigma for pan in (-0.6, 0.5)
+        )
         assert (there < 0.2).all()
         assert elsewhere[0] > 1.0
         assert (elsewhere > there).all()
 
     def test_one_is_left_out_without_a_copy_of_the_others(self):
         odd = place(off(0.0, 9.0, -3.0))
-        every = FramePlaces([*around(STAND, 3), odd])
+        every = FrameCameraPlaces([*around(STAND, 3), odd])
         rest = every.without_frame(3)
         assert rest.position_prior(0.5).mean == pytest.approx(
-            FramePlaces(around(STAND, 3)).position_prior(0.5).mean
+            FrameCameraPlaces(around(STAND, 3)).position_prior(0.5).mean
         )
-        assert FramePlaces(around(STAND, 3)).without_frame(0).position_prior(0.5) is None
+        assert FrameCameraPlaces(around(STAND, 3)).without_frame(0).position_prior(0.5) is None
         assert rest._equations is every._equations
 
     def test_what_is_known_with_a_frame_is_not_known_without_it(self):
-        every = FramePlaces(around(STAND, 3))
+        every = FrameCameraPlaces(around(STAND, 3))
         assert every.position_prior(0.5) is not None
         assert every.without_frame(0).position_prior(0.5) is None
 
@@ -118,10 +122,10 @@ class TestPrior:
             for seed, y in enumerate((45.0, 55.0, 65.0, 75.0, 85.0))
             for item in around(np.array([0.0, y, -y / 4]), 3, seed)
         ]
-        assert FramePlaces(mixed).position_prior(0.5) is None
+        assert FrameCameraPlaces(mixed).position_prior(0.5) is None
 
     def test_two_frames_are_too_few(self):
-        assert FramePlaces(around(STAND, 2)).position_prior(0.5) is None
+        assert FrameCameraPlaces(around(STAND, 2)).position_prior(0.5) is None
 
 
 class TestSharePosition:
@@ -181,7 +185,7 @@ def turning(stand, count, seed=0, slope=2.0, sigma=0.4):
     pans = np.where(np.arange(count) % 2, 0.6, -0.6) + generator.normal(0, 0.1, count)
     moved = stand + np.outer(pans, [slope, 0.0, 0.0]) + generator.normal(0, sigma, (count, 3))
     return [
-        FramePlace(at, sigma**2 * np.eye(3), float(pan))
+        FrameCameraPlace(at, sigma**2 * np.eye(3), float(pan))
         for at, pan in zip(moved, pans, strict=True)
     ]
 
@@ -205,7 +209,9 @@ class TestGuessMatches:
 
     def test_one_odd_frame_does_not_end_a_match(self):
         frames = turning(NEAR_STAND, 8)
-        frames[3] = FramePlace(NEAR_STAND + np.array([0.0, 15.0, -10.0]), frames[3].covariance, 0.5)
+        frames[3] = FrameCameraPlace(
+            NEAR_STAND + np.array([0.0, 15.0, -10.0]), frames[3].covariance, 0.5
+        )
         assert guess_matches(frames) == [0] * 8
 
     def test_frames_that_say_nothing_are_each_their_own(self):

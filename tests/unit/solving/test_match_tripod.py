@@ -15,13 +15,17 @@ from app.soccer.paint_evidence import (
     PaintEvidence,
     PaintPoint,
     PaintReading,
+    reading_from_canonical_json,
     reading_from_json,
-    reading_from_text,
     reading_to_json,
 )
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import TOUCHLINE
-from app.solving.calibrate import calibrate_view, compute_paint_search_key, compute_view_key
+from app.solving.calibrate import (
+    calibrate_view,
+    compute_paint_search_key,
+    compute_view_calibration_key,
+)
 from app.solving.match_tripod import solve_match_tripod
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, click
@@ -78,9 +82,9 @@ def test_their_covariance_knows_how_far_the_plan_puts_them_off_and_no_camera_mov
         off, covariance = off_and_covariance(together, truths[number])
         assert off @ np.linalg.solve(covariance, off) < WITHIN**2
         assert (off == off_and_covariance(group, truths[number])[0]).all()
-        assert compute_view_key(together, together.views[0], POLICY) != compute_view_key(
-            group, group.views[0], POLICY
-        )
+        assert compute_view_calibration_key(
+            together, together.views[0], POLICY
+        ) != compute_view_calibration_key(group, group.views[0], POLICY)
         off_plan.append(np.linalg.norm(off))
     assert np.mean(off_plan) > 0.5
 
@@ -132,7 +136,7 @@ def test_paint_that_was_read_for_other_lines_takes_no_part():
 def test_it_is_kept_as_json_to_the_last_bit_and_anything_else_is_refused():
     _, groups = match()
     reading = solve_match_tripod(groups, POLICY)[1]
-    assert reading_from_text(reading.text) == reading
+    assert reading_from_canonical_json(reading.text) == reading
     value = reading_to_json(reading)
     assert "tripod" not in reading_to_json(groups[1].paint["a"])
     for wrong in ([[1.0], [2.0]], [[float("nan")] * 8, [0.0] * 64], "no"):

@@ -19,7 +19,11 @@ from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.solving.calibrate import calibrate_view, compute_paint_search_key, compute_view_key
+from app.solving.calibrate import (
+    calibrate_view,
+    compute_paint_search_key,
+    compute_view_calibration_key,
+)
 from app.solving.paint_camera import write_paint_step
 from app.solving.solve import solve_group
 from tests.balls import box_around
@@ -157,14 +161,16 @@ class TestKey:
         group = read(clicked())
         view = group.views[0]
         for policy in (CLICKS, PAPER.calibration):
-            assert compute_view_key(group, view, policy) == compute_view_key(
-                clicked(), view, policy
-            )
+            assert compute_view_calibration_key(
+                group, view, policy
+            ) == compute_view_calibration_key(clicked(), view, policy)
             assert first(group, policy) == first(clicked(), policy)
 
     def test_paint_that_was_not_read_leaves_the_key_of_the_clicks(self):
         view = clicked().views[0]
-        assert compute_view_key(clicked(), view, TOLD) == compute_view_key(clicked(), view, CLICKS)
+        assert compute_view_calibration_key(clicked(), view, TOLD) == compute_view_calibration_key(
+            clicked(), view, CLICKS
+        )
 
     def test_what_counts_as_missing_leaves_paint_as_it_was_read(self):
         """It changes how a camera is measured, and no camera."""
@@ -178,7 +184,7 @@ class TestKey:
             assert found.source == other.source == "paint"
             assert found.camera == other.camera == first(group).camera
         keys = {
-            compute_view_key(group, view, replace(TOLD, shortest_marking_px=shortest))
+            compute_view_calibration_key(group, view, replace(TOLD, shortest_marking_px=shortest))
             for shortest in (0.0, 5.0)
         }
         assert len(keys) == 2
@@ -212,7 +218,10 @@ class TestKey:
 
     def test_each_reading_has_a_key_of_its_own(self):
         groups = (clicked(), read(clicked()), read(clicked(), supported=0.5))
-        assert len({compute_view_key(group, group.views[0], TOLD) for group in groups}) == 3
+        assert (
+            len({compute_view_calibration_key(group, group.views[0], TOLD) for group in groups})
+            == 3
+        )
 
     def test_a_reading_for_other_lines_does_not_count(self):
         group = read(clicked())
@@ -233,9 +242,9 @@ class TestKey:
         painted = read(bare)
         assert first(painted).source != "paint"
         assert first(painted) == first(bare)
-        assert compute_view_key(painted, painted.views[0], TOLD) == compute_view_key(
-            bare, bare.views[0], TOLD
-        )
+        assert compute_view_calibration_key(
+            painted, painted.views[0], TOLD
+        ) == compute_view_calibration_key(bare, bare.views[0], TOLD)
 
 
 def kinds(group: Group, policy=TOUCHLINE):

@@ -18,7 +18,7 @@ from app.solving.lone_frame import (
 )
 from app.solving.observations import make_observations
 from app.solving.paint_camera import PaintProblem, measure_offsets
-from app.solving.paint_noise import painted_terms, size_terms
+from app.solving.paint_noise import paint_derivatives_by_layout, paint_derivatives_by_size
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, click
@@ -48,7 +48,7 @@ class TestSizeTerms:
     @pytest.mark.parametrize(("number", "other"), [(0, Pitch(105.2, 68)), (1, Pitch(105, 68.2))])
     def test_they_are_how_the_paint_of_another_pitch_moves(self, number, other):
         seen, _ = seen_by(MAIN, other)
-        told = size_terms(seen.marking, seen.jacobian, PITCH)[:, number]
+        told = paint_derivatives_by_size(seen.marking, seen.jacobian, PITCH)[:, number]
         told = told * 0.2 / PAINT_SIZE_SIGMA_M[number]
         assert np.abs(told).max() > 0.3
         rows = across_middles(seen)
@@ -57,20 +57,20 @@ class TestSizeTerms:
     def test_which_line_of_a_goal_is_meant_changes_nothing(self):
         seen, _ = seen_by(MAIN)
         one, other = (
-            size_terms(seen.marking, seen.jacobian, PITCH.with_goal(goal))
+            paint_derivatives_by_size(seen.marking, seen.jacobian, PITCH.with_goal(goal))
             for goal in ("inner", "middle")
         )
         assert one.any() and (one == other).all()
 
     def test_a_pitch_that_was_measured_has_none(self):
         seen, _ = seen_by(MAIN)
-        assert not size_terms(seen.marking, seen.jacobian, Pitch(104, 68)).any()
+        assert not paint_derivatives_by_size(seen.marking, seen.jacobian, Pitch(104, 68)).any()
 
 
 class TestPaintedTerms:
     def terms(self):
         seen, places = seen_by(MAIN)
-        terms = painted_terms(places, seen.marking, seen.jacobian, PITCH)
+        terms = paint_derivatives_by_layout(places, seen.marking, seen.jacobian, PITCH)
         return seen, places, terms
 
     def test_the_grass_is_raised_between_the_touchlines(self):

@@ -10,7 +10,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import (
     PitchEstimate,
-    PitchFrame,
+    PitchSizeFrameLines,
     eliminate_camera,
     eliminate_own_numbers,
     estimate_pitch,
@@ -35,7 +35,7 @@ def frames(pitch, count=10, noise_px=0.8):
         for index in range(count)
     ]
     return [
-        PitchFrame(click(camera, noise_px, seed, pitch), SIZE)
+        PitchSizeFrameLines(click(camera, noise_px, seed, pitch), SIZE)
         for seed, camera in enumerate(cameras)
     ]
 
@@ -43,7 +43,7 @@ def frames(pitch, count=10, noise_px=0.8):
 def among_frames_of_one_end(*telling):
     """The size that frames tell together with six that say nothing of the length."""
     one_end = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0, bend=BEND)
-    others = [PitchFrame(click(one_end, 0.8, seed, SMALL), SIZE) for seed in range(6)]
+    others = [PitchSizeFrameLines(click(one_end, 0.8, seed, SMALL), SIZE) for seed in range(6)]
     return estimate_pitch([*others, *telling], POLICY)
 
 
@@ -70,16 +70,16 @@ class TestEstimatePitch:
             lines["Side line top"],
             lines["Big rect. left top"],
         )
-        spoilt[1] = PitchFrame(make_lines(lines), SIZE)
+        spoilt[1] = PitchSizeFrameLines(make_lines(lines), SIZE)
         found = estimate_pitch(spoilt, POLICY)
         assert found.frames == small.frames - 1
         assert found.length == pytest.approx(small.length, abs=0.15)
 
     def test_a_length_that_no_frame_shows_is_unknown(self):
         camera = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 1500.0)
-        one_end = [PitchFrame(click(camera, 0.8, seed, SMALL), SIZE) for seed in range(6)]
+        one_end = [PitchSizeFrameLines(click(camera, 0.8, seed, SMALL), SIZE) for seed in range(6)]
         kept = [
-            PitchFrame(
+            PitchSizeFrameLines(
                 make_lines({name: it for name, it in frame.lines.items() if "right" in name}), SIZE
             )
             for frame in one_end
@@ -128,7 +128,7 @@ class TestChooseFrames:
         monkeypatch.setattr("app.solving.pitch_size.MAX_FRAMES", 4)
         narrow = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0)
         telling = frames(Pitch(), 4, noise_px=0.0)
-        many = [PitchFrame(click(narrow), SIZE)] * 6 + telling
+        many = [PitchSizeFrameLines(click(narrow), SIZE)] * 6 + telling
         chosen = select_informative_frames(many)
         assert len(chosen) == 4 and np.isin(chosen, [6, 7, 8, 9]).sum() >= 3
 

@@ -20,7 +20,7 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.triangulate import (
     BallObservation,
-    CameraNumbers,
+    UncertainCameraParameters,
     collect_ball_observations,
     stack_pair_arrays,
     triangulate_observation_pairs,
@@ -33,12 +33,12 @@ KNOWN = tuple(np.arange(64.0))
 
 class TestOf:
     def test_without_a_camera_and_of_unknown_exactness_there_are_none(self):
-        assert CameraNumbers.of(Calibration("none", None), SIZE.diagonal) is None
-        assert CameraNumbers.of(Calibration("given", MAIN), SIZE.diagonal) is None
+        assert UncertainCameraParameters.of(Calibration("none", None), SIZE.diagonal) is None
+        assert UncertainCameraParameters.of(Calibration("given", MAIN), SIZE.diagonal) is None
 
     def test_a_picture_as_it_was_taken_says_nothing_of_its_own(self):
         calibration = Calibration("lines", MAIN, covariance=KNOWN)
-        found = CameraNumbers.of(calibration, SIZE.diagonal)
+        found = UncertainCameraParameters.of(calibration, SIZE.diagonal)
         assert np.array_equal(found.parameters, parameters_from_camera(MAIN, SIZE.diagonal / 2))
         assert np.array_equal(found.covariance, np.reshape(KNOWN, (8, 8)))
         assert found.picture is None
@@ -49,7 +49,7 @@ class TestOf:
         calibration = Calibration(
             "lines", changed, covariance=KNOWN, picture_covariance=tuple(whole.ravel())
         )
-        found = CameraNumbers.of(calibration, SIZE.diagonal)
+        found = UncertainCameraParameters.of(calibration, SIZE.diagonal)
         taken = parameters_from_camera(BEHIND_GOAL, SIZE.diagonal / 2)
         assert np.allclose(found.parameters, taken, atol=1e-12)
         assert np.array_equal(found.covariance, whole[:8, :8])

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UnsafePathError
-from app.terminal.remote import unpack_zip, zip_folder
+from app.terminal.remote import unpack_zip, zip_if_folder
 
 
 @pytest.fixture
@@ -23,12 +23,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_file_is_sent_as_it_is(folder: Path) -> None:
-    with zip_folder(folder / "a.json") as file:
+    with zip_if_folder(folder / "a.json") as file:
         assert file == folder / "a.json"
 
 
 def test_a_folder_is_a_zip_of_its_name_that_is_gone_afterwards(folder: Path) -> None:
-    with zip_folder(folder) as file:
+    with zip_if_folder(folder) as file:
         assert file.name == "frames of May.zip"
         with zipfile.ZipFile(file) as archive:
             packed = {one.filename: one.compress_type for one in archive.infolist()}
@@ -38,15 +38,15 @@ def test_a_folder_is_a_zip_of_its_name_that_is_gone_afterwards(folder: Path) -> 
 
 
 def test_the_same_files_make_the_same_zip_whenever_they_were_written(folder: Path) -> None:
-    with zip_folder(folder) as file:
+    with zip_if_folder(folder) as file:
         first = file.read_bytes()
     os.utime(folder / "a.json", (1e9, 1e9))
-    with zip_folder(folder) as file:
+    with zip_if_folder(folder) as file:
         assert file.read_bytes() == first
 
 
 def test_what_was_packed_is_unpacked(folder: Path, tmp_path: Path) -> None:
-    with zip_folder(folder) as file:
+    with zip_if_folder(folder) as file:
         unpack_zip(file, tmp_path / "again")
     again = tmp_path / "again"
     files = {path.relative_to(again).as_posix() for path in again.rglob("*") if path.is_file()}

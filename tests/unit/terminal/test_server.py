@@ -41,7 +41,7 @@ from app.json_text import json_text
 from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
-from app.terminal.remote import write_evaluation
+from app.terminal.remote import download_evaluation
 from app.terminal.server import (
     ABLE,
     ServerPlace,
@@ -457,7 +457,7 @@ class TestRefusals:
         values = {"id": 1, "tables": [], "figures": []}
         values[named] = [{"name": "../x"}] if named == "tables" else ["../x"]
         with pytest.raises(UnsafePathError):
-            write_evaluation(Client("http://127.0.0.1:9"), values, tmp_path / "out")
+            download_evaluation(Client("http://127.0.0.1:9"), values, tmp_path / "out")
         assert [file.name for file in tmp_path.iterdir()] == ["out"]
 
     def test_another_version_is_not_spoken_to(

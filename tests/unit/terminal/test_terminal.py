@@ -12,8 +12,8 @@ import pytest
 
 from app.terminal.terminal import (
     MAX_MISSING,
-    allow_any_text,
     escape_controls,
+    escape_unencodable_output,
     hold_interrupts,
     print_error,
     print_export,
@@ -87,7 +87,7 @@ class TestSpellOut:
         raw = io.BytesIO()
         monkeypatch.setattr("sys.stdout", io.TextIOWrapper(raw, encoding="ascii"))
         value = {"file": "Málaga – 1° ⚽ \udcff"}
-        allow_any_text()
+        escape_unencodable_output()
         print_json(value)
         assert json.loads(raw.getvalue()) == value
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.tracking.ball_picture import (
-    BallColour,
+    BallGreyConversion,
     find_ball,
     find_similar_ball,
     fit_disc,
@@ -46,7 +46,7 @@ class TestFindBall:
 class TestFitDisc:
     def test_a_smeared_ball_has_its_centre_in_the_middle(self) -> None:
         picture = drawn([(60.3 + step, 50.6, 8.0) for step in np.linspace(-5, 5, 21)])
-        grey = BallColour.of(picture, 60.3, 50.6, 8).to_grey(picture)
+        grey = BallGreyConversion.of(picture, 60.3, 50.6, 8).to_grey(picture)
         spot = fit_disc(grey, 61, 50, 8, smear=10, angle=0)
         assert spot is not None
         assert np.hypot(spot.x - 60.3, spot.y - 50.6) < 0.15
@@ -56,7 +56,7 @@ class TestFitDisc:
         for seed in range(40):
             x, y = 60 + seed % 7 / 7, 50 + seed % 5 / 5
             picture = drawn([(x, y, 6.0)], noise=14.0, seed=seed)
-            spot = fit_disc(BallColour.of(picture, x, y, 6).to_grey(picture), 60.3, 50.3, 6)
+            spot = fit_disc(BallGreyConversion.of(picture, x, y, 6).to_grey(picture), 60.3, 50.3, 6)
             assert spot is not None
             off += [spot.x - x, spot.y - y]
             sigma.append(spot.sigma_px)
@@ -73,7 +73,7 @@ class TestLikeness:
         picture = drawn([(60, 50, 8.0)], noise=1.0)
         template = make_ball_template(8.0)
         alike, contrast = match_template(
-            BallColour.of(picture, 60, 50, 8).to_grey(picture), template
+            BallGreyConversion.of(picture, 60, 50, 8).to_grey(picture), template
         )
         row, column = np.unravel_index(int(alike.argmax()), alike.shape)
         reach = template.shape[0] // 2
@@ -85,7 +85,9 @@ class TestFindLike:
     """A click that mends: the ball looks as in another frame, or is where the person says."""
 
     PICTURE = drawn([(60.3, 50.6, 8.0)])
-    GREY = BallColour.of(PICTURE, 60.3, 50.6, 8.0).to_grey(drawn([(40.4, 30.2, 8.0)], seed=4))
+    GREY = BallGreyConversion.of(PICTURE, 60.3, 50.6, 8.0).to_grey(
+        drawn([(40.4, 30.2, 8.0)], seed=4)
+    )
 
     def test_a_click_beside_it_snaps_to_its_centre(self) -> None:
         spot = find_similar_ball(self.GREY, 42.0, 29.0, 8.0)

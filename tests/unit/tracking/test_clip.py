@@ -12,7 +12,7 @@ from app.errors import ImageError
 from app.soccer.frames import ImageSize
 from app.tracking.clip import Clip
 from app.video.frames import RecordingReader
-from app.video.indexing import index_times
+from app.video.indexing import index_without_measuring
 from tests.cameras import looking
 from tests.videos import number_of, numbered, stretch_pixels, turn, vary_times, write_pictures
 
@@ -61,7 +61,7 @@ def test_a_stretch_is_read_alone_by_an_index(tmp_path: Path, monkeypatch: pytest
     path = tmp_path / "clip.mp4"
     write_pictures(path, "mp4v", (cv2.resize(numbered(n), (640, 384)) for n in range(120)))
     vary_times(path, [512 + 128 * (number % 3) for number in range(120)])
-    index = index_times(path)
+    index = index_without_measuring(path)
     clip, asked = Clip.open(path, index, 90, 109), list[int]()
     read = RecordingReader.read
     monkeypatch.setattr(

@@ -48,7 +48,7 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
         asked.append(now)
         return FrameProposal("nothing", "no straight line is seen on the grass")
 
-    monkeypatch.setattr(follow, "propose_in_picture", nothing)
+    monkeypatch.setattr(follow, "propose_camera_in_picture", nothing)
     for now in range(FRAMES):
         assert follower._prefer_proposed_camera(replace(black, number=now), frame) is frame
     waits = np.diff(asked).tolist()
@@ -70,7 +70,7 @@ class TestWhereOneIsSought:
             found.append((shown.number, tuple(library.name for library in asked[-1])))
             return FrameProposal("nothing", "no straight line is seen on the grass")
 
-        monkeypatch.setattr(follow, "propose_in_picture", nothing)
+        monkeypatch.setattr(follow, "propose_camera_in_picture", nothing)
         return found
 
     def lose(self, known: list[Camera], shift_px: float) -> None:

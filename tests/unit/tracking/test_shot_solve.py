@@ -24,7 +24,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.follow import BRIDGED, LOST, TRACKED, TrackedFrame
 from app.tracking.motion import BackgroundMatches
-from app.tracking.shot_equations import invert_diagonal, solve_tridiagonal
+from app.tracking.shot_equations import compute_inverse_diagonal_blocks, solve_tridiagonal
 from app.tracking.shot_solve import solve_shot
 from tests.unit.paint.lawns import SMALL, TRUE
 
@@ -145,6 +145,6 @@ def test_a_block_tridiagonal_system_is_solved_as_the_whole_matrix(count: int):
     found = solve_tridiagonal(diagonal, beside, right).reshape(-1, 2)
     assert found == pytest.approx(np.linalg.solve(whole, right.reshape(-1, 2)))
     inverse = np.linalg.inv(whole)
-    for n, block in enumerate(invert_diagonal(diagonal, beside)):
+    for n, block in enumerate(compute_inverse_diagonal_blocks(diagonal, beside)):
         at = slice(n * size, (n + 1) * size)
         assert block == pytest.approx(inverse[at, at])

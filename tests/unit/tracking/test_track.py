@@ -113,7 +113,7 @@ def test_a_film_of_nothing_has_no_camera(tmp_path: Path):
 def test_lines_of_a_frame_that_is_not_there_are_refused(film: Film, tmp_path: Path):
     lines = drawn(film, 0)
     path = film.write(tmp_path, film.images[:2])
-    with pytest.raises(InputError, match="frame 7 is not in .*, whose frames are 0 to 1"):
+    with pytest.raises(InputError, match=r"frame 7 is not in .*, whose frames are 0 to 1"):
         track_clip(path, {7: lines})
     few = make_lines(dict(list(lines.items())[:1]))
     with pytest.raises(InputError, match="no camera can be computed from the lines of frame 0"):

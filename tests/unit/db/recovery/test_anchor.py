@@ -193,7 +193,7 @@ class TestAfterTheCommit:
         def refuse(*_: object) -> None:
             raise OSError(5, "Input/output error")
 
-        monkeypatch.setattr("app.db.store.sync_anchor", refuse)
+        monkeypatch.setattr("app.db.store.flush_anchor_to_disk", refuse)
         with capture_logs() as logs:
             Store.open(settings).close()
         assert [line["event"] for line in logs] == ["home.json cannot be synced"]

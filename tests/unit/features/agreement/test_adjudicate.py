@@ -21,7 +21,7 @@ from app.features.agreement.service import (
     read_limits,
     set_limits,
 )
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
@@ -49,7 +49,11 @@ def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Inde
     if moved:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
         state = submit_edit(
-            store, take.copy_id, set_ball(view.key, ball), if_match=state.etag, actor=person
+            store,
+            take.copy_id,
+            make_set_ball_edit(view.key, ball),
+            if_match=state.etag,
+            actor=person,
         )
     set_verdict(store, take.copy_id, "accepted", None, "seen", if_match=state.etag, actor=person)
     return get_annotation(store, take.id)

@@ -12,7 +12,7 @@ from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
@@ -41,7 +41,9 @@ def annotate(store: Store, leases: LeaseService, batch: Batch, person: str, move
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    state = submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
+    state = submit_edit(
+        store, copy, make_set_ball_edit(view.key, ball), if_match=state.etag, actor=person
+    )
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return copy
 

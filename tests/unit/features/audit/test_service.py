@@ -11,7 +11,7 @@ from app.errors import ConflictError, InputError
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import (
     KINDS,
-    Family,
+    AuditTopic,
     assign_local_work,
     find_owner_of_local_work,
     iterate_audit_entries,
@@ -20,7 +20,7 @@ from app.features.audit.service import (
 )
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
 from app.features.comments.service import begin_thread
-from app.features.groups.edit import IncludeView, SetLines, set_ball
+from app.features.groups.edit import SetLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import _STEPS, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -85,7 +85,7 @@ class TestAudit:
     ) -> None:
         assert len(lines(store, AuditQuery(person="anna"))) == 4
         assert len(lines(store, AuditQuery(person="anna (token lens)"))) == 1
-        assert len(lines(store, AuditQuery(kinds=KINDS[Family.VERDICT]))) == 1
+        assert len(lines(store, AuditQuery(kinds=KINDS[AuditTopic.VERDICT]))) == 1
         assert len(lines(store, AuditQuery(group_id=said))) == 3
         at = read_audit(store, ALL, EVERYTHING).items[0].at
         assert len(lines(store, AuditQuery(since=at))) == 1
@@ -135,7 +135,7 @@ class TestAudit:
     ) -> None:
         state = load_group_state(store, said)
         one, two = (view.key for view in state.group.views[:2])
-        edits = [SetLines(one, {"Middle line": None}), set_ball(two, None)]
+        edits = [SetLines(one, {"Middle line": None}), make_set_ball_edit(two, None)]
         state = submit_edits(store, said, edits, if_match=state.etag, actor="anna")
         undo_group_edit(store, said, if_match=state.etag, actor="anna")
         told = f"lines of view {one}: Middle line; balls of view {two}"
@@ -150,9 +150,9 @@ class TestAudit:
         key = state.group.views[0].key
         edits = (
             SetLines(key, {"Middle line": None}),
-            set_ball(key, None),
-            IncludeView(key, False),
-            IncludeView(key, True),
+            make_set_ball_edit(key, None),
+            SetViewInclusion(key, False),
+            SetViewInclusion(key, True),
         )
         for edit in edits:
             state = submit_edit(store, said, edit, if_match=state.etag, actor="anna")

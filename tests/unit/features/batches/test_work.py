@@ -16,8 +16,8 @@ from app.features.batches import leases as leases_module
 from app.features.batches.leases import LASTS, BatchMember, Lease, LeaseService
 from app.features.batches.progress import list_own_batches, list_team_batches
 from app.features.batches.service import (
+    BatchRole,
     NewBatch,
-    Part,
     change_batch,
     get_batch,
     list_batch_groups,
@@ -255,11 +255,11 @@ class TestLeases:
         batch = make_batch(store, dataset, new, actor="lead").id
         assert leases.lease_next_group(batch, BO).group is None
         lease = leases.lease_next_group(batch, ADA)
-        assert (lease.group, lease.part) == (groups[0], Part.ANNOTATOR)
+        assert (lease.group, lease.part) == (groups[0], BatchRole.ANNOTATOR)
         assert leases.submit(batch, groups[0], ADA, actor="ada").batch.submitted == 1
         assert leases.lease_next_group(batch, ADA, after=groups[0]).group == groups[1]
         review = leases.lease_next_group(batch, BO)
-        assert (review.group, review.part) == (groups[0], Part.REVIEWER)
+        assert (review.group, review.part) == (groups[0], BatchRole.REVIEWER)
         with pytest.raises(ConflictError):
             leases.submit(batch, groups[1], BO, actor="bo")
         with pytest.raises(ConflictError, match="assigned to other people"):
@@ -352,7 +352,11 @@ class TestLeases:
         assert had == 3
         assert get_batch(store, batch).submitted == 2
         found = leases.lease_next_group(batch, BO)
-        assert (found.group, found.part, found.submitted_by) == (groups[0], Part.REVIEWER, "ada")
+        assert (found.group, found.part, found.submitted_by) == (
+            groups[0],
+            BatchRole.REVIEWER,
+            "ada",
+        )
         leases.return_group(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = list_own_batches(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.returned]) == (1, [groups[0]])
@@ -463,7 +467,11 @@ class TestProgress:
             ]
             for one in (ADA, BO, CY)
         }
-        assert left == {"ada": [([Part.ANNOTATOR], 2)], "bo": [([Part.REVIEWER], 1)], "cy": []}
+        assert left == {
+            "ada": [([BatchRole.ANNOTATOR], 2)],
+            "bo": [([BatchRole.REVIEWER], 1)],
+            "cy": [],
+        }
 
     def test_pace_comes_of_what_was_done_and_pauses_are_none_of_it(
         self, store, dataset, groups, clock

@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
 from app.features.datasets import service as module
 from app.features.datasets.service import delete_dataset, get_dataset, list_datasets, read_contents
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -42,7 +42,9 @@ def two(store: Store, once, fill, make_group, make_static) -> Store:
         ids = fill(make_group(7), make_group(8), make_static(10))
         state = load_group_state(store, ids[0])
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit_edit(store, ids[0], set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, ids[0], make_set_ball_edit("7.png", ball), if_match=state.etag, actor="ann"
+        )
         other_lines = replace(make_static(10).views[0].station, lines={})
         changed = make_static(10)
         changed = changed.with_view(replace(changed.views[0], station=other_lines))

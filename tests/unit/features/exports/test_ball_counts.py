@@ -20,7 +20,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
 from app.formats.parquet import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, has_ball_3d
+from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, is_ball_3d_valid_in_view
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from tests.balls import seen
@@ -200,4 +200,4 @@ class TestBoxOfAViewApart:
         view = replace(state.group.views[2], balls=())
         assert collect_ball_boxes(state.solution, view) == {}
         assert find_ball_fit(state.solution, view, everything=True) is None
-        assert not has_ball_3d(state.solution, view)
+        assert not is_ball_3d_valid_in_view(state.solution, view)

@@ -16,10 +16,10 @@ from app.features.exports.service import (
     FORMATS,
     TRACKS,
     export_dataset,
-    list_formats_with_problems,
+    list_format_availability,
     require_exportable,
 )
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
@@ -114,7 +114,9 @@ class TestExport:
         judge(store, three[0], "accepted")
         state = judge(store, three[1], "accepted")
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit_edit(store, three[1], set_ball("8.png", ball), if_match=state.etag, actor="ben")
+        submit_edit(
+            store, three[1], make_set_ball_edit("8.png", ball), if_match=state.etag, actor="ben"
+        )
         report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"stale": 1}
@@ -131,7 +133,9 @@ class TestExport:
     ) -> None:
         if state == "stale":
             etag = judge(store, three[0], "accepted").etag
-            submit_edit(store, three[0], set_ball("7.png", None), if_match=etag, actor="ben")
+            submit_edit(
+                store, three[0], make_set_ball_edit("7.png", None), if_match=etag, actor="ben"
+            )
         with pytest.raises(InputError) as caught:
             export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert caught.value.hint is None
@@ -162,7 +166,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         etag = judge(store, three[1], "accepted").etag
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit_edit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
+        submit_edit(store, three[1], make_set_ball_edit("8.png", ball), if_match=etag, actor="ben")
         export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
         assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}
@@ -374,7 +378,7 @@ class TestImages:
 
 class TestPossibleFormats:
     def test_a_format_that_has_no_place_for_the_groups_says_why(self, store, three) -> None:
-        answers = {one.format: one for one in list_formats_with_problems(store, "demo")}
+        answers = {one.format: one for one in list_format_availability(store, "demo")}
         refused = [name for name, one in answers.items() if one.reason is not None]
         assert refused == ["issia-3d", "issia", *TRACKS]
         assert "is not from ISSIA" in answers["issia"].reason
@@ -383,9 +387,7 @@ class TestPossibleFormats:
     def test_of_static_cameras_it_is_the_other_way_round(self, store, fill, make_static) -> None:
         fill(make_static(10))
         refused = {
-            one.format
-            for one in list_formats_with_problems(store, "demo")
-            if one.reason is not None
+            one.format for one in list_format_availability(store, "demo") if one.reason is not None
         }
         assert {"soccernet-v3", "soccernet-v3d"} <= refused
         assert not {"issia", "issia-3d"} & refused

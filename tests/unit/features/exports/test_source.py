@@ -8,7 +8,7 @@ import pytest
 
 from app.errors import InputError, NotFoundError
 from app.features.exports.service import export_dataset
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
@@ -47,7 +47,7 @@ class TestVersionSource:
     ) -> None:
         export_dataset(store, "demo", name, tmp_path / "a.zip", version="v1")
         etag = load_group_state(store, 1).etag
-        submit_edit(store, 1, set_ball("7.png", None), if_match=etag, actor="ben")
+        submit_edit(store, 1, make_set_ball_edit("7.png", None), if_match=etag, actor="ben")
         judge(store, 2, "rejected", "bad_calibration")
         export_dataset(store, "demo", name, tmp_path / "b.zip", version=version.hash[:12])
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()

@@ -6,7 +6,7 @@ import pytest
 from app.errors import DatasetFormatError
 from app.features.file_tools.matches import collect_shared_match_places, read_match_of_each_frame
 from app.formats.sn_calibration import LineFile
-from app.solving.match_position import FramePlace
+from app.solving.match_position import FrameCameraPlace
 from tests.cameras import SIZE
 
 
@@ -15,7 +15,7 @@ def files(*stems):
 
 
 def places(*ys):
-    return [FramePlace(np.array([0.0, y, -15.0]), 0.01 * np.eye(3), 0.0) for y in ys]
+    return [FrameCameraPlace(np.array([0.0, y, -15.0]), 0.01 * np.eye(3), 0.0) for y in ys]
 
 
 class TestReadMatches:

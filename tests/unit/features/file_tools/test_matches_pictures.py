@@ -10,8 +10,8 @@ import pytest
 from app.errors import DatasetFormatError
 from app.features.file_tools.calibrate import calibrate_files
 from app.features.file_tools.matches import (
-    choose_picture,
-    estimate_picture_of_files,
+    choose_picture_geometry,
+    estimate_picture_geometry_of_files,
     read_picture_geometry,
 )
 from app.formats.cameras import read_cameras
@@ -47,7 +47,7 @@ class TestCalibrateFiles:
     def test_cameras_are_those_of_the_picture_as_it_is(self, tmp_path: Path, by_file: bool) -> None:
         lines, file = tmp_path / "lines", tmp_path / "picture.json"
         write(lines)
-        file.write_text(json.dumps(estimate_picture_of_files(lines, size=SIZE)))
+        file.write_text(json.dumps(estimate_picture_geometry_of_files(lines, size=SIZE)))
         options = {"picture": file} if by_file else {"guess_picture": True}
         summary = calibrate(lines, tmp_path / "out", **options)
         assert summary["picture"]["aspect"] == pytest.approx(1.06, abs=0.015)
@@ -73,7 +73,7 @@ class TestCalibrateFiles:
 
 class TestPictureFor:
     def test_too_few_frames_are_told_and_nothing_is_done(self, tmp_path: Path) -> None:
-        picture, told = choose_picture(write(tmp_path, count=2), SIZE, None)
+        picture, told = choose_picture_geometry(write(tmp_path, count=2), SIZE, None)
         assert picture is None
         assert "needs 3" in told["problem"]
 

@@ -17,7 +17,7 @@ from app.features.findings.service import (
     read_findings,
     set_dismissal,
 )
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
@@ -143,7 +143,7 @@ class TestSetDismissal:
         ball = found.group.views[0].ball
         assert ball is not None
         moved = Box(ball.center.x + 200.0, ball.center.y - 90.0, 14.0, 14.0)
-        edit = set_ball(found.group.views[0].key, BallAnnotation(box=moved))
+        edit = make_set_ball_edit(found.group.views[0].key, BallAnnotation(box=moved))
         state = submit_edit(store, found.id, edit, if_match=after.etag, actor="ben")
         assert None in state.dismissed
         (row,) = list_groups(store, found.dataset_id, "finding:any").items

@@ -7,15 +7,15 @@ import pytest
 
 from app.errors import InputError, NotFoundError, UnknownMarkingError
 from app.features.groups.edit import (
-    IncludeView,
     SetBalls,
     SetCalibrationSource,
     SetLines,
-    SetPicture,
+    SetPictureGeometry,
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
-    set_ball,
+    SetViewInclusion,
+    make_set_ball_edit,
 )
 from app.features.groups.edit_codec import edit_from_json, edit_to_json, station_edit_from_json
 from app.soccer.annotation import BallAnnotation
@@ -29,15 +29,15 @@ EDITS = [
     SetLines("7.png", {"Middle line": HERE, "Side line top": None, "Side line left": HERE}),
     SetLines("7.png", {" Middle line ": ()}),
     SetLines("7.png", {"Circle left": None, "Side line top": HERE}, (), ("Circle left",)),
-    set_ball("7.png", BALL),
-    set_ball("7.png", None),
+    make_set_ball_edit("7.png", BALL),
+    make_set_ball_edit("7.png", None),
     SetBalls("7.png", (BALL, BallAnnotation(point=ImagePoint(1.0, 2.0)))),
-    IncludeView("7_1.png", False),
-    IncludeView("7_1.png", False, "not_same_instant"),
-    IncludeView("7_1.png", False, "other", "another match"),
+    SetViewInclusion("7_1.png", False),
+    SetViewInclusion("7_1.png", False, "not_same_instant"),
+    SetViewInclusion("7_1.png", False, "other", "another match"),
     SetCalibrationSource("7.png", "lines"),
-    SetPicture("7.png", PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5))),
-    SetPicture("7.png", None),
+    SetPictureGeometry("7.png", PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5))),
+    SetPictureGeometry("7.png", None),
 ]
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),
@@ -78,8 +78,8 @@ class TestNotVisible:
 
 class TestSetPicture:
     def test_its_inverse_is_the_picture_before(self, make_group) -> None:
-        group = SetPicture("7.png", PictureGeometry(1.25)).apply(make_group())
-        edit = SetPicture("7.png", PictureGeometry(0.75))
+        group = SetPictureGeometry("7.png", PictureGeometry(1.25)).apply(make_group())
+        edit = SetPictureGeometry("7.png", PictureGeometry(0.75))
         assert edit.inverse(group).apply(edit.apply(group)) == group
 
 
@@ -112,7 +112,7 @@ class TestApply:
 
     def test_a_ball_takes_the_place_of_all_others(self, make_group) -> None:
         two = SetBalls("7.png", (BALL, BALL)).apply(make_group())
-        assert set_ball("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
+        assert make_set_ball_edit("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
 
     @pytest.mark.parametrize("edit", EDITS)
     def test_the_group_that_it_is_applied_to_stays(self, edit, make_group) -> None:
@@ -131,22 +131,36 @@ class TestApply:
                 "valid pixel",
             ),
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
-            (set_ball("7.png", BallAnnotation()), InputError, "box or a point"),
-            (set_ball("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
-            (set_ball("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "valid pixel"),
+            (make_set_ball_edit("7.png", BallAnnotation()), InputError, "box or a point"),
             (
-                set_ball("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))),
+                make_set_ball_edit("7.png", BallAnnotation(box=Box(1, 2, 0, 3))),
+                InputError,
+                "above zero",
+            ),
+            (
+                make_set_ball_edit("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))),
                 InputError,
                 "valid pixel",
             ),
-            (set_ball("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "valid pixel"),
             (
-                set_ball("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
+                make_set_ball_edit("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))),
                 InputError,
                 "valid pixel",
             ),
             (
-                set_ball("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),
+                make_set_ball_edit("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))),
+                InputError,
+                "valid pixel",
+            ),
+            (
+                make_set_ball_edit("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
+                InputError,
+                "valid pixel",
+            ),
+            (
+                make_set_ball_edit(
+                    "7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))
+                ),
                 InputError,
                 "not both",
             ),
@@ -161,7 +175,7 @@ class TestApply:
 
     def test_a_ball_out_of_view_needs_no_box(self, make_group) -> None:
         ball = BallAnnotation(out_of_view=True)
-        assert set_ball("7.png", ball).apply(make_group()).view("7.png").ball is None
+        assert make_set_ball_edit("7.png", ball).apply(make_group()).view("7.png").ball is None
 
 
 class TestInverse:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.errors import TooManyPointsError
-from app.features.groups.edit import SetLines, SetStationLines, set_ball
+from app.features.groups.edit import SetLines, SetStationLines, make_set_ball_edit
 from app.features.groups.edit_codec import (
     MARKING_POINTS,
     REQUEST_POINTS,
@@ -76,7 +76,7 @@ class TestEveryDoor:
     def test_a_preview_of_too_many_points_is_refused(self, store, fill, make_group) -> None:
         (group,) = fill(make_group(7))
         with pytest.raises(TooManyPointsError, match=r"view 7\.png"):
-            edits = [set_ball("7.png", None), SetLines("7.png", self.LINES)]
+            edits = [make_set_ball_edit("7.png", None), SetLines("7.png", self.LINES)]
             solve_edited_group(store, group, lambda _: edits)
 
     def test_an_edit_of_a_static_camera_with_too_many_points_is_refused(

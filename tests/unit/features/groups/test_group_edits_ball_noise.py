@@ -9,7 +9,7 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.features.groups import group_edits
-from app.features.groups.edit import CompositeEdit, SetBalls, set_ball
+from app.features.groups.edit import CompositeEdit, SetBalls, make_set_ball_edit
 from app.features.groups.group_edits import (
     add_noise_of_actor,
     apply_noise_factors,
@@ -58,7 +58,7 @@ def place(store: Store, group: int, actor: str, ball: BallAnnotation = BALL) -> 
     """Place the ball of the last view; returns the view's key."""
     state = load_group_state(store, group)
     key = state.group.views[-1].key
-    submit_edit(store, group, set_ball(key, ball), if_match=state.etag, actor=actor)
+    submit_edit(store, group, make_set_ball_edit(key, ball), if_match=state.etag, actor=actor)
     return key
 
 
@@ -169,7 +169,7 @@ class TestWithNoise:
         self, make_static
     ) -> None:
         group = make_static(10)
-        one, two = set_ball("cam2", BALL), SetBalls("cam1", (BALL,))
+        one, two = make_set_ball_edit("cam2", BALL), SetBalls("cam1", (BALL,))
         assert add_noise_of_actor(FACTORS, group, one, "ann") == replace(one, noise=4.0)
         assert add_noise_of_actor(
             FACTORS, group, CompositeEdit((one, two)), "ann"
@@ -182,7 +182,7 @@ class TestWithNoise:
     def test_an_edit_that_places_none_and_a_dataset_without_noise_stay_as_they_are(
         self, make_static
     ) -> None:
-        group, none = make_static(10), set_ball("cam2", None)
+        group, none = make_static(10), make_set_ball_edit("cam2", None)
         assert add_noise_of_actor(FACTORS, group, none, "ann") is none
         placed = SetBalls("cam2", (BALL,), 2.0)
         assert add_noise_of_actor((), group, placed, "ann") is placed
@@ -212,7 +212,7 @@ class TestWithNoise:
     def test_a_preview_keeps_what_the_view_has(self, store: Store, static: int) -> None:
         give(store, *FACTORS)
         key = next(iter(noise(store, static)))
-        group, _ = solve_edited_group(store, static, lambda _group: [set_ball(key, BALL)])
+        group, _ = solve_edited_group(store, static, lambda _group: [make_set_ball_edit(key, BALL)])
         assert group.noise[key] == 2.0
 
 
@@ -229,7 +229,7 @@ class TestReadPlaced:
     ) -> None:
         state = load_group_state(store, static)
         keys = [view.key for view in state.group.views[:2]]
-        edits = [set_ball(key, BALL) for key in keys]
+        edits = [make_set_ball_edit(key, BALL) for key in keys]
         submit_edits(store, static, edits, if_match=state.etag, actor="ann")
         with store.read() as session:
             assert read_last_ball_actors(session, [static]) == {static: dict.fromkeys(keys, "ann")}

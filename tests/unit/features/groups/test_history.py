@@ -6,7 +6,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.groups.edit import SetLines, SetStationLines, set_ball
+from app.features.groups.edit import SetLines, SetStationLines, make_set_ball_edit
 from app.features.groups.history import EntryChanges, read_entry_changes, read_history
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
@@ -27,7 +27,7 @@ class TestReadStep:
         self, store: Store, state
     ) -> None:
         edited = submit_edit(
-            store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ann"
+            store, state.id, make_set_ball_edit("7.png", BALL), if_match=state.etag, actor="ann"
         )
         edited = submit_edit(
             store,

@@ -8,7 +8,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.exports.service import export_dataset
-from app.features.groups.edit import IncludeView, SetLines, set_ball
+from app.features.groups.edit import SetLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -34,7 +34,7 @@ from tests.cameras import SIZE
 from tests.unit.stores import OPPOSITE, drawn
 
 WHY = ViewExclusion("not_same_instant", "the foot is off the ball")
-LEAVE = IncludeView("7_1.png", False, WHY.reason, WHY.note)
+LEAVE = SetViewInclusion("7_1.png", False, WHY.reason, WHY.note)
 
 
 def three_views(group: Group) -> Group:
@@ -71,21 +71,24 @@ class TestIncludeView:
     )
     def test_an_unknown_reason_is_refused(self, make_group, reason, note, sentence) -> None:
         with pytest.raises(InputError, match=sentence):
-            IncludeView("7_1.png", False, reason, note).apply(make_group(7))
+            SetViewInclusion("7_1.png", False, reason, note).apply(make_group(7))
 
     def test_only_a_view_that_is_left_out_has_a_reason(self, make_group) -> None:
         with pytest.raises(InputError, match="left-out"):
-            IncludeView("7_1.png", True, "duplicate_view").apply(make_group(7))
+            SetViewInclusion("7_1.png", True, "duplicate_view").apply(make_group(7))
 
     def test_taking_the_view_in_again_removes_it(self, make_group) -> None:
         group = make_group(7)
         left = LEAVE.apply(group)
         assert left.view("7_1.png").left_out == WHY
-        assert IncludeView("7_1.png", True).apply(left) == group
+        assert SetViewInclusion("7_1.png", True).apply(left) == group
 
     def test_the_inverse_brings_it_back_whole(self, make_group) -> None:
         left = LEAVE.apply(make_group(7))
-        for edit in (IncludeView("7_1.png", True), IncludeView("7_1.png", False, "other", "no")):
+        for edit in (
+            SetViewInclusion("7_1.png", True),
+            SetViewInclusion("7_1.png", False, "other", "no"),
+        ):
             assert edit.inverse(left).apply(edit.apply(left)) == left
 
     def test_an_entry_of_the_log_from_before_reasons_is_read(self, make_group) -> None:
@@ -112,7 +115,7 @@ class TestUndo:
     def test_another_reason_is_an_edit_that_computes_nothing_anew(self, store, state) -> None:
         left = change(store, LEAVE)
         judged = set_verdict(store, 1, "accepted", note="fine", if_match=left.etag, actor="ann")
-        other = change(store, IncludeView("7_1.png", False, "duplicate_view"))
+        other = change(store, SetViewInclusion("7_1.png", False, "duplicate_view"))
         assert why(store) == ViewExclusion("duplicate_view")
         assert other.stored.inputs_hash == left.stored.inputs_hash
         assert (other.verdict.stale, judged.verdict.stale) == (False, False)
@@ -123,11 +126,11 @@ class TestUndo:
 class TestDigests:
     def test_solving_does_not_read_the_reason(self, make_group) -> None:
         group = make_group(7)
-        plain = IncludeView("7_1.png", False).apply(group)
+        plain = SetViewInclusion("7_1.png", False).apply(group)
         assert hash_group_inputs(LEAVE.apply(group)) == hash_group_inputs(plain)
 
     def test_groups_without_a_reason_are_frozen_without_that_field(self, make_group) -> None:
-        group = IncludeView("7_1.png", False).apply(make_group(7))
+        group = SetViewInclusion("7_1.png", False).apply(make_group(7))
         assert "left_out" not in "".join(freeze_annotations(group).texts.values())
         assert hash_imported_group(group) != hash_imported_group(LEAVE.apply(make_group(7)))
 
@@ -136,7 +139,7 @@ class TestVersions:
     def test_a_version_keeps_it_and_comes_out_the_same(self, store, state) -> None:
         change(store, LEAVE)
         version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
-        change(store, IncludeView("7_1.png", False))
+        change(store, SetViewInclusion("7_1.png", False))
         plain = freeze_dataset(store, "demo", FreezeRequest("v2", groups="passing"), actor="ann")
         assert version.hash != plain.hash
         assert verify_version(store, version.id).ok and verify_version(store, plain.id).ok
@@ -198,7 +201,7 @@ class TestFixed:
 
     def test_an_accepted_group_that_fails_is_not_fixed(self, store, state) -> None:
         change(store, LEAVE)
-        change(store, IncludeView("7_2.png", False))
+        change(store, SetViewInclusion("7_2.png", False))
         self.judge(store, "accepted", note="needed")
         assert self.fixed(store) == (False, False)
         give_verdicts(store, 1, "", "accepted", note="all", actor="ben")
@@ -207,7 +210,7 @@ class TestFixed:
     def test_a_group_that_an_edit_makes_fail_is_no_longer_fixed(self, store, state) -> None:
         change(store, LEAVE)
         self.judge(store, "accepted")
-        change(store, set_ball("7.png", None))
+        change(store, make_set_ball_edit("7.png", None))
         assert self.fixed(store) == (False, False)
 
 

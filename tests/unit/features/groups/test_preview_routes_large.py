@@ -13,7 +13,7 @@ from fastapi import FastAPI
 
 from app.errors import OverloadedError
 from app.features.groups.preview_routes import NICENESS, LargeGroupSolver
-from app.features.groups.state import read_record
+from app.features.groups.state import read_group_without_solution
 from app.features.solutions.service import solve_and_encode
 from app.worker_process import COUNTS
 from tests.waiting import SECONDS
@@ -83,7 +83,7 @@ def test_its_process_solves_a_large_edit_as_the_server_does(app, ready, api, mon
 
 def test_a_group_and_its_solution_travel_whole(app: FastAPI, ready) -> None:
     with app.state.services.store.read() as session:
-        stored = read_record(session, 1).stored
+        stored = read_group_without_solution(session, 1).stored
     given = stored.group, stored.policy, {}
     assert ready.solve(solve_and_encode, *given) == solve_and_encode(*given)
 

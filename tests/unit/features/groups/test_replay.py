@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
+from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.group_edits import apply_noise_factors
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -33,9 +33,9 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
     state = load_group_state(store, ids[0])
     ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
     for edit in (
-        set_ball("7.png", ball),
+        make_set_ball_edit("7.png", ball),
         SetLines("7_1.png", {"Middle line": None}),
-        IncludeView("7_1.png", False),
+        SetViewInclusion("7_1.png", False),
     ):
         state = submit_edit(store, ids[0], edit, if_match=state.etag, actor="ann")
     for step in (undo_group_edit, undo_group_edit, redo_group_edit):
@@ -55,7 +55,11 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         )
     state = load_group_state(store, ids[2])
     submit_edit(
-        store, ids[2], set_ball(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
+        store,
+        ids[2],
+        make_set_ball_edit(state.group.views[-1].key, ball),
+        if_match=state.etag,
+        actor="ann",
     )
     _import_changed(store, make_group, make_static)
     import_given_cameras(

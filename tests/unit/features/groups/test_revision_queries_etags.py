@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from app.db.store import Store
 from app.features.groups.revision_queries import find_etag_row, read_etag_rows
-from app.features.verdicts.queries import StoredVerdict, insert_verdicts
+from app.features.verdicts.queries import StoredVerdict, insert_verdicts_and_end_work
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)
 
@@ -11,7 +11,7 @@ class TestHeads:
     def test_name_the_newest_verdict_or_none(self, filled: Store) -> None:
         with filled.write() as session:
             before = find_etag_row(session, 1)
-            insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, [VERDICT], actor="ann", at="t")
             after = find_etag_row(session, 1)
             assert before is not None and after is not None
             assert (before.last, after.last) == (0, 7)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from app.db.store import Store
-from app.features.groups.edit import IncludeView, SetStationLines
+from app.features.groups.edit import SetStationLines, SetViewInclusion
 from app.features.groups.state import (
-    GroupHead,
+    GroupChangeBasis,
     GroupState,
     content_tag_from_etag,
     group_etag,
     read_etags,
-    read_group_head,
+    read_group_change_basis,
 )
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
@@ -29,7 +29,7 @@ class TestReadEtags:
     def test_follows_edits_and_verdicts(self, store: Store, state: GroupState) -> None:
         seen = [state.etag]
         edited = submit_edit(
-            store, state.id, IncludeView("7.png", False), if_match=seen[0], actor="ann"
+            store, state.id, SetViewInclusion("7.png", False), if_match=seen[0], actor="ann"
         )
         seen.append(edited.etag)
         assert etags_of(store, state.id) == {state.id: edited.etag}
@@ -39,7 +39,7 @@ class TestReadEtags:
         assert len(set(seen)) == 3
 
     def test_what_is_undone_is_not_what_it_was(self, store: Store, state: GroupState) -> None:
-        edit = IncludeView("7.png", False)
+        edit = SetViewInclusion("7.png", False)
         edited = submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         undone = undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         assert undone.stored.inputs_hash == state.stored.inputs_hash
@@ -79,7 +79,7 @@ class TestReadEtags:
         self, store: Store, fill, make_group
     ) -> None:
         ids = fill(make_group(7, shift=300.0), make_group(8))
-        edit = IncludeView("8.png", False)
+        edit = SetViewInclusion("8.png", False)
         etag = load_group_state(store, ids[1]).etag
         submit_edit(store, ids[1], edit, if_match=etag, actor="ann")
         # The same group comes with another ball: what a person edited stays, with a finding.
@@ -101,5 +101,7 @@ class TestReadHead:
     ) -> None:
         with store.read() as session:
             said = state.etag.strip('"').partition("-")[0]
-            assert read_group_head(session, state.id) == GroupHead(said, state.policy.hash)
-            assert read_group_head(session, 99) is None
+            assert read_group_change_basis(session, state.id) == GroupChangeBasis(
+                said, state.policy.hash
+            )
+            assert read_group_change_basis(session, 99) is None

@@ -16,7 +16,7 @@ from app.features.groups.state_snapshot_queries import (
 )
 from app.features.paint.proposal_queries import Proposal, read_proposals, save_proposals
 from app.features.predictions.tables import PredictionModel, PredictionSetModel
-from app.features.verdicts.queries import StoredVerdict, insert_verdicts
+from app.features.verdicts.queries import StoredVerdict, insert_verdicts_and_end_work
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)
 
@@ -28,7 +28,7 @@ def proposal(view_id: int) -> Proposal:
 class TestAll:
     def test_everything_that_the_log_can_make_anew_is_read(self, filled: Store, full_group) -> None:
         with filled.write() as session:
-            insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, [VERDICT], actor="ann", at="t")
             upsert_unassigned_frames(session, 1, {("cam1", "99"): b"x"})
             said = {"group_id": 1, "kind": "edited", "sentence": "kept"}
             session.execute(insert(ImportFindingModel), [said])
@@ -55,7 +55,7 @@ def whole(session):
 class TestRewrite:
     def test_rows_are_replaced_while_verdicts_refer_to_them(self, filled: Store) -> None:
         with filled.write() as session:
-            insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, [VERDICT], actor="ann", at="t")
             upsert_unassigned_frames(session, 1, {("cam1", "99"): b"x"})
             stations, groups, views = whole(session)
             label = [{**row, "label": "anew"} for row in groups]

@@ -17,7 +17,13 @@ from app.errors import (
     StorageError,
 )
 from app.features.groups import state as state_module
-from app.features.groups.edit import IncludeView, SetBalls, SetLines, SetPicture, set_ball
+from app.features.groups.edit import (
+    SetBalls,
+    SetLines,
+    SetPictureGeometry,
+    SetViewInclusion,
+    make_set_ball_edit,
+)
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import (
@@ -74,7 +80,7 @@ class TestLoad:
 
 class TestSubmit:
     def test_answers_with_the_group_as_it_is_then_solved(self, store, state) -> None:
-        after = change(store, state, set_ball("7.png", BALL))
+        after = change(store, state, make_set_ball_edit("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)
         assert after.revision == state.revision + 1
         assert after.etag != state.etag
@@ -91,25 +97,25 @@ class TestSubmit:
                 text(f"CREATE TRIGGER spoils BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
             )
         with pytest.raises(StorageError, match="could not carry out"):
-            change(store, state, set_ball("7.png", BALL))
+            change(store, state, make_set_ball_edit("7.png", BALL))
         assert load_group_state(store, state.id) == state
         assert {name: count(store, name) for name in before} == before
 
     def test_an_older_state_is_refused_with_both_etags(self, store, state) -> None:
-        after = change(store, state, set_ball("7.png", BALL))
+        after = change(store, state, make_set_ball_edit("7.png", BALL))
         with pytest.raises(StaleRevisionError) as caught:
-            change(store, state, set_ball("7.png", None))
+            change(store, state, make_set_ball_edit("7.png", None))
         assert caught.value.base_etag == state.etag
         assert caught.value.current_etag == after.etag
         assert load_group_state(store, state.id) == after
 
     def test_a_change_during_the_solve_is_seen_before_saving(self, store, state) -> None:
         def slow(group, policy, calibrations):
-            change(store, load_group_state(store, state.id), IncludeView("7_1.png", False))
+            change(store, load_group_state(store, state.id), SetViewInclusion("7_1.png", False))
             return solve_and_encode(group, policy, calibrations)
 
         with pytest.raises(StaleRevisionError):
-            change(store, state, set_ball("7.png", BALL), solve=slow)
+            change(store, state, make_set_ball_edit("7.png", BALL), solve=slow)
         after = load_group_state(store, state.id)
         assert after.group.view("7.png") == state.group.view("7.png")
         assert not after.group.view("7_1.png").included
@@ -120,7 +126,7 @@ class TestSubmit:
                 change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
             return solve_and_encode(group, policy, calibrations)
 
-        after = change(store, state, set_ball("7.png", BALL), solve=slow)
+        after = change(store, state, make_set_ball_edit("7.png", BALL), solve=slow)
         assert after.policy == STRICT
         assert after.solution == solve_group(after.group, STRICT)
         assert load_group_state(store, state.id) == after
@@ -132,7 +138,7 @@ class TestSubmit:
         def work(number: int) -> None:
             ball = BallAnnotation(box=Box(number, 300.0, 14.0, 14.0))
             try:
-                results.append(change(store, state, set_ball("7.png", ball)))
+                results.append(change(store, state, make_set_ball_edit("7.png", ball)))
             except StaleRevisionError as error:
                 results.append(error)
 
@@ -148,15 +154,15 @@ class TestSubmit:
         assert len(read_history(store, state.id)) == 2
 
     def test_two_views_of_one_group_at_once_are_a_conflict_too(self, store, state) -> None:
-        change(store, state, set_ball("7.png", BALL))
+        change(store, state, make_set_ball_edit("7.png", BALL))
         with pytest.raises(StaleRevisionError):
-            change(store, state, set_ball("7_1.png", BALL))
+            change(store, state, make_set_ball_edit("7_1.png", BALL))
 
     def test_a_solution_that_arrives_is_no_conflict(self, store, fill, make_group) -> None:
         unsolved = load_group_state(store, fill(make_group(), solved=False)[0])
         with_solution = solve_and_store_group(store, unsolved.id)
         assert with_solution.etag != unsolved.etag
-        after = change(store, unsolved, set_ball("7.png", BALL))
+        after = change(store, unsolved, make_set_ball_edit("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)
 
     def test_what_changes_nothing_makes_no_revision(self, store, state) -> None:
@@ -169,7 +175,7 @@ class TestSubmit:
         with pytest.raises(SharedStationError) as caught:
             change(store, state, SetLines("cam1", {"Middle line": HERE}))
         assert caught.value.station == state.station_ids["cam1"]
-        after = change(store, state, set_ball("cam1", None))
+        after = change(store, state, make_set_ball_edit("cam1", None))
         assert after.group.view("cam1").balls == ()
 
     def test_the_picture_of_a_shared_station_is_as_it_was_taken(
@@ -179,21 +185,21 @@ class TestSubmit:
         with pytest.raises(
             SharedStationError, match="picture geometry of view cam1 cannot be set"
         ) as caught:
-            change(store, state, SetPicture("cam1", OPEN))
+            change(store, state, SetPictureGeometry("cam1", OPEN))
         assert "given camera" in str(caught.value.hint)
         with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set"):
-            solve_edited_group(store, state.id, lambda _group: [SetPicture("cam1", OPEN)])
+            solve_edited_group(store, state.id, lambda _group: [SetPictureGeometry("cam1", OPEN)])
 
     def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:
         def refuse(*_):
             raise AssertionError("calibrated again")
 
         monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
-        after = change(store, state, set_ball("7.png", BALL))
+        after = change(store, state, make_set_ball_edit("7.png", BALL))
         undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
 
     def test_the_queue_is_in_step(self, store, state) -> None:
-        after = change(store, state, set_ball("7.png", None))
+        after = change(store, state, make_set_ball_edit("7.png", None))
         (row,) = list_groups(store, state.dataset_id).items
         assert row.passes is False
         assert row.gate == after.solution.first_failing.name == "ball"
@@ -202,7 +208,7 @@ class TestSubmit:
 
 class TestPreview:
     def test_is_what_a_save_would_give_and_saves_nothing(self, store, state) -> None:
-        edits = [set_ball("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
+        edits = [make_set_ball_edit("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
         _, solution = solve_edited_group(store, state.id, lambda _: edits)
         assert load_group_state(store, state.id) == state
         after = state
@@ -237,7 +243,7 @@ class TestCost:
             return plain(*arguments)
 
         monkeypatch.setattr(solutions, "attach_calibrations", counted)
-        edit = set_ball("7.png", None)
+        edit = make_set_ball_edit("7.png", None)
         done = submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         assert decoded == []
         read = load_group_state(store, state.id)
@@ -251,9 +257,9 @@ class TestCost:
     @pytest.mark.parametrize(
         ("edit", "statements"),
         [
-            (set_ball("7.png", BALL), 13),
+            (make_set_ball_edit("7.png", BALL), 13),
             (SetLines("7.png", {"Middle line": None}), 14),
-            (IncludeView("8.png", False), 13),
+            (SetViewInclusion("8.png", False), 13),
         ],
     )
     def test_an_edit_of_four_views_is_one_read_and_one_durable_commit(
@@ -268,7 +274,7 @@ class TestCost:
     def test_an_undo_reads_one_entry_more(
         self, store: Store, state: GroupState, counted: Counted
     ) -> None:
-        after = change(store, state, set_ball("7.png", BALL))
+        after = change(store, state, make_set_ball_edit("7.png", BALL))
         with counted(store) as cost:
             undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
         assert (cost.reads, cost.writes, cost.commits) == (1, 1, 1)
@@ -278,7 +284,7 @@ class TestCost:
         self, store: Store, state: GroupState, counted: Counted
     ) -> None:
         with counted(store) as cost:
-            solve_edited_group(store, state.id, lambda _: [set_ball("7.png", BALL)])
+            solve_edited_group(store, state.id, lambda _: [make_set_ball_edit("7.png", BALL)])
         assert (cost.reads, cost.writes) == (1, 0)
         assert cost.statements <= 2
 
@@ -301,5 +307,7 @@ class TestCost:
 
         monkeypatch.setattr(Store, "write", write)
         monkeypatch.setattr(state_module, "read_groups", read_groups)
-        submit_edit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7.png", None), if_match=state.etag, actor="ann"
+        )
         assert seen == [False]

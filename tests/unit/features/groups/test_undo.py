@@ -6,7 +6,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, set_ball
+from app.features.groups.edit import Edit, SetBalls, SetLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import submit_edit
@@ -24,11 +24,11 @@ def edited(store: Store, state: GroupState, edit: Edit) -> GroupState:
 class TestUndo:
     def test_steps_back_and_forth_across_views(self, store, state) -> None:
         edits = [
-            set_ball("7.png", BALL),
+            make_set_ball_edit("7.png", BALL),
             SetLines("7_1.png", {"Middle line": None}),
-            IncludeView("7_1.png", False),
+            SetViewInclusion("7_1.png", False),
             # More steps, there and back, than are read of a history at first.
-            *(IncludeView("7_1.png", included) for included in (True, False, True)),
+            *(SetViewInclusion("7_1.png", included) for included in (True, False, True)),
         ]
         states = [state]
         for edit in edits:
@@ -47,17 +47,17 @@ class TestUndo:
         assert not now.can_redo
 
     def test_a_fresh_edit_clears_redo(self, store, state) -> None:
-        after = edited(store, state, set_ball("7.png", BALL))
+        after = edited(store, state, make_set_ball_edit("7.png", BALL))
         back = undo_group_edit(store, state.id, if_match=after.etag, actor="ann")
         assert back.can_redo
-        fresh = edited(store, back, set_ball("7.png", None))
+        fresh = edited(store, back, make_set_ball_edit("7.png", None))
         assert fresh.can_undo
         assert not fresh.can_redo
         with pytest.raises(ConflictError, match="nothing to redo"):
             redo_group_edit(store, state.id, if_match=fresh.etag, actor="ann")
 
     def test_survives_a_restart(self, store, state) -> None:
-        after = edited(store, state, set_ball("7.png", BALL))
+        after = edited(store, state, make_set_ball_edit("7.png", BALL))
         with closing(Store.open(store.settings)) as other:
             back = undo_group_edit(other, state.id, if_match=after.etag, actor="ben")
         assert back.group == state.group
@@ -68,7 +68,7 @@ class TestUndo:
             undo_group_edit(store, state.id, if_match=state.etag, actor="ann")
 
     def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
-        after = edited(store, state, set_ball("7.png", BALL))
+        after = edited(store, state, make_set_ball_edit("7.png", BALL))
         undo_group_edit(store, state.id, if_match=after.etag, actor="ben")
         entries = read_history(store, state.id)
         assert [(item.kind, item.actor) for item in entries] == [
@@ -81,6 +81,6 @@ class TestUndo:
 
     def test_several_balls_come_back(self, store, state) -> None:
         two = edited(store, state, SetBalls("7.png", (BALL, BALL)))
-        picked = edited(store, two, set_ball("7.png", BALL))
+        picked = edited(store, two, make_set_ball_edit("7.png", BALL))
         back = undo_group_edit(store, state.id, if_match=picked.etag, actor="ann")
         assert back.group.view("7.png").balls == (BALL, BALL)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import OverloadedError
-from app.features.groups.edit import SetLines, set_ball
+from app.features.groups.edit import SetLines, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -76,7 +76,7 @@ class TestFollow:
 
     def test_an_edit_of_a_ball_looks_at_no_picture(self, painted, paint, looked):
         view = load_group_state(painted, 1).group.views[0]
-        change(painted, paint, set_ball(view.key, None))
+        change(painted, paint, make_set_ball_edit(view.key, None))
         assert looked == []
         assert [entry.kind for entry in read_history(painted, 1)][-1] == "edit"
 
@@ -137,8 +137,10 @@ class TestFollow:
         gone = SetLines(view.key, dict.fromkeys([*view.station.lines][1:]))
         after = change(painted, paint, gone)
         assert after.solution.views[0].calibration.camera is None
-        monkeypatch.setattr(Frames, "request_work", lambda *_: pytest.fail("a picture was asked for"))
-        change(painted, paint, set_ball(view.key, None))
+        monkeypatch.setattr(
+            Frames, "request_work", lambda *_: pytest.fail("a picture was asked for")
+        )
+        change(painted, paint, make_set_ball_edit(view.key, None))
 
     def test_a_view_that_gets_its_first_lines_is_read_with_the_others(
         self, painted, paint, monkeypatch
@@ -149,7 +151,9 @@ class TestFollow:
         bare = replace(state.group, paint=paint_of)
         policy = state.stored.policy.calibration
         assert set(paint.update_paint(bare, policy, {}).paint) == set(state.group.paint)
-        monkeypatch.setattr(Frames, "request_work", lambda *_: pytest.fail("a picture was asked for"))
+        monkeypatch.setattr(
+            Frames, "request_work", lambda *_: pytest.fail("a picture was asked for")
+        )
         without = bare.with_view(replace(view, media=None))
         assert paint.update_paint(without, policy, {}) is without
 

@@ -18,8 +18,8 @@ from app.features.groups.view_routes import (
     CLIENT_GONE,
     MAX_WIDTH,
     MIN_WIDTH,
-    clamp_width,
-    get_neighbours,
+    get_neighbour_frames,
+    round_up_and_clamp_width,
 )
 from app.features.imports.ingest import import_groups
 from app.soccer.group import Media
@@ -336,7 +336,7 @@ class TestImage:
                 return True
 
         async def ask() -> int:
-            answer = await get_neighbours(view, app.state.services, Gone())
+            answer = await get_neighbour_frames(view, app.state.services, Gone())
             return answer.status_code
 
         assert asyncio.run(asyncio.wait_for(ask(), 20)) == CLIENT_GONE
@@ -345,6 +345,9 @@ class TestImage:
 
 class TestClampWidth:
     def test_widths_are_rounded_up_to_few_sizes(self) -> None:
-        assert {clamp_width(width) for width in range(200, 210)} == {208, 224}
-        assert clamp_width(None) is None
-        assert (clamp_width(1), clamp_width(10**5)) == (MIN_WIDTH, MAX_WIDTH)
+        assert {round_up_and_clamp_width(width) for width in range(200, 210)} == {208, 224}
+        assert round_up_and_clamp_width(None) is None
+        assert (round_up_and_clamp_width(1), round_up_and_clamp_width(10**5)) == (
+            MIN_WIDTH,
+            MAX_WIDTH,
+        )

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
@@ -60,7 +60,7 @@ class TestNoteGone:
     def test_an_edit_stays_and_the_log_replays(self, store, three, make_group) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
         etag = load_group_state(store, three[1]).etag
-        submit_edit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
+        submit_edit(store, three[1], make_set_ball_edit("8.png", ball), if_match=etag, actor="ben")
         bring(store, [make_group(7)])
         state = load_group_state(store, three[1])
         assert (state.group.view("8.png").ball, state.stored.edited_views) == (ball, {"8.png"})

@@ -16,11 +16,11 @@ from app.features.exports.service import export_dataset
 from app.features.findings.queries import list_group_findings
 from app.features.findings.service import FindingReference, set_dismissal
 from app.features.groups.edit import (
-    IncludeView,
     SetLines,
     SetStationCamera,
     SetStationLines,
-    set_ball,
+    SetViewInclusion,
+    make_set_ball_edit,
 )
 from app.features.groups.history import read_history
 from app.features.groups.replay import replay_log
@@ -110,9 +110,9 @@ def busy(store, once, fill, make_group, make_static, opposite):
 
     def make():
         ids = fill(make_group(7), make_group(8), make_group(9, shift=80.0), make_static(10))
-        edit(store, ids[0], set_ball("7.png", BALL))
+        edit(store, ids[0], make_set_ball_edit("7.png", BALL))
         edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
-        edit(store, ids[1], IncludeView("8_1.png", False))
+        edit(store, ids[1], SetViewInclusion("8_1.png", False))
         undo_group_edit(store, ids[1], if_match=load_group_state(store, ids[1]).etag, actor="ben")
         judge(store, ids[0], "deferred", actor="ben")
         judge(store, ids[1], "accepted")
@@ -201,7 +201,7 @@ def both(store, there, fill, make_group, make_static):
 class TestMerge:
     def test_what_nobody_edited_here_follows_the_other_installation(self, both, bring) -> None:
         here, there = both
-        edit(there, 1, set_ball("7.png", BALL))
+        edit(there, 1, make_set_ball_edit("7.png", BALL))
         assert bring(there, here).changed == 1
         assert ball_of(here, 1, "7.png") == BALL
         assert load_group_state(here, 1).group.view("7.png").media is not None
@@ -210,21 +210,21 @@ class TestMerge:
 
     def test_what_was_edited_here_alone_stays(self, both, bring) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         assert bring(there, here).unchanged == 2
         assert ball_of(here, 1, "7.png") == BALL
 
     def test_two_views_edited_in_two_places_come_together(self, both, bring) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
-        edit(there, 1, set_ball("7_1.png", OTHER))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
+        edit(there, 1, make_set_ball_edit("7_1.png", OTHER))
         assert bring(there, here).findings == 0
         assert (ball_of(here, 1, "7.png"), ball_of(here, 1, "7_1.png")) == (BALL, OTHER)
 
     def test_a_conflict_keeps_the_edit_here_and_is_a_finding_once(self, both, bring) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
-        edit(there, 1, set_ball("7.png", OTHER))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
+        edit(there, 1, make_set_ball_edit("7.png", OTHER))
         assert bring(there, here).findings == 1
         assert ball_of(here, 1, "7.png") == BALL
         (sentence,) = findings(here, 1)
@@ -237,14 +237,14 @@ class TestMerge:
     def test_the_same_edit_in_both_is_no_conflict(self, both, bring) -> None:
         here, there = both
         for home in both:
-            edit(home, 1, set_ball("7.png", BALL))
+            edit(home, 1, make_set_ball_edit("7.png", BALL))
         assert bring(there, here).findings == 0
 
     def test_an_installation_that_is_behind_follows_and_one_ahead_stays(self, both, bring) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         bring(here, there)
-        edit(there, 1, set_ball("7.png", OTHER))
+        edit(there, 1, make_set_ball_edit("7.png", OTHER))
         assert bring(here, there).findings == 0
         assert ball_of(there, 1, "7.png") == OTHER
         assert bring(there, here, "back.zip").findings == 0
@@ -253,7 +253,7 @@ class TestMerge:
     def test_an_edit_that_was_taken_back_is_taken_back_everywhere(self, both, bring) -> None:
         here, there = both
         before = ball_of(here, 1, "7.png")
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         bring(here, there)
         undo_group_edit(here, 1, if_match=load_group_state(here, 1).etag, actor="ann")
         bring(here, there)
@@ -263,7 +263,7 @@ class TestMerge:
     def test_lines_of_a_view_merge_like_balls(self, both, bring) -> None:
         here, there = both
         edit(there, 1, SetLines("7.png", {"Middle line": None}))
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         bring(there, here)
         view = load_group_state(here, 1).group.view("7.png")
         assert ("Middle line" in view.station.lines, view.ball) == (False, BALL)
@@ -294,7 +294,7 @@ class TestMerge:
 
     def test_a_newer_state_of_the_source_comes_along(self, both, bring, make_group) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         newer = make_group(7, ball=(6.0, 2.0, -0.5))
         import_groups(there, "demo", [newer], source="test", actor="zoe")
         assert bring(there, here).findings == 1
@@ -307,7 +307,7 @@ class TestMerge:
         here, there = both
         newer = make_group(7, ball=(6.0, 2.0, -0.5))
         import_groups(here, "demo", [newer], source="test", actor="ann")
-        edit(there, 1, set_ball("7_1.png", OTHER))
+        edit(there, 1, make_set_ball_edit("7_1.png", OTHER))
         assert bring(there, here).findings == 1
         assert ball_of(here, 1, "7.png") == newer.view("7.png").ball
         assert ball_of(here, 1, "7_1.png") == OTHER
@@ -348,7 +348,7 @@ class TestVerdicts:
 
     def test_a_verdict_on_another_state_is_stale(self, both, bring) -> None:
         here, there = both
-        edit(here, 1, set_ball("7.png", BALL))
+        edit(here, 1, make_set_ball_edit("7.png", BALL))
         judge(there, 1, "accepted")
         bring(there, here)
         assert load_group_state(here, 1).verdict.stale
@@ -365,7 +365,7 @@ class TestDismissals:
     def test_what_was_dismissed_is_carried_and_the_newest_counts(self, both, bring) -> None:
         here, there = both
         for store in both:
-            edit(store, 1, set_ball("7.png", BALL))
+            edit(store, 1, make_set_ball_edit("7.png", BALL))
         self.dismiss(there, "ben")
         bring(there, here)
         said = load_group_state(here, 1).dismissed[0]

@@ -8,7 +8,7 @@ from sqlalchemy import text
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
-from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
+from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
@@ -193,7 +193,9 @@ class TestAChangedSource:
         self, store: Store, fill, state: GroupState, make_group
     ) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit_edit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7.png", ball), if_match=state.etag, actor="ann"
+        )
         report = again(store, with_ball(make_group(), "7.png", 300.0))
         after = load_group_state(store, state.id)
         assert (report.changed, report.findings) == (1, 1)
@@ -207,7 +209,7 @@ class TestAChangedSource:
     def test_importing_the_changed_source_again_finds_nothing_new(
         self, store, fill, state, make_group
     ) -> None:
-        edit = IncludeView("7.png", False)
+        edit = SetViewInclusion("7.png", False)
         submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)
         again(store, changed)
@@ -220,7 +222,7 @@ class TestAChangedSource:
     def test_another_view_follows_beside_an_edited_one(
         self, store, fill, state, make_group
     ) -> None:
-        edit = set_ball("7.png", None)
+        edit = make_set_ball_edit("7.png", None)
         submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         changed = with_ball(make_group(), "7_1.png", 300.0)
         report = again(store, changed)
@@ -230,7 +232,7 @@ class TestAChangedSource:
         assert after.group.view("7_1.png") == changed.view("7_1.png")
 
     def test_lines_follow_beside_an_edited_ball(self, store, fill, state, make_group) -> None:
-        edit = set_ball("7.png", None)
+        edit = make_set_ball_edit("7.png", None)
         submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
         view = make_group().views[0]
         lines = make_lines({"Middle line": [(1.0, 2.0), (3.0, 4.0)]})
@@ -244,7 +246,7 @@ class TestAChangedSource:
         self, store, fill, state, make_group
     ) -> None:
         edited = submit_edit(
-            store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann"
+            store, state.id, make_set_ball_edit("7.png", None), if_match=state.etag, actor="ann"
         )
         undo_group_edit(store, state.id, if_match=edited.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)
@@ -256,7 +258,9 @@ class TestAChangedSource:
     ) -> None:
         agreed = with_ball(make_group(), "7.png", 333.0)
         ball = agreed.view("7.png").balls[0]
-        submit_edit(store, state.id, set_ball("7.png", ball), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7.png", ball), if_match=state.etag, actor="ann"
+        )
         again(store, with_ball(make_group(), "7.png", 300.0))
         again(store, agreed)
         assert rows(store)["import_finding"] == 0
@@ -270,7 +274,7 @@ class TestAChangedSource:
         again(store, make_group())
         back = load_group_state(store, state.id)
         assert back.group == make_group()
-        edit = set_ball("7_1.png", None)
+        edit = make_set_ball_edit("7_1.png", None)
         submit_edit(store, state.id, edit, if_match=back.etag, actor="ann")
         report = again(store, one)
         assert report.findings == 1
@@ -280,7 +284,9 @@ class TestAChangedSource:
     def test_views_that_people_edited_do_not_add_up_beyond_what_a_group_may_have(
         self, store, state, make_group, monkeypatch
     ) -> None:
-        submit_edit(store, state.id, set_ball("7_1.png", None), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7_1.png", None), if_match=state.etag, actor="ann"
+        )
         before = load_group_state(store, state.id).group
         monkeypatch.setattr("app.features.imports.ingest.MAX_VIEWS", 2)
         view = make_group().views[0]

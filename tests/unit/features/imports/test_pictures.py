@@ -11,7 +11,7 @@ from app.errors import InputError
 from app.features.datasets.service import get_dataset
 from app.features.groups.submit import load_group_state
 from app.features.queue.service import list_groups
-from app.features.verdicts.bulk import NO_PICTURE, Refusal, give_verdicts, plan_verdicts
+from app.features.verdicts.bulk import NO_PICTURE, RefusedGroups, give_verdicts, plan_verdicts
 from app.features.verdicts.service import set_verdict
 from app.soccer.group import Group
 
@@ -85,9 +85,9 @@ class TestBulk:
     ) -> None:
         dataset = get_dataset(store, "demo").id
         plan = plan_verdicts(store, dataset, "", "accepted")
-        assert (plan.would_change, plan.refused) == (2, (Refusal(NO_PICTURE, 1),))
+        assert (plan.would_change, plan.refused) == (2, (RefusedGroups(NO_PICTURE, 1),))
         done = give_verdicts(store, dataset, "", "accepted", actor="ann")
-        assert (done.changed, done.refused) == (2, (Refusal(NO_PICTURE, 1),))
+        assert (done.changed, done.refused) == (2, (RefusedGroups(NO_PICTURE, 1),))
         done = give_verdicts(store, dataset, "", "accepted", note="seen on tape", actor="ann")
         assert done.refused == ()
         assert load_group_state(store, ids[2]).verdict.state == "accepted"

@@ -9,7 +9,7 @@ from app.features.imports.queries import (
     list_shared_stations,
     list_verdicts_of_groups,
 )
-from app.features.verdicts.queries import StoredVerdict, insert_verdicts
+from app.features.verdicts.queries import StoredVerdict, insert_verdicts_and_end_work
 
 VALUES = ("ann", "t", "rejected", "bad", None, "i", "p", False, None)
 
@@ -53,5 +53,5 @@ class TestGroupVerdicts:
         second = first | {"state": "accepted", "reason": None, "fixed": True}
         with filled.write() as session:
             given = [StoredVerdict(1, 1, **first), StoredVerdict(2, 1, **second)]
-            insert_verdicts(session, 1, given, actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, given, actor="ann", at="t")
             assert list_verdicts_of_groups(session, [1, 2]) == {1: [first, second]}

@@ -20,7 +20,7 @@ from app.features.imports.jobs import resume_imports
 from app.features.imports.queries import list_shared_stations
 from app.features.imports.upload_queries import get_upload
 from app.features.jobs.queries import NewJob, insert_job, update_job
-from app.features.solve.jobs import resume_solving
+from app.features.solve.jobs import register_solve_resume
 from app.formats.issia_writer import write_issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.soccer.group import Group
@@ -222,7 +222,7 @@ class TestStartImport:
             identity = insert_job(session, NewJob("import", "Import", "ann", None, request))
             update_job(session, identity, state="running")
         resume_imports(services.jobs, services.store, services.settings)
-        resume_solving(services.jobs, services.store)
+        register_solve_resume(services.jobs, services.store)
         services.jobs.start()
         job = services.jobs.wait(identity, SECONDS)
         assert (job.state, job.result["new"]) == ("done", 1)

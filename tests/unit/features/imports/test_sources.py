@@ -17,7 +17,7 @@ from app.errors import InputError
 from app.features.datasets.service import dataset_id, get_dataset, list_datasets
 from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export_dataset
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import (
     UnassignedFrame,
@@ -299,7 +299,7 @@ class TestDryRun:
         first = list_groups(store, get_dataset(store, "demo").id, limit=1).items[0].id
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
         state = load_group_state(store, first)
-        submit_edit(store, first, set_ball(state.group.views[0].key, ball), if_match=state.etag,
+        submit_edit(store, first, make_set_ball_edit(state.group.views[0].key, ball), if_match=state.etag,
                actor="ben")  # fmt: skip
         labels = json.loads(root.read_text())
         for number in (1, 2):

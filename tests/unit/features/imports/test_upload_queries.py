@@ -21,11 +21,11 @@ from app.features.imports.upload_queries import (
     UploadWriter,
     delete_upload,
     expire_uploads,
+    find_complete_upload_path,
     get_upload,
     list_uploads,
     make_safe_file_name,
     mark_upload_permanent,
-    upload_path,
 )
 
 THEN = "2030-01-01T00:00:00+00:00"
@@ -66,7 +66,7 @@ def make_old(folder: Path) -> None:
 class TestUploadWriter:
     def test_an_upload_is_whole_under_its_own_name(self, settings: Settings) -> None:
         upload = send(settings)
-        path = upload_path(settings, upload.id)
+        path = find_complete_upload_path(settings, upload.id)
         assert (path.name, path.read_bytes()) == ("a.zip", b"content")
         assert get_upload(settings, upload.id) == upload
         assert (upload.bytes, upload.kept) == (7, False)
@@ -95,7 +95,7 @@ class TestUploadWriter:
         said = {"id": "a" * 32, "name": "/etc/passwd", "bytes": 1, "created": "2030-01-01"}
         upload = send(settings, "upload.json", json.dumps(said).encode()[:90])
         assert get_upload(settings, upload.id) == upload
-        path = upload_path(settings, upload.id)
+        path = find_complete_upload_path(settings, upload.id)
         assert (path.name, path.read_bytes()) == ("upload.json", json.dumps(said).encode()[:90])
 
     def test_it_is_nowhere_before_it_is_complete(
@@ -230,7 +230,7 @@ class TestUploadPath:
     def test_an_impossible_id_finds_nothing(self, settings: Settings, upload_id: str) -> None:
         send(settings)
         with pytest.raises(NotFoundError):
-            upload_path(settings, upload_id)
+            find_complete_upload_path(settings, upload_id)
 
 
 class TestGetUpload:
@@ -253,7 +253,7 @@ class TestGetUpload:
         record = settings.uploads / upload.id / "upload.json"
         record.write_text(json.dumps({**json.loads(record.read_text()), field: said}))
         with pytest.raises(NotFoundError):
-            upload_path(settings, upload.id)
+            find_complete_upload_path(settings, upload.id)
         assert list_uploads(settings) == []
 
     def test_one_of_an_earlier_version_has_its_file_beside_the_record(
@@ -264,7 +264,7 @@ class TestGetUpload:
         (folder / "a.zip").write_bytes(b"content")
         said = {"id": "c" * 32, "name": "a.zip", "bytes": 7, "created": THEN, "kept": True}
         (folder / "upload.json").write_text(json.dumps(said))
-        assert upload_path(settings, "c" * 32).read_bytes() == b"content"
+        assert find_complete_upload_path(settings, "c" * 32).read_bytes() == b"content"
         assert [item.name for item in list_uploads(settings)] == ["a.zip"]
 
 
@@ -347,7 +347,7 @@ class TestDeleteUpload:
         assert (ann.id, ben.by) == (ben.id, ("ann", "ben"))
         delete_upload(settings, ann.id, "ann".__eq__)
         assert get_upload(settings, ann.id).by == ("ben",)
-        assert upload_path(settings, ann.id).read_bytes() == b"content"
+        assert find_complete_upload_path(settings, ann.id).read_bytes() == b"content"
         delete_upload(settings, ann.id, "ben".__eq__)
         assert list_uploads(settings) == []
 

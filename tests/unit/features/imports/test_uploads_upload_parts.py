@@ -18,9 +18,9 @@ from app.features.imports.upload_queries import (
     Upload,
     delete_upload,
     expire_uploads,
+    find_complete_upload_path,
     get_upload,
     list_uploads,
-    upload_path,
 )
 from app.features.imports.upload_quota import count_used_bytes
 from app.features.imports.uploads import PartWriter, begin_upload_in_parts
@@ -55,7 +55,7 @@ class TestBeginInParts:
         send(settings, upload, 4000, len(FILM))
         whole = begin(settings)
         assert (whole.id, whole.bytes) == (upload.id, len(FILM))
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_another_file_or_another_persons_is_another_upload(self, settings: Settings) -> None:
         ids = {
@@ -105,7 +105,7 @@ class TestPartWriter:
         with pytest.raises(ConflictError, match=r"begins at byte 7,001, and only 7,000 bytes"):
             send(settings, upload, 7001, 8000)
         assert send(settings, upload, 7000, len(FILM)).bytes == len(FILM)
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_two_windows_at_once_make_one_file(self, settings: Settings) -> None:
         upload = begin(settings)
@@ -114,7 +114,7 @@ class TestPartWriter:
             one.write(FILM[first : first + 1000])
             other.write(FILM[first : first + 1000])
         assert other.finish().bytes == len(FILM)
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_more_than_was_said_is_refused_and_what_is_here_stays(self, settings: Settings) -> None:
         upload = send(settings, begin(settings, size=4000), 0, 3000)
@@ -128,14 +128,14 @@ class TestPartWriter:
             file.write(b"half of a part, when the server was killed")
         assert begin(settings).bytes == 4000
         send(settings, upload, 4000, len(FILM))
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_a_copy_of_a_home_may_have_less_than_its_record_says(self, settings: Settings) -> None:
         upload = send(settings, begin(settings), 0, 4000)
         os.truncate(settings.uploads / upload.id / "content" / "final.mp4", 2500)
         assert begin(settings).bytes == 2500
         send(settings, upload, 2500, len(FILM))
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_every_byte_is_on_the_disk_before_it_is_acknowledged(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
@@ -165,7 +165,7 @@ class TestPartWriter:
         path = settings.uploads / upload.id / "content" / "final.mp4"
         assert (path.stat().st_size, begin(settings).bytes) == (4000, 4000)
         send(settings, upload, 4000, len(FILM))
-        assert upload_path(settings, upload.id).read_bytes() == FILM
+        assert find_complete_upload_path(settings, upload.id).read_bytes() == FILM
 
     def test_a_part_that_the_disk_takes_half_of_is_taken_back(self, settings: Settings) -> None:
         upload = send(settings, begin(settings), 0, 4000)
@@ -190,7 +190,7 @@ class TestPartWriter:
     def test_nothing_uses_what_is_not_whole(self, settings: Settings) -> None:
         upload = send(settings, begin(settings), 0, 4000)
         with pytest.raises(ConflictError, match=r"only 4,000 of 10,240 bytes of final\.mp4"):
-            upload_path(settings, upload.id)
+            find_complete_upload_path(settings, upload.id)
 
 
 class TestUpkeep:

@@ -8,7 +8,7 @@ import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.annotation_distance import polyline_distance
-from app.features.groups.edit import SetLines, set_ball
+from app.features.groups.edit import SetLines, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.independent_annotations.adopt import return_annotation
@@ -80,7 +80,12 @@ class TestStartWith:
         with store.read() as session:
             truth = read_gold_truth(session, state.id)
         view = state.group.views[0]
-        change(store, state.id, set_ball(view.key, BallAnnotation(box=Box(1, 1, 9, 9))), "ann")
+        change(
+            store,
+            state.id,
+            make_set_ball_edit(view.key, BallAnnotation(box=Box(1, 1, 9, 9))),
+            "ann",
+        )
         changed = set_gold_start(store, state.id, "without_balls", actor="max")
         assert changed == replace(marked, start="without_balls")
         assert read_gold_report(store, state.dataset_id).groups == (changed,)
@@ -144,7 +149,7 @@ class TestReadReport:
                 view = group.views[0]
                 box = view.balls[0].box
                 moved = BallAnnotation(box=Box(box.x + 3.0, box.y + 4.0, box.width, box.height))
-                change(store, take.copy_id, set_ball(view.key, moved), "ann")
+                change(store, take.copy_id, make_set_ball_edit(view.key, moved), "ann")
                 name = next(iter(view.station.lines))
                 gone = SetLines(view.key, {name: None})
                 change(store, take.copy_id, gone, "ann")
@@ -176,13 +181,13 @@ class TestReadReport:
         view = load_group_state(store, take.copy_id).group.views[0]
         box = view.balls[0].box
         wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
-        change(store, take.copy_id, set_ball(view.key, wrong), "ann")
+        change(store, take.copy_id, make_set_ball_edit(view.key, wrong), "ann")
         submit_annotation(store, take.id, actor="ann")
         (first,) = read_gold_report(store, terms.dataset_id).people[0].results
         assert (first.error.ball_px, first.submissions) == (pytest.approx(30.0), 1)
         return_annotation(store, take.id, "look again", actor="lea")
         assert read_gold_report(store, terms.dataset_id).people[0].results == (first,)
-        change(store, take.copy_id, set_ball(view.key, view.balls[0]), "ann")
+        change(store, take.copy_id, make_set_ball_edit(view.key, view.balls[0]), "ann")
         judge(store, take.copy_id, actor="ann")
         (second,) = read_gold_report(store, terms.dataset_id).people[0].results
         assert second == replace(first, submissions=2)

@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, get_batch, make_batch
 from app.features.datasets.service import get_dataset
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
@@ -63,7 +63,7 @@ def annotate(store: Store, copy: int, dx: float, dy: float) -> None:
     view = state.group.views[0]
     at = view.balls[0].center
     ball = BallAnnotation(point=ImagePoint(at.x + dx, at.y + dy))
-    submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor="ann")
+    submit_edit(store, copy, make_set_ball_edit(view.key, ball), if_match=state.etag, actor="ann")
 
 
 class TestGoldInAFilm:

@@ -16,7 +16,7 @@ from app.features.audit.service import read_audit
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import NewBatch, change_batch, make_batch
-from app.features.groups.edit import SetLines, set_ball
+from app.features.groups.edit import SetLines, make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.gold import TruthSource, read_gold_report, set_gold_start
@@ -89,7 +89,11 @@ def drawn_as_it_is(store: Store, copy: int, scene, aside: float) -> None:
         box = Box(x + aside - d / 2, y - d / 2, d, d)
         etag = load_group_state(store, copy).etag
         submit_edit(
-            store, copy, set_ball(mine.key, BallAnnotation(box=box)), if_match=etag, actor="ann"
+            store,
+            copy,
+            make_set_ball_edit(mine.key, BallAnnotation(box=box)),
+            if_match=etag,
+            actor="ann",
         )
 
 
@@ -163,7 +167,7 @@ class TestVersion:
         key = load_group_state(store, 2).group.views[0].key
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
         frozen = load_group_state(store, 2)
-        submit_edit(store, 2, set_ball(key, ball), if_match=frozen.etag, actor="cy")
+        submit_edit(store, 2, make_set_ball_edit(key, ball), if_match=frozen.etag, actor="cy")
         choice = GoldChoice(TruthSource.VERSION, version="v1")
         assert mark_groups_with_known_truth(store, "demo", choice, actor="lea").groups == (2,)
         take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)

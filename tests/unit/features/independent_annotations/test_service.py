@@ -10,7 +10,7 @@ from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.features.batches.own_annotations import count_own_groups_left
 from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
-from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
+from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
@@ -116,7 +116,7 @@ class TestBeginTake:
 
     def test_the_log_has_it_and_makes_it_again(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
-        change(store, take.copy_id, set_ball(state.group.views[0].key, BALL))
+        change(store, take.copy_id, make_set_ball_edit(state.group.views[0].key, BALL))
         before = load_group_state(store, take.copy_id)
         assert faults(store) == []
         rebuild_tables(store)
@@ -145,7 +145,7 @@ class TestBeginTake:
     ) -> None:
         since = "2999-01-01"
         view = state.group.views[0].key
-        change(store, state.id, set_ball(view, None), actor="eve")
+        change(store, state.id, make_set_ball_edit(view, None), actor="eve")
         late = begin_for_batch(store, state.id, "ann", batch_id=1, since=since)
         assert load_group_state(store, late.copy_id).group.view(view).balls == ()
         early = begin_for_batch(store, state.id, "ann", batch_id=2, since="2000-01-01")
@@ -156,7 +156,7 @@ class TestBeginTake:
     ) -> None:
         view = state.group.views[0].key
         first = begin_for_batch(store, state.id, "ann", batch_id=1)
-        change(store, first.copy_id, set_ball(view, BALL))
+        change(store, first.copy_id, make_set_ball_edit(view, BALL))
         submit_annotation(store, first.id, actor="ann")
         blind = begin_for_batch(store, state.id, "ben", batch_id=1)
         assert load_group_state(store, blind.copy_id).group == state.group
@@ -170,7 +170,7 @@ class TestBeginTake:
         assert copy.group.label == "Group 1" and copy.group.match == ""
         for word in ("north", "Alder", ".png"):
             assert word not in said
-        change(store, take.copy_id, set_ball("view 1", BALL))
+        change(store, take.copy_id, make_set_ball_edit("view 1", BALL))
         submit_annotation(store, take.id, actor="ann")
         adopted = adopt_annotation(store, take.id, actor="lea")
         assert adopted.group.views[0].balls == (BALL,)
@@ -237,9 +237,9 @@ class TestHandIn:
         take = begin_take(store, state.id, person="ann")
         assert submit_annotation(store, take.id, actor="ann").submitted is not None
         with pytest.raises(ConflictError):
-            change(store, take.copy_id, set_ball(state.group.views[0].key, BALL))
+            change(store, take.copy_id, make_set_ball_edit(state.group.views[0].key, BALL))
         return_annotation(store, take.id, "the ball", actor="lea")
-        change(store, take.copy_id, set_ball(state.group.views[0].key, BALL))
+        change(store, take.copy_id, make_set_ball_edit(state.group.views[0].key, BALL))
 
     def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
@@ -323,7 +323,7 @@ class TestAdoptTake:
         take = begin_take(store, state.id, person="ann")
         views = [view.key for view in state.group.views]
         line = next(iter(state.group.views[1].station.lines))
-        change(store, take.copy_id, set_ball(views[0], BALL))
+        change(store, take.copy_id, make_set_ball_edit(views[0], BALL))
         change(store, take.copy_id, SetLines(views[1], {line: HERE}))
         judge(store, take.copy_id)
         after = adopt_annotation(store, take.id, actor="lea")
@@ -344,7 +344,7 @@ class TestAdoptTake:
     def test_a_view_that_was_left_out_is_left_out_then(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         view = state.group.views[0].key
-        change(store, take.copy_id, IncludeView(view, False))
+        change(store, take.copy_id, SetViewInclusion(view, False))
         submit_annotation(store, take.id, actor="ann")
         after = adopt_annotation(store, take.id, actor="lea")
         assert [one.key for one in after.group.views if not one.included] == [view]

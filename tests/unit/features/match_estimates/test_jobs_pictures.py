@@ -19,7 +19,7 @@ from app.features.match_estimates import jobs as pictures_job
 from app.features.match_estimates.jobs import PICTURES
 from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
 from app.features.solutions.service import list_stale_groups
-from app.features.solve.jobs import change_and_return_job
+from app.features.solve.jobs import change_and_return_solve_job
 from app.progress import ReportProgress
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
@@ -117,7 +117,7 @@ def say(jobs: Jobs, store: Store, wanted: dict[str, PictureGeometry | None]) -> 
     def change(session: Session) -> None:
         set_picture_geometries(session, "demo", wanted, actor="lea")
 
-    return change_and_return_job(jobs, store, "demo", change, actor="lea")
+    return change_and_return_solve_job(jobs, store, "demo", change, actor="lea")
 
 
 def test_a_picture_that_is_said_is_solved_and_no_longer_proposed(jobs: Jobs, two: Store) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, NotFoundError
-from app.features.groups.edit import SetLines, SetPicture
+from app.features.groups.edit import SetLines, SetPictureGeometry
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -202,7 +202,7 @@ class TestSharePositions:
         )
 
     def test_a_view_whose_picture_was_changed_takes_no_part(self, shared):
-        edit = SetPicture(load_group_state(shared, 1).group.views[0].key, OPEN)
+        edit = SetPictureGeometry(load_group_state(shared, 1).group.views[0].key, OPEN)
         submit_edit(shared, 1, edit, if_match=load_group_state(shared, 1).etag, actor="ann")
         share_positions(shared, "demo", actor="ann")
         assert load_group_state(shared, 1).group.positions == {}

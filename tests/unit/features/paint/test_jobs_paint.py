@@ -15,7 +15,7 @@ from app.features.jobs.service import Jobs
 from app.features.paint import jobs as paint_job
 from app.features.paint import service as editing
 from app.features.paint.jobs import PAINT
-from app.features.paint.service import get_paint
+from app.features.paint.service import summarize_paint_readings
 from app.features.policies.service import change_policy
 from app.soccer.group import Group, Media
 from app.soccer.policy import TOUCHLINE
@@ -53,7 +53,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     (solve,) = jobs.find(kinds=["solve"])
     assert jobs.wait(solve.id, SECONDS).state == "done"
     back = jobs.wait(PAINT.undo_last_job(jobs, asked, "demo", actor="ann").id, SECONDS)
-    assert (back.kind, get_paint(asked, "demo").items[0].read) == ("solve", 0)
+    assert (back.kind, summarize_paint_readings(asked, "demo").items[0].read) == ("solve", 0)
     jobs.close()
 
 
@@ -65,11 +65,11 @@ def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
     monkeypatch.setattr(editing, "_read_paint_of_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
-    assert get_paint(asked, "demo").items[0].read > 0
+    assert summarize_paint_readings(asked, "demo").items[0].read > 0
     PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
-    assert get_paint(asked, "demo").items[0].read == 0
+    assert summarize_paint_readings(asked, "demo").items[0].read == 0
     jobs.close()
 
 
@@ -86,7 +86,7 @@ def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
     PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
-    assert get_paint(asked, "demo").items[0].read == 12
+    assert summarize_paint_readings(asked, "demo").items[0].read == 12
     jobs.close()
 
 
@@ -102,7 +102,7 @@ def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, mon
         PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "done"
-    assert get_paint(asked, "demo").items[0].read == 12
+    assert summarize_paint_readings(asked, "demo").items[0].read == 12
     jobs.close()
 
 
@@ -113,7 +113,7 @@ def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked
     with asked.write() as session:
         insert_job(session, NewJob("paint", "Read", "ann", 1, {"match": None, "run": "lost"}))
     PAINT.undo_last_job(jobs, asked, "demo", actor="ann")
-    assert get_paint(asked, "demo").items[0].read == 0
+    assert summarize_paint_readings(asked, "demo").items[0].read == 0
     jobs.close()
 
 

@@ -29,13 +29,13 @@ from app.features.paint.proposals import (
     ProposalRun,
     forget_proposals,
     get_group_proposals,
-    get_proposals,
-    propose_views,
+    get_proposal_counts,
+    propose_cameras_for_views,
 )
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
-from app.media.files import has_index
+from app.media.files import has_video_index
 from app.paint.view_proposal import ViewProposal
 from app.soccer.codec import station_digest
 from app.soccer.group import Group, Media, Station, View
@@ -108,7 +108,7 @@ def filled(store: Store, groups: list[Group]) -> Store:
 
 
 def counts(store: Store) -> tuple[int, ...]:
-    (item,) = get_proposals(store, "demo").items
+    (item,) = get_proposal_counts(store, "demo").items
     return item.views, item.looked, item.proposed, item.unsure, item.nothing, item.accepted
 
 
@@ -136,12 +136,12 @@ class TestProposeViews:
         seen: list[bool] = []
 
         def look(task, settings):  # type: ignore[no-untyped-def]
-            seen.append(has_index(task.media, settings))
+            seen.append(has_video_index(task.media, settings))
             return task.make_proposal_without_picture(MISSING)
 
-        monkeypatch.setattr(editing, "read_proposal", look)
+        monkeypatch.setattr(editing, "propose_lines_for_task", look)
         told: list[str] = []
-        propose_views(store, "demo", progress=lambda _, __, said="": told.append(said))
+        propose_cameras_for_views(store, "demo", progress=lambda _, __, said="": told.append(said))
         assert seen == [True]
         assert told[0] == "Finding the frames of cam1.mp4."
 
@@ -151,7 +151,7 @@ class TestProposeViews:
             [entry.kind for entry in read_history(filled, 2)],
         )
         assert counts(filled) == (1, 0, 0, 0, 0, 0)
-        run = propose_views(filled, "demo")
+        run = propose_cameras_for_views(filled, "demo")
         assert run == ProposalRun(views=1, proposed=1)
         ((key, is_open, item),) = get_group_proposals(filled, 2)
         assert (key, is_open, item.outcome, item.sentence) == ("b.png", True, "proposed", "")
@@ -166,7 +166,7 @@ class TestProposeViews:
         assert [entry.kind for entry in read_history(filled, 2)] == kinds
 
     def test_what_the_match_knows_is_handed_on(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         ((camera,),) = asked
         assert np.linalg.norm(camera.position - CAMERA.position) < 1.0
 
@@ -184,21 +184,23 @@ class TestProposeViews:
         ]
         import_groups(store, "demo", [*groups, *odd], source="files", actor="ann")
         solve_dataset(store, "demo")
-        propose_views(store, "demo")
+        propose_cameras_for_views(store, "demo")
         ((camera,),) = asked
         assert np.linalg.norm(camera.position - CAMERA.position) < 1.0
 
     def test_once_more_compares_pictures_and_looks_at_none(self, filled, asked):
-        propose_views(filled, "demo")
-        assert propose_views(filled, "demo") == ProposalRun(views=1, left=1)
+        propose_cameras_for_views(filled, "demo")
+        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, left=1)
         assert len(asked) == 1
 
     def test_another_picture_and_a_missing_one_are_said(self, filled, asked, tmp_path: Path):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         draw(tmp_path / "b.png", empty=True)
-        assert propose_views(filled, "demo") == ProposalRun(views=1, nothing=1, changed=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRun(
+            views=1, nothing=1, changed=1
+        )
         (tmp_path / "b.png").unlink()
-        run = propose_views(filled, "demo")
+        run = propose_cameras_for_views(filled, "demo")
         assert run == ProposalRun(views=1, nothing=1, missing=1)
         ((_, _, item),) = get_group_proposals(filled, 2)
         assert (item.sentence, item.frame, dict(item.lines)) == (MISSING, "", {})
@@ -206,27 +208,27 @@ class TestProposeViews:
     def test_what_another_extractor_found_is_looked_for_again(self, filled, asked, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(proposal_reading, "EXTRACTOR_VERSION", "0")
-            propose_views(filled, "demo")
-        assert propose_views(filled, "demo") == ProposalRun(views=1, proposed=1)
+            propose_cameras_for_views(filled, "demo")
+        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, proposed=1)
 
     def test_where_nothing_was_found_a_later_search_looks_again(
         self, filled, asked, monkeypatch, tmp_path: Path
     ):
         draw(tmp_path / "b.png", empty=True)
-        propose_views(filled, "demo")
-        assert propose_views(filled, "demo") == ProposalRun(views=1, left=1)
+        propose_cameras_for_views(filled, "demo")
+        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, left=1)
         monkeypatch.setattr(editing, "SEARCH_VERSION", editing.SEARCH_VERSION + 1)
-        assert propose_views(filled, "demo") == ProposalRun(views=1, nothing=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, nothing=1)
 
     def test_where_nothing_was_found_more_of_the_match_is_worth_another_look(
         self, store, groups, asked, tmp_path: Path
     ):
         draw(tmp_path / "b.png", empty=True)
         import_groups(store, "demo", groups, source="files", actor="ann")
-        propose_views(store, "demo")
+        propose_cameras_for_views(store, "demo")
         solve_dataset(store, "demo")
-        assert propose_views(store, "demo") == ProposalRun(views=1, nothing=1)
-        assert propose_views(store, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, nothing=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, left=1)
 
     def test_a_static_camera_is_looked_at_once(self, store, asked, tmp_path: Path):
         media = draw(tmp_path / "s.png")
@@ -234,7 +236,7 @@ class TestProposeViews:
             Group(str(number), (view("cam1", media, shared=True),), match="m") for number in (1, 2)
         ]
         import_groups(store, "demo", shared, source="files", actor="ann")
-        assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, proposed=1)
         assert counts(store) == (1, 1, 1, 0, 0, 0)
 
     def test_killed_midway_it_goes_on_where_it_was(self, store, asked, tmp_path, monkeypatch):
@@ -249,22 +251,24 @@ class TestProposeViews:
             raise JobCancelled
 
         with pytest.raises(JobCancelled):
-            propose_views(store, "demo", workers=1, progress=stop)
+            propose_cameras_for_views(store, "demo", workers=1, progress=stop)
         told = []
-        run = propose_views(store, "demo", workers=1, progress=lambda *at: told.append(at))
+        run = propose_cameras_for_views(
+            store, "demo", workers=1, progress=lambda *at: told.append(at)
+        )
         assert (run.left, run.proposed, len(asked)) == (1, 2, 3)
         assert told == [(1, 3), (2, 3), (3, 3)]
 
     def test_a_match_that_is_not_there_is_refused(self, filled):
         with pytest.raises(NotFoundError, match="no match final"):
-            propose_views(filled, "demo", ["final"])
+            propose_cameras_for_views(filled, "demo", ["final"])
 
 
 class TestAccepting:
     def test_the_source_stands_in_log_state_and_frozen_text_and_undo_takes_all_back(
         self, filled, asked
     ):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         before = load_group_state(filled, 2)
         key = accept(filled)
         state = load_group_state(filled, 2)
@@ -278,13 +282,13 @@ class TestAccepting:
         assert back.group == before.group and back.group.view(key).station.proposed == ()
 
     def test_who_says_the_lines_is_part_of_what_is_said(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         key = accept(filled)
         station = load_group_state(filled, 2).group.view(key).station
         assert station_digest(station) != station_digest(replace(station, proposed=()))
 
     def test_a_frozen_group_and_a_carried_one_keep_it(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         key = accept(filled)
         group = load_group_state(filled, 2).group
         said = freeze_annotations(group)
@@ -297,14 +301,14 @@ class TestAccepting:
         ]
 
     def test_the_log_makes_the_same_tables(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         accept(filled)
         with filled.read() as session:
             verify_chain(session)
             assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_marking_that_is_moved_is_a_person_s_again(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         key = accept(filled)
         state = load_group_state(filled, 2)
         first, *rest = state.group.view(key).station.proposed
@@ -315,7 +319,7 @@ class TestAccepting:
         assert back.group.view(key).station.proposed == (first, *rest)
 
     def test_what_is_accepted_is_no_longer_open_and_undo_opens_it(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         assert found(filled, "proposal:proposed") == [2]
         accept(filled)
         assert counts(filled) == (0, 0, 0, 0, 0, 1)
@@ -340,13 +344,13 @@ class TestDrawnLines:
         return store
 
     def test_are_looked_at_once_they_are_solved(self, poor, asked):
-        assert propose_views(poor, "demo") == ProposalRun()
+        assert propose_cameras_for_views(poor, "demo") == ProposalRun()
         solve_dataset(poor, "demo")
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
-        assert propose_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, proposed=1)
         assert counts(poor) == (1, 1, 1, 0, 0, 0)
         assert found(poor, "proposal:proposed") == [1]
-        assert propose_views(poor, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, left=1)
 
     def test_a_camera_that_is_a_guess_is_none(self, store, asked, tmp_path: Path):
         names = iter(lines_of(CAMERA))
@@ -356,13 +360,13 @@ class TestDrawnLines:
         solve_dataset(store, "demo")
         calibration = load_group_state(store, 1).solution.views[0].calibration
         assert calibration.camera is not None and calibration.unobservable
-        assert propose_views(store, "demo") == ProposalRun(views=1, unsure=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, unsure=1)
         ((_, is_open, item),) = get_group_proposals(store, 1)
         assert is_open and "Side line right” is drawn" in item.sentence
 
     def test_stay_and_the_others_join_them_in_one_edit(self, poor, asked):
         solve_dataset(poor, "demo")
-        propose_views(poor, "demo")
+        propose_cameras_for_views(poor, "demo")
         before = load_group_state(poor, 1)
         assert before.solution.views[0].calibration.camera is None
         accept(poor, 1)
@@ -382,13 +386,13 @@ class TestDrawnLines:
 
     def test_that_are_others_now_are_looked_at_again(self, poor, asked):
         solve_dataset(poor, "demo")
-        propose_views(poor, "demo")
+        propose_cameras_for_views(poor, "demo")
         at = load_group_state(poor, 1)
         more = SetLines("p.png", {"Big rect. right main": lines_of(CAMERA)["Big rect. right main"]})
         submit_edit(poor, 1, more, if_match=at.etag, actor="bob")
         assert not get_group_proposals(poor, 1)[0][1]
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
-        assert propose_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, proposed=1)
         assert counts(poor) == (1, 1, 1, 0, 0, 0)
         ((_, is_open, item),) = get_group_proposals(poor, 1)
         assert is_open and "Big rect. right main" not in item.lines
@@ -410,17 +414,17 @@ class TestDrawnLines:
         ]
         import_groups(store, "demo", shared, source="files", actor="ann")
         solve_dataset(store, "demo")
-        assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, proposed=1)
 
 
 class TestQuery:
     def test_finds_groups_by_what_became_of_their_views(self, filled, asked, tmp_path: Path):
         assert found(filled, "proposal:none") == [1, 2]
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         assert found(filled, "proposal:proposed,unsure") == [2]
         assert found(filled, "-proposal:any") == found(filled, "proposal:none") == [1]
         draw(tmp_path / "b.png", empty=True)
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         assert (found(filled, "proposal:nothing"), found(filled, "proposal:proposed")) == ([2], [])
 
     def test_refuses_what_it_does_not_know(self, filled):
@@ -430,7 +434,7 @@ class TestQuery:
 
 class TestForget:
     def test_takes_all_back_at_once_and_leaves_what_was_accepted(self, filled, asked):
-        propose_views(filled, "demo")
+        propose_cameras_for_views(filled, "demo")
         accept(filled)
         assert forget_proposals(filled, "demo") == 1
         assert counts(filled) == (0, 0, 0, 0, 0, 0)
@@ -439,7 +443,7 @@ class TestForget:
 
     def test_leaves_other_datasets_alone(self, filled, groups, asked):
         import_groups(filled, "other", groups, source="files", actor="ann")
-        propose_views(filled, "demo")
-        propose_views(filled, "other")
+        propose_cameras_for_views(filled, "demo")
+        propose_cameras_for_views(filled, "other")
         assert forget_proposals(filled, "other") == 1
         assert counts(filled)[:3] == (1, 1, 1)

@@ -14,7 +14,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups import pictures as paint_reading
-from app.features.groups.edit import SetLines, set_ball
+from app.features.groups.edit import SetLines, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
@@ -24,7 +24,11 @@ from app.features.groups.undo import undo_group_edit
 from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import service as editing
-from app.features.paint.service import get_paint, read_paint, undo_paint_reading
+from app.features.paint.service import (
+    read_paint_of_pictures,
+    summarize_paint_readings,
+    undo_paint_reading,
+)
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
@@ -118,7 +122,7 @@ def painted(store, once, pictures, here) -> Store:
         import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         solve_dataset(store, "demo")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
-        read_paint(store, "demo", actor="ann", run="first")
+        read_paint_of_pictures(store, "demo", actor="ann", run="first")
         solve_dataset(store, "demo")
 
     once("paint", fill)
@@ -126,7 +130,7 @@ def painted(store, once, pictures, here) -> Store:
 
 
 def state(store):
-    (item,) = get_paint(store, "demo").items
+    (item,) = summarize_paint_readings(store, "demo").items
     return item
 
 
@@ -157,11 +161,11 @@ class TestReadPaint:
     def test_is_refused_where_the_policy_would_not_use_it(self, store, pictures):
         import_groups(store, "demo", groups(pictures), source="files", actor="ann")
         with pytest.raises(ConflictError, match="does not use the paint"):
-            read_paint(store, "demo", actor="ann")
+            read_paint_of_pictures(store, "demo", actor="ann")
 
     def test_an_unknown_match_is_refused(self, painted):
         with pytest.raises(NotFoundError, match="no match nowhere"):
-            read_paint(painted, "demo", ["nowhere"], actor="ann")
+            read_paint_of_pictures(painted, "demo", ["nowhere"], actor="ann")
 
     def test_cameras_lie_on_their_paint_and_nearer_to_the_truth(self, painted):
         item = state(painted)
@@ -217,17 +221,19 @@ class TestReadPaint:
 
     def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
         monkeypatch.setattr(media, "_decode_pixels", lambda *_: pytest.fail("it was decoded again"))
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         assert (here.read, looked, list_stale_groups(painted, "demo")) == (4, [], [])
         assert [entry.kind for entry in read_history(painted, 1)] == ["import", "paint"]
 
     def test_an_edit_of_a_ball_leaves_cameras_and_paint(self, painted, here, looked):
         at = load_group_state(painted, 1)
-        edit = set_ball(at.group.views[0].key, BallAnnotation(point=ImagePoint(600.0, 400.0)))
+        edit = make_set_ball_edit(
+            at.group.views[0].key, BallAnnotation(point=ImagePoint(600.0, 400.0))
+        )
         after = submit_edit(painted, 1, edit, if_match=at.etag, actor="ann")
         assert [view.calibration for view in after.solution.views] == calibrations(painted)
         assert after.group.paint == at.group.paint
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         assert looked == []
 
     def test_an_edit_of_lines_falls_back_to_the_clicks_until_it_is_read_again(
@@ -238,7 +244,7 @@ class TestReadPaint:
         assert (first.source, first.paint, second.source) == ("lines", None, "paint")
         assert kinds(painted) == ["no_paint"]
         assert (state(painted).old, "1 to be read again" in state(painted).sentence) == (1, True)
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert state(painted).old == 0
         assert looked == [after.group.views[0].key]
@@ -249,7 +255,7 @@ class TestReadPaint:
     ):
         monkeypatch.setattr(paint_reading, "EXTRACTOR_VERSION", "next")
         assert state(painted).old == 4
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         assert len(looked) == 4
 
     def test_where_too_many_were_read_nobody_says_how_many_are_old(self, painted, monkeypatch):
@@ -279,7 +285,7 @@ class TestReadPaint:
         (finding,) = (item for item in after.solution.findings if item.kind == NO_PAINT)
         assert (finding.view, finding.fix.action) == (key, "read_paint")
         assert "boxes of its people" in finding.sentence
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         again = load_group_state(painted, 1)
         assert (looked, state(painted).old) == ([key], 0)
@@ -302,7 +308,7 @@ class TestReadPaint:
         assert state(painted).old == 2
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
         assert kinds(painted) == ["no_paint"] * 2
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert (len(looked), state(painted).old) == (2, 0)
         assert [item.source for item in calibrations(painted)] == ["paint", "paint"]
@@ -323,7 +329,7 @@ class TestReadPaint:
         view = replace(changed.views[0], media=Media(str(other)))
         import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
         assert len(load_group_state(painted, 1).group.paint) == 2
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert looked == [view.key]
         assert load_group_state(painted, 1).group.paint[view.key].reason == NO_PAINT
@@ -333,10 +339,10 @@ class TestReadPaint:
         changed = groups(pictures)[0]
         view = replace(changed.views[0], media=Media(str(tmp_path / "gone.png")))
         import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         assert load_group_state(painted, 1).group.paint[view.key].reason is None
         draw(painted, 1)
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert load_group_state(painted, 1).group.paint[view.key].reason == NO_FRAME
         assert "missing" in load_group_state(painted, 1).solution.findings[-1].sentence
@@ -349,7 +355,7 @@ class TestReadPaint:
         bare = first.with_view(replace(first.views[0], media=None))
         import_groups(store, "demo", [bare, second], source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
-        read_paint(store, "demo", actor="ann")
+        read_paint_of_pictures(store, "demo", actor="ann")
         solve_dataset(store, "demo")
         assert [item.source for item in calibrations(store)] == ["lines", "paint"]
         assert kinds(store) == []
@@ -370,7 +376,7 @@ class TestReadPaint:
             station=replace(changed.views[0].station, flipped=True),
         )
         import_groups(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
-        read_paint(painted, "demo", actor="ann")
+        read_paint_of_pictures(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
         found, truth = calibrations(painted)[0], scenes()[0].truth.view(view.key).camera
         assert found.source == "paint"
@@ -387,15 +393,15 @@ class TestReadPaint:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            read_paint(store, "demo", actor="ann", workers=1, progress=stop)
+            read_paint_of_pictures(store, "demo", actor="ann", workers=1, progress=stop)
         assert (len(looked), state(store).read) == (2, 2)
-        read_paint(store, "demo", actor="ann", workers=1)
+        read_paint_of_pictures(store, "demo", actor="ann", workers=1)
         assert (len(looked), state(store).read) == (4, 4)
 
     def test_pictures_are_read_in_processes_of_their_own(self, store, pictures, looked):
         import_groups(store, "demo", groups(pictures)[:1], source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
-        read_paint(store, "demo", actor="ann", workers=1)
+        read_paint_of_pictures(store, "demo", actor="ann", workers=1)
         assert (state(store).painted, looked) == (2, [])
 
 
@@ -455,7 +461,7 @@ class TestTakeBackPaint:
     def test_each_reading_is_taken_back_once_the_newest_first(self, painted):
         first = load_group_state(painted, 1).group.paint
         draw(painted, 1)
-        read_paint(painted, "demo", actor="ann", run="second")
+        read_paint_of_pictures(painted, "demo", actor="ann", run="second")
         assert load_group_state(painted, 1).group.paint != first
         take_back(painted)
         assert load_group_state(painted, 1).group.paint == first

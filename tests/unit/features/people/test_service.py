@@ -145,17 +145,17 @@ class TestLinks:
             logins.log_in("anna", SECRET)
 
     def test_the_first_admin_chooses_a_name_and_the_link_is_gone(self, home, logins) -> None:
-        link = links.make_first_link(home, actor="local")
+        link = links.make_first_admin_link(home, actor="local")
         assert link is not None
         assert links.find_link_holder(home, link.token).name is None
         assert links.set_password_by_link(home, link.token, SECRET, "Anna") == "anna"
         assert found(logins, logins.log_in("anna", SECRET)).role is Role.ADMIN
-        assert links.make_first_link(home, actor="local") is None
+        assert links.make_first_admin_link(home, actor="local") is None
         with pytest.raises(NotFoundError):
             links.set_password_by_link(home, link.token, SECRET, "eve")
 
     def test_the_link_of_the_first_admin_ends_once_there_is_another(self, home) -> None:
-        link = links.make_first_link(home, actor="local")
+        link = links.make_first_admin_link(home, actor="local")
         assert link is not None
         join(home, "anna", Role.ADMIN)
         with pytest.raises(NotFoundError):

@@ -12,13 +12,18 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
 from app.features.datasets.queries import list_group_ids
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
 from app.features.groups.submit import submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies import noise
-from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, reset_noise_factors
+from app.features.policies.noise import (
+    ASSUMED_WORDS,
+    adopt_estimated_noise,
+    read_noise,
+    reset_noise_factors,
+)
 from app.features.policies.service import change_policy, read_policy, replace_thresholds
 from app.features.solutions import service as recompute
 from app.features.solutions.service import list_stale_groups, solve_dataset
@@ -30,7 +35,7 @@ from app.soccer.policy import PAPER, TOUCHLINE, Policy, is_builtin_policy
 from app.solving import dataset_noise
 from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.ball_noise import RayResidual
-from app.solving.dataset_noise import NoiseGroup
+from app.solving.dataset_noise import GroupNoiseInputs
 from app.solving.resect import REFERENCE_DIAGONAL
 from tests.cameras import SIZE
 from tests.unit.stores import BEHIND, MAIN, OPPOSITE, drawn
@@ -73,7 +78,7 @@ def placings(states: Sequence[GroupState]) -> Iterator[NewLogEntry]:
     """Ann placed every ball; then Bea those of every other group once more, and Cleo the others."""
     for state in states:
         for view in state.group.views:
-            body = {"edit": edit_to_json(set_ball(view.key, view.balls[0]))}
+            body = {"edit": edit_to_json(make_set_ball_edit(view.key, view.balls[0]))}
             for actor in ("ann", "bea" if state.id % 2 else "cleo"):
                 yield NewLogEntry("edit", actor, "2026-01-01T00:00:00Z", body, 1, state.id)
 
@@ -134,7 +139,7 @@ class TestReadNoise:
         # Sigma of the balls of camera b follows once it is accepted, and nothing is new then.
         assert found.is_new and found.used == ()
         sigma = _mean_sigma(store)
-        apply_noise(store, found, actor="ben")
+        adopt_estimated_noise(store, found, actor="ben")
         carried = {view.noise for state in read_states_of(store) for view in state.group.views}
         assert carried <= {item.ratio for item in found.factors} and max(carried) > 1.5
         solve_dataset(store, "demo")
@@ -163,7 +168,7 @@ class TestReadNoise:
         assert sigma.low < LINE_NOISY < sigma.high and share.low <= 0.1
         assert "noise of lines per image" in " ".join(found.notices)
         before = _spreads(store)
-        state = apply_noise(store, found, actor="ben")
+        state = adopt_estimated_noise(store, found, actor="ben")
         assert state.policy.calibration.line_sigma_px == sigma.estimate
         assert len(list_stale_groups(store, state.dataset_id)) == 8
         solve_dataset(store, "demo")
@@ -207,7 +212,7 @@ class TestReadNoise:
             for size in rng.uniform(5, 40, 600)
         ]
         shown = iter([misses])
-        monkeypatch.setattr(NoiseGroup, "ray_residuals", lambda *_: tuple(next(shown, ())))
+        monkeypatch.setattr(GroupNoiseInputs, "ray_residuals", lambda *_: tuple(next(shown, ())))
         found = read_noise(store, "demo")
         click, share = found.advice
         assert (click.name, share.name, share.unit) == (
@@ -227,7 +232,7 @@ class TestApplyNoise:
     ) -> None:
         make(store, given=given)
         found = read_noise(store, "demo")
-        state = apply_noise(store, found, actor="ben")
+        state = adopt_estimated_noise(store, found, actor="ben")
         assert (state.policy.name, state.history[-1].actor) == ("custom", "ben")
         name = found.advice[0].name
         assert getattr(state.policy, name) == found.advice[0].estimate
@@ -237,13 +242,13 @@ class TestApplyNoise:
         assert all(item.agrees for item in again.advice)
         assert (again.values, again.notices) == ({}, ())
         with pytest.raises(InputError, match="is what its policy already uses"):
-            apply_noise(store, again, actor="ben")
+            adopt_estimated_noise(store, again, actor="ben")
 
     def test_a_second_estimate_is_the_first(self, store: Store) -> None:
         """Lines and balls are each known with the other's noise, not with what was used before."""
         make_lined(store)
         first = read_noise(store, "demo")
-        apply_noise(store, first, actor="ben")
+        adopt_estimated_noise(store, first, actor="ben")
         solve_dataset(store, "demo")
         again = read_noise(store, "demo")
         for one, other in zip(first.advice, again.advice, strict=True):
@@ -300,7 +305,9 @@ class TestFollowing:
         before = read_policy(store, "demo")
         state = read_states_of(store)[0]
         ball = BallAnnotation(point=ImagePoint(5.0, 5.0))
-        submit_edit(store, state.id, set_ball("a", ball), if_match=state.etag, actor="ben")
+        submit_edit(
+            store, state.id, make_set_ball_edit("a", ball), if_match=state.etag, actor="ben"
+        )
         assert not list_stale_groups(store, "demo")
         assert read_policy(store, "demo") == before
 

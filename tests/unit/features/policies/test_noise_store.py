@@ -8,7 +8,7 @@ from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies import noise as noise_store
-from app.features.policies.noise import NoiseCache, apply_noise
+from app.features.policies.noise import NoiseCache, adopt_estimated_noise
 from app.features.solutions.service import solve_dataset
 from tests.unit.features.policies.test_noise import make
 
@@ -23,7 +23,7 @@ class TestNoiseStore:
         make(store, given=True)
         noises = NoiseCache(store)
         before = noises.read("demo")
-        policy = apply_noise(store, before, actor="ben").policy
+        policy = adopt_estimated_noise(store, before, actor="ben").policy
         assert noises.read("demo") is not before
         solve_dataset(store, "demo")
         after = noises.read("demo")

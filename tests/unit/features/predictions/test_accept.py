@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.frame import Detection
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -29,7 +29,9 @@ def cleared(store, fill, make_group):
     """Two groups; nobody annotated a ball in the main view of the first."""
     ids = fill(make_group(7), make_group(8))
     state = load_group_state(store, ids[0])
-    return submit_edit(store, ids[0], set_ball("7.png", None), if_match=state.etag, actor="ann")
+    return submit_edit(
+        store, ids[0], make_set_ball_edit("7.png", None), if_match=state.etag, actor="ann"
+    )
 
 
 @pytest.fixture
@@ -139,7 +141,7 @@ class TestAccept:
 
         accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         state = load_group_state(store, cleared.id)
-        edit = set_ball("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
+        edit = make_set_ball_edit("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
         after = submit_edit(store, cleared.id, edit, if_match=state.etag, actor="bob")
         assert after.group.view("7.png").ball.predicted_by == ""
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from app.errors import NotFoundError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit, submit_edits
 from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.predictions.accept import AcceptedBall, accept_box, read_group_predictions
@@ -95,7 +95,10 @@ class TestAcceptedBall:
         state = accept_first(store, ids[0], "bob")
         ball = state.group.views[0].ball
         state = undo_group_edit(store, ids[0], if_match=state.etag, actor="bob")
-        edits = [set_ball("7.png", ball), set_ball(state.group.views[1].key, None)]
+        edits = [
+            make_set_ball_edit("7.png", ball),
+            make_set_ball_edit(state.group.views[1].key, None),
+        ]
         submit_edits(store, ids[0], edits, if_match=state.etag, actor="eve")
         (found,) = read_group_predictions(store, ids[0]).accepted
         assert found.actor == "eve"
@@ -110,14 +113,14 @@ class TestAcceptedBall:
     def test_a_ball_that_a_person_moved_is_none(self, store, ids, add) -> None:
         add("yolo", ("7.png", 10, 0.75))
         state = accept_first(store, ids[0], "bob")
-        moved = set_ball("7.png", BallAnnotation(box=Box(11, 300, 14, 14)))
+        moved = make_set_ball_edit("7.png", BallAnnotation(box=Box(11, 300, 14, 14)))
         submit_edit(store, ids[0], moved, if_match=state.etag, actor="bob")
         assert read_group_predictions(store, ids[0]).accepted == ()
 
     def test_an_imported_prediction_names_nobody(self, store, fill, make_group) -> None:
         group = make_group(7)
         ball = BallAnnotation(box=Box(10, 300, 14, 14), predicted_by="elsewhere")
-        (group_id,) = fill(set_ball("7.png", ball).apply(group))
+        (group_id,) = fill(make_set_ball_edit("7.png", ball).apply(group))
         assert read_group_predictions(store, group_id).accepted == (
             AcceptedBall(
                 load_group_state(store, group_id).view_ids["7.png"],

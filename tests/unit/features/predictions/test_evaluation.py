@@ -7,7 +7,7 @@ from sqlalchemy import func, select
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.evaluation import (
@@ -22,7 +22,7 @@ from app.features.predictions.evaluation import (
 )
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
-    check_evaluation,
+    require_valid_evaluation_request,
     run_evaluation,
 )
 from app.features.predictions.reader import PredictionFiles
@@ -91,7 +91,7 @@ class TestRunEvaluation:
         assert first.pins["predictions"]["source"] == "a.json"
         assert first.pins["predictions"]["unknown"] == 0
         assert first.pins["policy_hash"] == states[0].policy.hash
-        edit = set_ball("7.png", None)
+        edit = make_set_ball_edit("7.png", None)
         submit_edit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         assert (
             run_evaluation(store, "demo", request, actor="ann").pins["state"] != first.pins["state"]
@@ -101,7 +101,7 @@ class TestRunEvaluation:
         version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         request = EvaluationRequest(predictions=exact.id, version=version.id)
         first = run_evaluation(store, "demo", request, actor="ann")
-        edit = set_ball("7.png", None)
+        edit = make_set_ball_edit("7.png", None)
         submit_edit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         again = run_evaluation(store, "demo", request, actor="ann")
         assert (again.pins, again.tables) == (first.pins, first.tables)
@@ -145,7 +145,10 @@ class TestRunEvaluation:
         path.write_text(json.dumps([*values, values[1]]))
         twice = add_predictions(store, "demo", "twice", PredictionFiles(path), actor="ann")
         request = EvaluationRequest(predictions=exact.id, careful=twice.id)
-        for refused in (check_evaluation, lambda *args: run_evaluation(*args, actor="ann")):
+        for refused in (
+            require_valid_evaluation_request,
+            lambda *args: run_evaluation(*args, actor="ann"),
+        ):
             with pytest.raises(InputError, match="have more than one box") as caught:
                 refused(store, "demo", request)
             assert caught.value.pointer == "/careful"

@@ -8,9 +8,9 @@ from app.errors import InputError, NotFoundError
 from app.evaluation.frame import Frame
 from app.evaluation.result import Table
 from app.features.predictions.evaluation_run import (
-    AcceptedTruth,
+    AcceptedTruthCounts,
     EvaluationRequest,
-    SourcesRequest,
+    SourcesEvaluationRequest,
     read_or_find_prediction_set,
 )
 from app.features.predictions.reader import PredictionFiles
@@ -27,14 +27,16 @@ def frame(identity: int, source: str = "", **more: object) -> Frame:
 class TestAcceptedTruth:
     def test_counts_frames_that_have_the_box_by_where_their_ball_is_from(self) -> None:
         frames = [frame(1), frame(2, "yolo"), frame(3, "old"), frame(4, "yolo", boxes={})]
-        assert AcceptedTruth.count(frames, "annotated", "yolo") == AcceptedTruth(2, 1, 3)
-        assert AcceptedTruth.count(frames, "annotated", None) == AcceptedTruth(2, 0, 3)
-        assert AcceptedTruth.count(frames, "exact", "yolo") == AcceptedTruth(0, 0, 0)
+        assert AcceptedTruthCounts.count(frames, "annotated", "yolo") == AcceptedTruthCounts(
+            2, 1, 3
+        )
+        assert AcceptedTruthCounts.count(frames, "annotated", None) == AcceptedTruthCounts(2, 0, 3)
+        assert AcceptedTruthCounts.count(frames, "exact", "yolo") == AcceptedTruthCounts(0, 0, 0)
 
     def test_warns_in_the_tables_that_it_flatters_alone(self) -> None:
         tables = [Table(name, name, (), (), "Note.") for name in ("detection", "cameras")]
-        assert AcceptedTruth(0, 0, 3).add_warnings(tables) == tables
-        first, second = AcceptedTruth(2, 1, 3).add_warnings(tables)
+        assert AcceptedTruthCounts(0, 0, 3).add_warnings(tables) == tables
+        first, second = AcceptedTruthCounts(2, 1, 3).add_warnings(tables)
         assert first.note.startswith("Note. Warning: the ball of 2 of 3 frames")
         assert "1 of them from the evaluated set itself" in first.note
         assert second == tables[1]
@@ -61,13 +63,17 @@ class TestCheck:
 
     def test_so_are_those_of_careful_boxes_by_their_own_name(self) -> None:
         careful = PredictionFiles(None, category=1)
-        request = SourcesRequest(EvaluationRequest(), PredictionFiles(Path("a-set")), careful)
+        request = SourcesEvaluationRequest(
+            EvaluationRequest(), PredictionFiles(Path("a-set")), careful
+        )
         with pytest.raises(InputError, match="--careful-category needs a file of boxes"):
             request.check()
 
     def test_a_version_has_its_own_groups(self) -> None:
         nothing = PredictionFiles(None)
-        request = SourcesRequest(EvaluationRequest(groups="all"), nothing, nothing, version="v1")
+        request = SourcesEvaluationRequest(
+            EvaluationRequest(groups="all"), nothing, nothing, version="v1"
+        )
         with pytest.raises(InputError, match='groups "all" cannot be combined with a version'):
             request.check()
 

@@ -13,14 +13,14 @@ from app.features.exports.service import export_dataset
 from app.features.predictions.evaluation import get_figure, parse_run_tables
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
-    SourcesRequest,
-    check_evaluation,
+    SourcesEvaluationRequest,
     evaluate_sources,
+    require_valid_evaluation_request,
 )
 from app.features.predictions.queries import PredictionSet
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, get_predictions
-from app.features.tracks.service import TrackChange, change_track, get_track
+from app.features.tracks.service import TrackReview, get_track, review_track
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from tests.flights import add_flight
 
@@ -29,7 +29,7 @@ from tests.flights import add_flight
 def accepted(store: Store) -> Store:
     """A flight whose track is accepted and frozen as v1."""
     track = get_track(store, add_flight(store))
-    change_track(store, track.id, TrackChange("accepted"), track.etag, actor="ann")
+    review_track(store, track.id, TrackReview("accepted"), track.etag, actor="ann")
     freeze_dataset(store, "flight", FreezeRequest("v1", groups="passing"), actor="ann")
     return store
 
@@ -42,7 +42,7 @@ def own(accepted: Store, tmp_path: Path) -> Path:
 
 
 def evaluated(store: Store, path: Path, version: str | None = "v1", **asked: object):
-    request = SourcesRequest(
+    request = SourcesEvaluationRequest(
         EvaluationRequest(**asked),  # type: ignore[arg-type]
         PredictionFiles(path),
         PredictionFiles(None),
@@ -101,7 +101,7 @@ class TestEvaluation:
         found = add_predictions(accepted, "flight", None, PredictionFiles(own), actor="ann")
         request = EvaluationRequest(predictions=found.id, **asked)
         with pytest.raises(InputError, match=f"{next(iter(asked))} is not used"):
-            check_evaluation(accepted, "flight", request)
+            require_valid_evaluation_request(accepted, "flight", request)
 
 
 class TestSets:

@@ -6,14 +6,14 @@ import pytest
 
 from app.db.session import now
 from app.errors import NotFoundError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.jobs.service import Jobs
 from app.features.predictions.accept import AcceptRequest
 from app.features.predictions.evaluation import list_evaluations
 from app.features.predictions.evaluation_run import EvaluationRequest
-from app.features.predictions.jobs import request_accept, request_evaluation, resume_evaluations
+from app.features.predictions.jobs import request_accept, request_evaluation, resume_prediction_jobs
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
 
@@ -21,7 +21,7 @@ from app.features.predictions.service import add_predictions
 @pytest.fixture
 def jobs(store):
     jobs = Jobs(store)
-    resume_evaluations(jobs, store)
+    resume_prediction_jobs(jobs, store)
     yield jobs
     jobs.close()
 
@@ -87,7 +87,9 @@ class TestResume:
 class TestRequestAccept:
     def test_counts_what_changed(self, store, state, jobs, predictions) -> None:
         jobs.start()
-        submit_edit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7.png", None), if_match=state.etag, actor="ann"
+        )
         request = AcceptRequest(predictions.id, query="")
         job = jobs.wait(request_accept(jobs, store, "demo", request, actor="bob").id, 60)
         assert job.state == "done", job.problem

@@ -7,6 +7,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.predictions.queries import (
     FrameCondition,
+    ball_without_number_condition,
     between_condition,
     count_frame_rows,
     delete_evaluation,
@@ -14,7 +15,6 @@ from app.features.predictions.queries import (
     insert_evaluation,
     list_evaluations_of_dataset,
     match_condition,
-    missing_condition,
     read_frame_rows,
 )
 from app.features.predictions.tables import EvaluationFrameModel
@@ -76,8 +76,8 @@ class TestReadFrameRows:
             ([between_condition("error_m", None, None)], 2),
             ([between_condition("error_m", 0.1, 0.5)], 1),
             ([between_condition("error_m", 0.2, None)], 1),
-            ([missing_condition("error_m")], 1),
-            ([match_condition("n"), missing_condition("error_m")], 0),
+            ([ball_without_number_condition("error_m")], 1),
+            ([match_condition("n"), ball_without_number_condition("error_m")], 0),
         ],
     )
     def test_all_conditions_must_hold(self, session, conditions, places: int) -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.features.predictions.accept import AcceptedView, AcceptPlan
+from app.features.predictions.accept import AcceptPlan, ViewAcceptDecision
 from app.features.predictions.queries import PredictedBox, PredictionSet
 from app.features.predictions.schemas import AcceptOutcome, GroupPrediction, ViewPrediction
 
@@ -10,7 +10,7 @@ SET = PredictionSet(
     3, 1, "old", "coco", "old.json", "2030-08-17T18:00:00Z", "ann", "0" * 64, 1, 1, 0, 0, 0, {}
 )
 BOX = PredictedBox(7, 3, 31, 1.0, 2.0, 3e9, 4.0, 0.9)
-PLAN = AcceptPlan(SET, (AcceptedView(31, "7.png", 5, "m/7.png", BOX, None),), {})
+PLAN = AcceptPlan(SET, (ViewAcceptDecision(31, "7.png", 5, "m/7.png", BOX, None),), {})
 
 
 class TestStoredBox:

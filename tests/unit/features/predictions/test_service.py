@@ -8,7 +8,7 @@ from sqlalchemy import delete, select
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.tables import ViewModel
-from app.features.groups.state import read_record
+from app.features.groups.state import read_group_without_solution
 from app.features.groups.submit import load_group_state
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import (
@@ -59,7 +59,7 @@ class TestAddPredictions:
         add_predictions(store, "demo", "yolo", files, actor="ann")
         assert load_group_state(store, state.id) == state
         with store.read() as session:
-            key = read_record(session, state.id).solution_key
+            key = read_group_without_solution(session, state.id).solution_key
             assert list(read_solutions(session, [key])) == [state.id]
 
     def test_keeps_cameras(self, store, state, tmp_path, opposite) -> None:

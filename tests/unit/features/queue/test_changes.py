@@ -8,7 +8,7 @@ from app.db.log import find_newest_entry_id
 from app.db.store import Store
 from app.features.comments.service import begin_thread
 from app.features.datasets.service import delete_dataset, get_dataset
-from app.features.groups.edit import IncludeView, SetStationCalibration
+from app.features.groups.edit import SetStationCalibration, SetViewInclusion
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
@@ -42,7 +42,9 @@ class TestReadChanges:
     ) -> None:
         one, _two = fill(make_group(7), make_group(8))
         before, etag = newest(store), load_group_state(store, one).etag
-        edited = submit_edit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
+        edited = submit_edit(
+            store, one, SetViewInclusion("7.png", False), if_match=etag, actor="ann"
+        )
         judged = set_verdict(store, one, "deferred", if_match=edited.etag, actor="bob")
         found = get_dataset(store, "demo").id
         assert since(store, before) == [
@@ -53,7 +55,7 @@ class TestReadChanges:
     def test_a_comment_hides_no_change_of_its_group(self, store: Store, fill, make_group) -> None:
         (one,) = fill(make_group(7))
         before, etag = newest(store), load_group_state(store, one).etag
-        submit_edit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
+        submit_edit(store, one, SetViewInclusion("7.png", False), if_match=etag, actor="ann")
         begin_thread(store, one, "Is it?", actor="bob")
         edited, commented = since(store, before)
         assert (edited.group_id, edited.actor) == (commented.group_id, "ann") == (one, "ann")

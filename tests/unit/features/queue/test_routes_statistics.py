@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.features.queue.routes import StatisticsHistogram
-from app.features.queue.statistics import Measure, MeasureHistogram, MeasureSeries
+from app.features.queue.statistics import Measure, MeasureCountsOfSplit, MeasureHistogram
 
 MEASURE = Measure("jac", "JaC", "", "jac", (0.0, 0.5, 1.0), open_high=False)
 
@@ -11,7 +11,7 @@ MEASURE = Measure("jac", "JaC", "", "jac", (0.0, 0.5, 1.0), open_high=False)
 class TestStatisticsHistogram:
     def test_has_the_bins_of_its_measure_and_its_own_counts_beside_them(self) -> None:
         found = MeasureHistogram(
-            MEASURE, ("jac<0.5", "jac>=0.5"), (MeasureSeries("train", (1, 2), 0),)
+            MEASURE, ("jac<0.5", "jac>=0.5"), (MeasureCountsOfSplit("train", (1, 2), 0),)
         )
         assert StatisticsHistogram.model_validate(found).model_dump() == {
             "name": "jac",

@@ -36,7 +36,7 @@ from app.features.recordings.cameras import (
 )
 from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
-from app.features.recordings.service import Recording, find_groups_of_recording, get_recording
+from app.features.recordings.service import Recording, find_group_ids_by_frame, get_recording
 from app.features.recordings.shots import Shot, replace_shots
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
@@ -222,11 +222,11 @@ def test_groups_get_the_cameras_of_their_frames_and_need_no_proposal(
     assert track(api, recording, finished)["lost"] == 1
     taken = take(api, recording, finished, 5, 6)
     assert (taken["new"], taken["cameras"], taken["proposals_job"]) == (2, 2, None)
-    assert taken["group"] == find_groups_of_recording(app.state.services.store, found)[5]
+    assert taken["group"] == find_group_ids_by_frame(app.state.services.store, found)[5]
     taken = take(api, recording, finished, 7, 8)
     assert taken["cameras"] == 1 and taken["proposals_job"] is not None
     store: Store = app.state.services.store
-    groups = find_groups_of_recording(store, found)
+    groups = find_group_ids_by_frame(store, found)
     with store.read() as session:
         stored = read_groups(session, list(groups.values()))
     station = stored[groups[5]].group.views[0].station
@@ -247,7 +247,7 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
     tracker.lost, tracker.off = {7, 8}, 2.0
     track(api, recording, finished)
     take(api, recording, finished, 5, 7, 8, 11)
-    groups = find_groups_of_recording(store, found)
+    groups = find_group_ids_by_frame(store, found)
     draw(api, groups[7], tracker.truth[3])
     assert api.get(f"{recording}/cameras").json()["items"][0]["drawn"] == [7]
     tracker.lost, tracker.off = {11}, 0.0
@@ -294,7 +294,7 @@ def test_views_of_linked_replays_are_frames_of_their_shot(
     track(api, recording, finished, 8, 11)
     body = {"frames": [5], "propose": False, "linked": True}
     finished(api.post(f"{recording}/groups", json=body))
-    (group,) = find_groups_of_recording(store, found).values()
+    (group,) = find_group_ids_by_frame(store, found).values()
 
     def given() -> list[Camera | None]:
         with store.read() as session:
@@ -329,7 +329,7 @@ def test_cameras_are_turned_by_half_and_back_and_groups_follow(
         return job.result
 
     def given() -> dict[int, Camera | None]:
-        groups = find_groups_of_recording(store, found)
+        groups = find_group_ids_by_frame(store, found)
         with store.read() as session:
             stored = read_groups(session, list(groups.values()))
         return {
@@ -368,7 +368,7 @@ def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_tur
     track(api, recording, finished)
     present = get_shot_cameras(store, found.id, 5)
     take(api, recording, finished, 7)
-    draw(api, find_groups_of_recording(store, found)[7], tracker.truth[3])
+    draw(api, find_group_ids_by_frame(store, found)[7], tracker.truth[3])
     tracker.off = 1.0
     track(api, recording, finished)
     answer = api.patch(f"{recording}/cameras/5", json={"turned": True})
@@ -395,7 +395,7 @@ def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
     take(api, recording, finished, 4, 5, 6)
     own = tracker.truth[0]
     import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
-    groups = find_groups_of_recording(store, found)
+    groups = find_group_ids_by_frame(store, found)
     draw(api, groups[6], tracker.truth[2])
     track(api, recording, finished)
     link = add_link(store, (found.id, 4, 7), (found.id, 8, 11), actor="ann")
@@ -426,7 +426,7 @@ def test_a_camera_that_somebody_gave_stays(
     own = tracker.truth[0]
     import_given_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
     assert track(api, recording, finished)["groups"] == 1
-    groups = find_groups_of_recording(store, found)
+    groups = find_group_ids_by_frame(store, found)
     with store.read() as session:
         stored = read_groups(session, list(groups.values()))
     assert stored[groups[5]].group.views[0].station.given == own

@@ -14,7 +14,7 @@ from app.errors import InputError, StorageError
 from app.features.recordings import instants as module
 from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants, validate_instant_frames
-from app.features.recordings.service import Recording, add_recording, find_groups_of_recording
+from app.features.recordings.service import Recording, add_recording, find_group_ids_by_frame
 from tests.videos import write_video
 
 
@@ -58,10 +58,10 @@ class TestTakeInstants:
             patch.setattr(module, "replace_file", replace_file)
             with pytest.raises(raised or type(error)):
                 take(store, recording, 5, 6, 7, 8)
-        assert sorted(find_groups_of_recording(store, recording)) == [5, 6]
+        assert sorted(find_group_ids_by_frame(store, recording)) == [5, 6]
         taken = take(store, recording, 5, 6, 7, 8)
         assert (taken.new, taken.unchanged) == (2, 2)
-        assert sorted(find_groups_of_recording(store, recording)) == [5, 6, 7, 8]
+        assert sorted(find_group_ids_by_frame(store, recording)) == [5, 6, 7, 8]
 
     def test_frames_are_kept_once_whoever_takes_them(
         self, store: Store, recording: Recording, monkeypatch: pytest.MonkeyPatch

@@ -12,7 +12,11 @@ from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
 from app.features.datasets.queries import list_unused_frame_files, list_unused_uploads
-from app.features.imports.upload_queries import UploadWriter, mark_upload_permanent, upload_path
+from app.features.imports.upload_queries import (
+    UploadWriter,
+    find_complete_upload_path,
+    mark_upload_permanent,
+)
 from app.features.jobs.service import Jobs
 from app.features.recordings import index
 from app.features.recordings import jobs as module
@@ -20,14 +24,14 @@ from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants
 from app.features.recordings.jobs import (
     InstantOptions,
+    request_groups_of_instants,
     request_index,
-    request_instants,
-    resume_recordings,
+    resume_recording_jobs,
 )
 from app.features.recordings.service import (
     Recording,
     add_recording,
-    find_groups_of_recording,
+    find_group_ids_by_frame,
     get_recording,
     remove_recording,
     require_video_file,
@@ -77,13 +81,13 @@ class TestIndexNow:
         write_video(film, "mp4v", 30)
         second = indexed(store, film)
         assert (second.name, second.groups) == ("final-2", 0)
-        assert find_groups_of_recording(store, second) == {}
+        assert find_group_ids_by_frame(store, second) == {}
         assert take(second, 5) == 1
         # The same video takes its groups up again, also where it lies elsewhere by now.
         again = film.with_name("other.mp4")
         again.write_bytes(kept)
         third = indexed(store, again)
-        assert (third.name, sorted(find_groups_of_recording(store, third))) == ("final", [5, 6])
+        assert (third.name, sorted(find_group_ids_by_frame(store, third))) == ("final", [5, 6])
 
     def test_groups_of_the_video_before_stay_when_a_file_is_replaced(
         self, store: Store, film: Path
@@ -165,7 +169,9 @@ class TestUnused:
         mark_upload_permanent(store.settings, upload.id)
         with store.read() as session:
             assert upload.id in list_unused_uploads(session, store.settings)
-        add_recording(store, "cup", upload_path(store.settings, upload.id), actor="ann")
+        add_recording(
+            store, "cup", find_complete_upload_path(store.settings, upload.id), actor="ann"
+        )
         with store.read() as session:
             assert upload.id not in list_unused_uploads(session, store.settings)
 
@@ -181,9 +187,11 @@ class TestJobs:
         with stopped_at_its_first_step(module, "index_recording_in_worker", first):
             number = request_index(first, store, recording, actor="ann").id
         with closing(Jobs(store)) as second:
-            resume_recordings(second, store)
+            resume_recording_jobs(second, store)
             second.start()
             assert second.wait(number, SECONDS).state == "done"
             options = InstantOptions(propose=False)
-            job = request_instants(second, store, recording.id, [1, 2], options, actor="ann")
+            job = request_groups_of_instants(
+                second, store, recording.id, [1, 2], options, actor="ann"
+            )
             assert second.wait(job.id, SECONDS).result["new"] == 2

@@ -6,7 +6,12 @@ from sqlalchemy import update
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.saved_views import service as saved_views
 from app.features.saved_views.queries import SavedViewModel
-from app.features.saved_views.service import delete_view, get_view, list_saved_views, save_view
+from app.features.saved_views.service import (
+    list_saved_views,
+    read_saved_view,
+    remove_saved_view,
+    save_view,
+)
 
 
 @pytest.fixture
@@ -29,7 +34,7 @@ class TestSaveView:
         save_view(store, 1, name="All", q="", actor="ann")
         with pytest.raises(ConflictError, match='"All"'):
             save_view(store, 1, name="All", q="split:test", actor="ben")
-        assert get_view(store, 1).q == ""
+        assert read_saved_view(store, 1).q == ""
 
     @pytest.mark.parametrize("name", ["", "  ", "x" * 81, "a\nb"])
     def test_a_name_can_be_read(self, store, ids, name: str) -> None:
@@ -74,7 +79,7 @@ class TestListSavedViews:
 class TestDeleteView:
     def test_answers_what_it_was(self, store, ids) -> None:
         saved = save_view(store, 1, name="All", q="sort:sigma", actor="ann")
-        assert delete_view(store, saved.id) == saved
+        assert remove_saved_view(store, saved.id) == saved
         assert list_saved_views(store, 1) == []
         with pytest.raises(NotFoundError):
-            delete_view(store, saved.id)
+            remove_saved_view(store, saved.id)

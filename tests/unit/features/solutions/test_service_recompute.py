@@ -7,7 +7,7 @@ from multiprocessing import get_context
 import pytest
 from sqlalchemy import text
 
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.queue.service import list_groups
 from app.features.solutions import service as module
@@ -51,7 +51,9 @@ class TestSolveDataset:
     def test_only_what_changed_is_solved_again(self, store, ids) -> None:
         solve_dataset(store, "demo")
         state = load_group_state(store, ids[2])
-        submit_edit(store, ids[2], set_ball("cam1", None), if_match=state.etag, actor="ann")
+        submit_edit(
+            store, ids[2], make_set_ball_edit("cam1", None), if_match=state.etag, actor="ann"
+        )
         assert list_stale_groups(store, "demo") == []
 
     def test_an_executor_makes_the_same(self, store, ids, small_chunks) -> None:
@@ -109,7 +111,7 @@ class TestSolveDataset:
         def change(group, policy, calibrations):
             if group.key == "12":
                 state = load_group_state(store, ids[2])
-                edit = set_ball("cam1", None)
+                edit = make_set_ball_edit("cam1", None)
                 if state.revision == 1:
                     submit_edit(store, ids[2], edit, if_match=state.etag, actor="ann")
             return solve_and_encode(group, policy, calibrations)

@@ -17,7 +17,11 @@ from app.features.jobs.service import Jobs
 from app.features.solutions.service import SolveReport, list_stale_groups
 from app.features.solve import jobs as full_solve
 from app.features.solve import jobs as solve_job
-from app.features.solve.jobs import request_solve_job, resume_solving, solve_leftovers
+from app.features.solve.jobs import (
+    register_solve_resume,
+    request_solve_job,
+    request_solve_of_leftovers,
+)
 from tests.waiting import SECONDS
 
 
@@ -169,16 +173,16 @@ class TestSolveLeftovers:
             assert started.wait(SECONDS)
             first.close()
         second = Jobs(store)
-        resume_solving(second, store)
+        register_solve_resume(second, store)
         second.start()
-        solve_leftovers(second, store, actor="ann")
+        request_solve_of_leftovers(second, store, actor="ann")
         done = second.wait(job.id, SECONDS)
         assert (done.state, done.result["solved"]) == ("done", 5)
         assert list_stale_groups(store, "demo") == []
         second.close()
 
     def test_a_dataset_that_is_complete_needs_no_job(self, jobs: Jobs, store: Store, state) -> None:
-        solve_leftovers(jobs, store, actor="ann")
+        request_solve_of_leftovers(jobs, store, actor="ann")
         assert jobs.find() == []
 
     def test_what_an_earlier_solver_solved_is_solved_at_the_start(
@@ -186,7 +190,7 @@ class TestSolveLeftovers:
     ) -> None:
         upgrade_solver()
         jobs.start()
-        solve_leftovers(jobs, store, actor="ann")
+        request_solve_of_leftovers(jobs, store, actor="ann")
         (job,) = jobs.find()
         assert jobs.wait(job.id, SECONDS).result["solved"] == 1
         assert list_stale_groups(store, "demo") == []

@@ -17,7 +17,7 @@ from app.features.tracks.codec import (
     make_track,
     patches_from_json,
     patches_to_json,
-    solve_corrections,
+    solve_corrected_parts,
     track_from_json,
     track_to_json,
 )
@@ -117,7 +117,7 @@ class TestTrackJson:
 class TestCorrections:
     def test_patches_come_back_bit_for_bit(self, inputs, track) -> None:
         said = replace(inputs, corrections=(EventCorrection(FIRST + 8, "kick", True),))
-        patches = solve_corrections(said, track)
+        patches = solve_corrected_parts(said, track)
         again = patches_from_json(json.loads(canonical_json_text(patches_to_json(patches))))
         assert len(patches) == 1
         assert equal(apply_corrections(said, track, again), apply_corrections(said, track, patches))
@@ -126,7 +126,7 @@ class TestCorrections:
         said = replace(inputs, corrections=(EventCorrection(FIRST + 8, "kick", True),))
         stored = track_from_json(json.loads(canonical_json_text(track_to_json(track))))
         assert equal(
-            apply_corrections(said, stored, solve_corrections(said, stored)), make_track(said)
+            apply_corrections(said, stored, solve_corrected_parts(said, stored)), make_track(said)
         )
 
 

@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
 from app.features.findings.service import FindingReference, iterate_findings_as_json, set_dismissal
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.suggested_edits import list_edits_of_finding
 from app.features.groups.undo import undo_group_edit
@@ -22,13 +22,13 @@ from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks import findings, making
-from app.features.tracks.findings import refresh_all_findings, save_notices
+from app.features.tracks.findings import refresh_track_notices, save_notices
 from app.features.tracks.service import (
-    TrackChange,
-    change_track,
+    TrackReview,
     list_tracks,
     make_tracks,
     read_track,
+    review_track,
 )
 from app.features.tracks.tables import TrackModel
 from app.soccer.finding import TRACK_DISAGREES, Finding
@@ -48,7 +48,7 @@ def make(store: Store) -> None:
 
 def judge(store: Store, verdict: Any) -> None:
     (track,) = list_tracks(store, "demo")
-    change_track(store, track.id, TrackChange(verdict), track.etag, actor="ben")
+    review_track(store, track.id, TrackReview(verdict), track.etag, actor="ben")
 
 
 def told(store: Store) -> list[tuple[str, str | None]]:
@@ -145,7 +145,7 @@ class TestFindings:
         judge(store, "rejected")
         state = load_group_state(store, beside)
         ball = state.group.views[0].ball
-        away = set_ball(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
+        away = make_set_ball_edit(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
         submit_edit(store, beside, away, if_match=state.etag, actor="ann")
         judge(store, "none")
         assert told(store) == []
@@ -193,7 +193,7 @@ class TestMeanwhile:
             return found
 
         monkeypatch.setattr(findings, "_read_notices", judged_meanwhile)
-        refresh_all_findings(store, dataset_id(store, "demo"), ["rig"])
+        refresh_track_notices(store, dataset_id(store, "demo"), ["rig"])
         assert turns == ["accepted", "rejected", "accepted"]
         assert [group for group, _ in told(store)] == [str(FIRST + AT)]
 
@@ -216,8 +216,8 @@ class TestMeanwhile:
                 turns.append(FIRST + 30 + len(turns))
                 (track,) = list_tracks(store, "demo")
                 said = tuple(EventCorrection(frame, "kick", True) for frame in turns)
-                change_track(
-                    store, track.id, TrackChange(corrections=said), track.etag, actor="ben"
+                review_track(
+                    store, track.id, TrackReview(corrections=said), track.etag, actor="ben"
                 )
             return read(*given)
 

@@ -16,7 +16,7 @@ from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.integrity.records import examine_versions
 from app.features.tracks.codec import TRACK_VERSION, recompute_frozen_track
-from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
+from app.features.tracks.service import TrackReview, list_tracks, make_tracks, review_track
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, decode_frozen_json, read_frozen
@@ -33,10 +33,10 @@ from tests.unit.features.tracks.test_service import move
 def accepted(store: Store, flight: list[int]) -> list[int]:
     """The flight with a track that a person corrected and accepted."""
     make_tracks(store, "demo", None, "ann", lambda *_: None)
-    said = TrackChange(corrections=(EventCorrection(FIRST + 40, "out", True),))
-    for change in (said, TrackChange("accepted")):
+    said = TrackReview(corrections=(EventCorrection(FIRST + 40, "out", True),))
+    for change in (said, TrackReview("accepted")):
         (track,) = list_tracks(store, "demo")
-        change_track(store, track.id, change, track.etag, actor="ben")
+        review_track(store, track.id, change, track.etag, actor="ben")
     return flight
 
 
@@ -63,7 +63,7 @@ class TestFreeze:
         assert [*version.tracks] == ["rig"]
         assert version.counts["tracks"] == 1
         (track,) = list_tracks(store, "demo")
-        change_track(store, track.id, TrackChange("none"), track.etag, actor="ben")
+        review_track(store, track.id, TrackReview("none"), track.etag, actor="ben")
         without = frozen(store, "v2")
         assert (without.tracks, "tracks" in without.counts) == ({}, False)
         assert without.hash != version.hash
@@ -142,7 +142,7 @@ class TestExport:
         export_dataset(store, "demo", "tracks", tmp_path / "out")
         assert f"\n{FIRST + 40},5.6,out," in (tmp_path / "out/events.csv").read_text()
         (track,) = list_tracks(store, "demo")
-        change_track(store, track.id, TrackChange("rejected"), track.etag, actor="ben")
+        review_track(store, track.id, TrackReview("rejected"), track.etag, actor="ben")
         with pytest.raises(InputError, match="rig: its track was rejected"):
             export_dataset(store, "demo", "tracks", tmp_path / "none")
         assert (

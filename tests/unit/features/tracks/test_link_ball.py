@@ -20,7 +20,7 @@ from app.features.recordings.camera_tracking import TrackedStretch, save_cameras
 from app.features.recordings.links import get_link
 from app.features.recordings.service import get_recording
 from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
-from app.features.tracks.link_ball import _iterate_balls_of_groups, read_ball_positions
+from app.features.tracks.link_ball import _iterate_balls_of_groups, read_tracked_ball_positions
 from app.features.tracks.queries import insert_track
 from app.features.tracks.stored import TrackSummary, compute_track_stamp
 from app.geometry.arrays import FloatArray
@@ -192,8 +192,8 @@ class TestOfTracks:
     ) -> None:
         insert_track_of(store, made_ball(8.0, seed=3), np.arange(LIVE) / FPS, "final link 1")
         recording, shot = get_recording(store, 1), get_link(store, 1, 1).live
-        assert read_ball_positions(store, recording, shot, 1) == {}
-        assert len(read_ball_positions(store, recording, shot, 2)) == LIVE
+        assert read_tracked_ball_positions(store, recording, shot, 1) == {}
+        assert len(read_tracked_ball_positions(store, recording, shot, 2)) == LIVE
 
 
 def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str = "final") -> None:

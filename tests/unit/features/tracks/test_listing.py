@@ -23,7 +23,7 @@ from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.listing import TrackChoice, choose_tracks
-from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
+from app.features.tracks.service import TrackReview, list_tracks, make_tracks, review_track
 from app.features.webhooks.queries import read_batch_values
 from tests.flights import flight_groups
 from tests.unit.features.tracks.test_service import move
@@ -59,7 +59,7 @@ def keys(store: Store, choice: TrackChoice) -> list[str]:
 
 def judge(store: Store, track: int, verdict: str) -> None:
     (found,) = [one for one in list_tracks(store, "demo") if one.id == track]
-    change_track(store, track, TrackChange(verdict), found.etag, actor="bo")
+    review_track(store, track, TrackReview(verdict), found.etag, actor="bo")
 
 
 class TestChooseTracks:

@@ -10,19 +10,19 @@ from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.tables import GroupModel
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.service import (
     MadeTracks,
     Track,
-    TrackChange,
-    change_track,
+    TrackReview,
     get_track,
     list_tracks,
     make_tracks,
     read_track,
+    review_track,
 )
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
@@ -41,9 +41,9 @@ def only(store: Store) -> Track:
     return track
 
 
-def change(store: Store, what: TrackChange) -> Track:
+def change(store: Store, what: TrackReview) -> Track:
     track = only(store)
-    return change_track(store, track.id, what, track.etag, actor="ben")
+    return review_track(store, track.id, what, track.etag, actor="ben")
 
 
 def move(store: Store, group: int, by: float) -> None:
@@ -51,7 +51,7 @@ def move(store: Store, group: int, by: float) -> None:
     state = load_group_state(store, group)
     view = state.group.views[0]
     ball = replace(view.ball, point=ImagePoint(view.ball.point.x + by, view.ball.point.y))
-    submit_edit(store, group, set_ball(view.key, ball), if_match=state.etag, actor="ann")
+    submit_edit(store, group, make_set_ball_edit(view.key, ball), if_match=state.etag, actor="ann")
     solve_dataset(store, "demo")
 
 
@@ -76,7 +76,7 @@ class TestMakeTracks:
     def test_a_changed_group_makes_it_stale_until_it_is_made_again(self, store, flight) -> None:
         make(store)
         before = only(store)
-        change(store, TrackChange("accepted"))
+        change(store, TrackReview("accepted"))
         move(store, flight[7], 3.0)
         assert only(store).stale
         assert make(store).made == 1
@@ -101,7 +101,7 @@ class TestMakeTracks:
     def test_corrections_stay_when_it_is_made_again(self, store, flight) -> None:
         make(store)
         said = (EventCorrection(FIRST + 2, "kick", True),)
-        change(store, TrackChange(corrections=said))
+        change(store, TrackReview(corrections=said))
         move(store, flight[30], 2.0)
         make(store)
         assert only(store).corrections == said
@@ -117,7 +117,7 @@ class TestMakeTracks:
         assert without["stretch"] == "rig"
         assert only(store).summary.reason == without["reason"]
         with pytest.raises(ConflictError, match='the stretch "rig" has no track'):
-            change(store, TrackChange("accepted"))
+            change(store, TrackReview("accepted"))
 
     def test_a_stretch_that_is_gone_goes_unless_somebody_judged_it(self, store, flight) -> None:
         make(store)
@@ -143,7 +143,7 @@ class TestStretchesThatChange:
         add_instants(store, *range(20))
         make(store)
         said = (EventCorrection(7, "kick", True),)
-        before = change(store, TrackChange(corrections=said))
+        before = change(store, TrackReview(corrections=said))
         add_instants(store, 20)
         make(store)
         after = only(store)
@@ -154,8 +154,8 @@ class TestStretchesThatChange:
         make(store)
         said = (EventCorrection(7, "kick", True), EventCorrection(155, "bounce", True))
         for track, item in zip(list_tracks(store, "demo"), said, strict=True):
-            wanted = TrackChange(corrections=(item,))
-            change_track(store, track.id, wanted, track.etag, actor="ben")
+            wanted = TrackReview(corrections=(item,))
+            review_track(store, track.id, wanted, track.etag, actor="ben")
         add_instants(store, 85)
         make(store)
         assert (only(store).key, only(store).corrections) == ("final 0-169", said)
@@ -164,7 +164,7 @@ class TestStretchesThatChange:
         add_instants(store, *range(20), 85, *range(150, 180))
         make(store)
         said = (EventCorrection(7, "kick", True), EventCorrection(155, "bounce", True))
-        whole = change(store, TrackChange(corrections=said))
+        whole = change(store, TrackReview(corrections=said))
         with store.read() as session:
             cut = session.scalar(select(GroupModel.id).where(GroupModel.key == "final/85.png"))
         etag = load_group_state(store, cut).etag
@@ -217,31 +217,31 @@ def _renamed():
 class TestChangeTrack:
     def test_is_accepted_by_a_person_and_the_log_says_so(self, store, flight) -> None:
         make(store)
-        found = change(store, TrackChange("accepted", "looks right"))
+        found = change(store, TrackReview("accepted", "looks right"))
         assert (found.verdict, found.note, found.judged_by) == ("accepted", "looks right", "ben")
         assert found == only(store)
         with store.read() as session:
             deeds = [entry.body for entry in read_log(session) if entry.kind == "deed"]
         assert deeds[-1]["did"] == "track accepted"
-        back = change(store, TrackChange("none"))
+        back = change(store, TrackReview("none"))
         assert (back.verdict, back.note, back.judged_by, back.judged_at) == (None, None, None, None)
         with pytest.raises(InputError, match="changes nothing"):
-            change(store, TrackChange(note="a word"))
+            change(store, TrackReview(note="a word"))
 
     def test_a_stale_one_is_not_accepted(self, store, flight) -> None:
         make(store)
         move(store, flight[7], 3.0)
         with pytest.raises(ConflictError, match='groups of the track "rig" have changed'):
-            change(store, TrackChange("accepted"))
-        assert change(store, TrackChange("rejected")).verdict == "rejected"
+            change(store, TrackReview("accepted"))
+        assert change(store, TrackReview("rejected")).verdict == "rejected"
 
     def test_events_are_corrected_and_what_was_accepted_is_not_any_more(
         self, store, flight
     ) -> None:
         make(store)
-        change(store, TrackChange("accepted"))
+        change(store, TrackReview("accepted"))
         before = _events(store)
-        found = change(store, TrackChange(corrections=(EventCorrection(FIRST + 40, "out", True),)))
+        found = change(store, TrackReview(corrections=(EventCorrection(FIRST + 40, "out", True),)))
         assert found.verdict is None
         assert set(_events(store)) - set(before) == {(FIRST + 40, "out")}
 
@@ -250,15 +250,15 @@ class TestChangeTrack:
         with pytest.raises(
             InputError, match=f"is not in the track .rig., which has the frames {FIRST} to"
         ) as error:
-            change(store, TrackChange(corrections=(EventCorrection(3, "out", True),)))
+            change(store, TrackReview(corrections=(EventCorrection(3, "out", True),)))
         assert error.value.pointer == "/corrections/0/frame"
 
     def test_two_people_do_not_overwrite_each_other(self, store, flight) -> None:
         make(store)
         etag = only(store).etag
-        change(store, TrackChange("rejected"))
+        change(store, TrackReview("rejected"))
         with pytest.raises(StaleRevisionError):
-            change_track(store, only(store).id, TrackChange("accepted"), etag, actor="ann")
+            review_track(store, only(store).id, TrackReview("accepted"), etag, actor="ann")
 
     def test_a_track_that_is_not_there(self, store) -> None:
         with pytest.raises(NotFoundError, match="there is no track 9"):

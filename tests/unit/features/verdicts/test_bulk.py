@@ -13,7 +13,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.tables import GroupModel
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state import VerdictState
 from app.features.groups.state_snapshot_queries import read_state_snapshot
@@ -159,7 +159,7 @@ class TestGiveVerdicts:
         submit_edit(
             store,
             ids[1],
-            set_ball("8_1.png", None),
+            make_set_ball_edit("8_1.png", None),
             if_match=load_group_state(store, ids[1]).etag,
             actor="ann",
         )
@@ -234,7 +234,7 @@ class TestGiveVerdicts:
     def test_a_verdict_that_is_out_of_date_is_given_again(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
         etag = load_group_state(store, ids[0]).etag
-        submit_edit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
+        submit_edit(store, ids[0], make_set_ball_edit("7.png", None), if_match=etag, actor="ann")
         assert (summarize_groups(store, 1).stale, summarize_groups(store, 1, "stale:no").stale) == (
             1,
             0,

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import text, update
 
 from app.errors import ConflictError, NotFoundError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
@@ -113,7 +113,7 @@ class TestRedoBatch:
 
     def test_a_group_that_was_edited_since_is_another_one(self, store, ids, undone) -> None:
         etag = load_group_state(store, ids[0]).etag
-        submit_edit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
+        submit_edit(store, ids[0], make_set_ball_edit("7.png", None), if_match=etag, actor="ann")
         done = redo_batch(store, undone, actor="ben")
         assert (done.changed, done.kept) == (3, 1)
         assert statuses(store)[0] == "unreviewed"

@@ -7,7 +7,7 @@ from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.queries import (
     StoredVerdict,
     count_groups_by_judge,
-    insert_verdicts,
+    insert_verdicts_and_end_work,
     list_groups_judged_between,
     list_groups_with_newest_verdict_between,
     read_judged_inputs,
@@ -23,7 +23,7 @@ class TestReadLastVerdicts:
     def test_of_each_person_the_last_the_newest_first(self, filled: Store) -> None:
         again = replace(FIRST, id=3, state="rejected", reason="other")
         with filled.write() as session:
-            insert_verdicts(session, 1, [FIRST, LATER, again], actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, [FIRST, LATER, again], actor="ann", at="t")
             assert read_last_verdicts(session, [1, 9]) == {1: [again, LATER]}
             assert read_verdicts(session, [1, 9]) == {1: [again, LATER, FIRST]}
 
@@ -31,7 +31,7 @@ class TestReadLastVerdicts:
 class TestRanges:
     def test_a_group_that_was_judged_again_is_not_of_the_earlier_range(self, filled: Store) -> None:
         with filled.write() as session:
-            insert_verdicts(session, 1, [FIRST, LATER], actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, [FIRST, LATER], actor="ann", at="t")
             assert list_groups_with_newest_verdict_between(session, 1, 1) == []
             assert (
                 list_groups_with_newest_verdict_between(session, 1, 2)
@@ -50,7 +50,7 @@ class TestCountByJudge:
     ) -> None:
         with filled.write() as session:
             given = [FIRST, LATER, replace(LATER, id=3)]
-            insert_verdicts(session, 1, given, actor="ann", at="t")
+            insert_verdicts_and_end_work(session, 1, given, actor="ann", at="t")
             rows = count_groups_by_judge(session, 1, since="2030-01-02")
             assert {tuple(row) for row in rows} == {
                 ("ann", "2030-01-01", 0),

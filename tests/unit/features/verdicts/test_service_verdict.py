@@ -8,7 +8,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
@@ -98,7 +98,7 @@ class TestSetVerdict:
     def test_becomes_stale_by_an_edit_and_fresh_by_its_undo(self, store, state) -> None:
         accepted = judge(store, state, "accepted")
         edited = submit_edit(
-            store, state.id, set_ball("7.png", BALL), if_match=accepted.etag, actor="ben"
+            store, state.id, make_set_ball_edit("7.png", BALL), if_match=accepted.etag, actor="ben"
         )
         assert (edited.verdict.state, edited.verdict.stale) == ("accepted", True)
         back = undo_group_edit(store, state.id, if_match=edited.etag, actor="ben")
@@ -122,7 +122,9 @@ class TestSetVerdict:
         assert row.reviewer is None
 
     def test_a_verdict_on_a_group_that_somebody_changed_is_refused(self, store, state) -> None:
-        submit_edit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ben")
+        submit_edit(
+            store, state.id, make_set_ball_edit("7.png", BALL), if_match=state.etag, actor="ben"
+        )
         with pytest.raises(StaleRevisionError):
             judge(store, state, "accepted", note="note")
 
@@ -144,11 +146,11 @@ class TestSetVerdict:
         assert load_group_state(store, state.id) == after
 
     def test_another_policy_meanwhile_judges_the_verdict(self, store, state, monkeypatch) -> None:
-        read = module.read_solved_group
+        read = module.ensure_group_solution
 
         def slow(*arguments, **options):
             found = read(*arguments, **options)
-            monkeypatch.setattr(module, "read_solved_group", read)
+            monkeypatch.setattr(module, "ensure_group_solution", read)
             change_policy(
                 store,
                 state.dataset_id,
@@ -158,7 +160,7 @@ class TestSetVerdict:
             )
             return found
 
-        monkeypatch.setattr(module, "read_solved_group", slow)
+        monkeypatch.setattr(module, "ensure_group_solution", slow)
         with pytest.raises(InputError, match="fails a gate"):
             judge(store, state, "accepted")
         assert len(read_history(store, state.id)) == 1

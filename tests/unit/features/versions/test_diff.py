@@ -5,12 +5,17 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.diff import Setting, describe_diff, diff_versions, make_version_changelog
+from app.features.versions.diff import (
+    ChangedSetting,
+    describe_diff,
+    diff_versions,
+    make_version_changelog,
+)
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -38,7 +43,9 @@ def two(store, once, fill, make_group):
         state = load_group_state(store, ids[1])
         box = state.group.view("7.png").ball.box
         ball = BallAnnotation(box=Box(box.x + 0.5, box.y, box.width, box.height))
-        submit_edit(store, ids[1], set_ball("7.png", ball), if_match=state.etag, actor="ben")
+        submit_edit(
+            store, ids[1], make_set_ball_edit("7.png", ball), if_match=state.etag, actor="ben"
+        )
         judge(store, ids[1], "accepted")
         judge(store, ids[2], "rejected", "sides_confused")
         judge(store, ids[3], "accepted")
@@ -92,7 +99,7 @@ class TestDiffVersions:
     ) -> None:
         diff = replace(
             diff_versions(store, two[0].id, two[0].id),
-            settings=(Setting("policy x", before, after),),
+            settings=(ChangedSetting("policy x", before, after),),
         )
         assert describe_diff(diff)[1] == f"policy x: {told}."
 
@@ -129,7 +136,7 @@ def judged_and_moved(store, fill, make_group):
         state = load_group_state(store, group)
         box = state.group.view(key).ball.box
         ball = BallAnnotation(box=Box(box.x + pixels, box.y, box.width, box.height))
-        submit_edit(store, group, set_ball(key, ball), if_match=state.etag, actor="ben")
+        submit_edit(store, group, make_set_ball_edit(key, ball), if_match=state.etag, actor="ben")
     judge(store, ids[2], "accepted")
     return first, frozen(store, "v2", groups="passing")
 

@@ -7,7 +7,7 @@ from sqlalchemy import delete, func, select, text
 
 from app.db.log import LogModel
 from app.errors import ConflictError, InputError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
@@ -139,7 +139,7 @@ class TestFreeze:
 
     def test_a_group_that_changed_after_its_verdict_stays_out(self, store, judged) -> None:
         etag = load_group_state(store, judged[0]).etag
-        submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
+        submit_edit(store, judged[0], make_set_ball_edit("7.png", BALL), if_match=etag, actor="ben")
         assert rows_of(store, frozen(store))[0].why == "changed after its verdict"
 
     def test_two_homes_freeze_the_same_hash(self, store, judged, elsewhere) -> None:
@@ -156,7 +156,9 @@ class TestFreeze:
         match change:
             case "ball":
                 etag = load_group_state(store, judged[0]).etag
-                submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=etag, actor="ben")
+                submit_edit(
+                    store, judged[0], make_set_ball_edit("7.png", BALL), if_match=etag, actor="ben"
+                )
                 judge(store, judged[0], "accepted", note="all the same")
             case "verdict":
                 judge(store, judged[4], "accepted")
@@ -183,7 +185,9 @@ class TestFreeze:
 
     def test_later_edits_and_deleted_solutions_do_not_reach_a_version(self, store, judged) -> None:
         before, version = load_group_state(store, judged[0]), frozen(store)
-        submit_edit(store, judged[0], set_ball("7.png", BALL), if_match=before.etag, actor="ben")
+        submit_edit(
+            store, judged[0], make_set_ball_edit("7.png", BALL), if_match=before.etag, actor="ben"
+        )
         with store.write() as session:
             session.execute(delete(SolutionModel))
             session.execute(text("DELETE FROM calibration"))

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import NotFoundError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
@@ -66,7 +66,7 @@ class TestVerify:
 
     def test_it_holds_after_the_group_was_edited(self, store, version) -> None:
         state = load_group_state(store, 1)
-        submit_edit(store, 1, set_ball("7.png", None), if_match=state.etag, actor="ben")
+        submit_edit(store, 1, make_set_ball_edit("7.png", None), if_match=state.etag, actor="ben")
         assert verify_version(store, version.id).ok
 
     def test_one_bit_is_a_difference_with_its_place(self, store, version, monkeypatch) -> None:

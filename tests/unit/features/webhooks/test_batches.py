@@ -16,7 +16,7 @@ from app.features.agreement.service import (
 )
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, change_batch, make_batch
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -87,7 +87,7 @@ def annotate(store: Store, batch: int, person: str, moved: float) -> int:
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    submit_edit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
+    submit_edit(store, copy, make_set_ball_edit(view.key, ball), if_match=state.etag, actor=person)
     judge(store, copy, "accepted", person)
     return copy
 

@@ -13,7 +13,7 @@ from app.db.home import WEBHOOKS
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import submit_edit
 from app.features.groups.undo import undo_group_edit
 from app.features.jobs.queries import NewJob, insert_job, update_job
@@ -86,7 +86,7 @@ class TestTelling:
         after = submit_edit(
             allowed,
             state.id,
-            set_ball(state.group.views[0].key, BALL),
+            make_set_ball_edit(state.group.views[0].key, BALL),
             if_match=state.etag,
             actor="ann",
         )

@@ -14,7 +14,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError, OverloadedError
-from app.features.groups.edit import IncludeView, set_ball
+from app.features.groups.edit import SetViewInclusion, make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
@@ -71,7 +71,9 @@ class TestInStep:
         def edit() -> None:
             group = rng.choice(ids)
             name = f"{numbers[group]}{rng.choice(['', '_1'])}.png"
-            change = rng.choice([set_ball(name, None), IncludeView(name, rng.random() < 0.5)])
+            change = rng.choice(
+                [make_set_ball_edit(name, None), SetViewInclusion(name, rng.random() < 0.5)]
+            )
             submit_edit(
                 store, group, change, if_match=load_group_state(store, group).etag, actor="ann"
             )
@@ -107,7 +109,9 @@ class TestInStep:
         (group, *_) = fill(make_group(7), make_group(8))
         yields = YieldStore(store)
         etag = load_group_state(store, group).etag
-        etag = submit_edit(store, group, set_ball("7.png", None), if_match=etag, actor="ann").etag
+        etag = submit_edit(
+            store, group, make_set_ball_edit("7.png", None), if_match=etag, actor="ann"
+        ).etag
         assert get_yield(yields, 1).passing == 1
         undo_group_edit(store, group, if_match=etag, actor="ann")
         assert get_yield(yields, 1) == anew()
@@ -131,7 +135,7 @@ class TestInStep:
         submit_edit(
             store,
             group,
-            set_ball("7.png", None),
+            make_set_ball_edit("7.png", None),
             if_match=load_group_state(store, group).etag,
             actor="ann",
         )
@@ -188,7 +192,7 @@ class TestAfterARestart:
         yields = YieldStore(store)
         get_yield(yields, 1)
         for group, number in zip(ids, range(7, 13), strict=True):
-            change = set_ball(f"{number}.png", None)
+            change = make_set_ball_edit(f"{number}.png", None)
             submit_edit(
                 store, group, change, if_match=load_group_state(store, group).etag, actor="ann"
             )

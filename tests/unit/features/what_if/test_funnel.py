@@ -11,7 +11,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.service import get_dataset
-from app.features.groups.edit import IncludeView, set_ball
+from app.features.groups.edit import SetViewInclusion, make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies.service import change_policy
@@ -352,14 +352,14 @@ class TestYieldStore:
         assert get_yield(yields, 1).passing == 3
         state = load_group_state(store, ids[1])
         state = submit_edit(
-            store, ids[1], set_ball("8.png", None), if_match=state.etag, actor="ann"
+            store, ids[1], make_set_ball_edit("8.png", None), if_match=state.etag, actor="ann"
         )
         found = get_yield(yields, 1)
         assert [step.gate for step in found.funnel if step.dropped] == ["ball"]
         submit_edit(
             store,
             ids[2],
-            IncludeView("9.png", False),
+            SetViewInclusion("9.png", False),
             if_match=load_group_state(store, ids[2]).etag,
             actor="b",
         )

@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.features.what_if.cache import map_arrays, write_arrays
-from app.features.what_if.service import examine_yields
+from app.features.what_if.service import examine_yield_cache
 
 ARRAYS = {
     "jac": np.linspace(0, 1, 7),
@@ -35,7 +35,7 @@ def spoil(path: Path, array: str) -> None:
 
 
 def test_what_was_written_is_sound(settings: Settings) -> None:
-    check = examine_yields(settings)
+    check = examine_yield_cache(settings)
     assert check.ok
     assert "1 file in" in check.sentence
 
@@ -47,7 +47,7 @@ def test_a_column_with_another_bit_is_found_and_named(settings: Settings, array:
     map_arrays(path)
     with pytest.raises(ValueError, match=r"ab\.facts is damaged"):
         map_arrays(path, whole=True)
-    check = examine_yields(settings)
+    check = examine_yield_cache(settings)
     assert not check.ok
     assert "ab.facts" in check.sentence
     assert str(settings.yields) in (check.mend or "")
@@ -56,9 +56,9 @@ def test_a_column_with_another_bit_is_found_and_named(settings: Settings, array:
 def test_a_file_that_is_cut_short_is_found(settings: Settings) -> None:
     path = settings.yields / "1" / "ab.facts"
     path.write_bytes(path.read_bytes()[:-1])
-    assert not examine_yields(settings).ok
+    assert not examine_yield_cache(settings).ok
 
 
 def test_no_cache_is_no_fault(settings: Settings) -> None:
     shutil.rmtree(settings.yields)
-    assert examine_yields(settings).ok
+    assert examine_yield_cache(settings).ok

@@ -12,7 +12,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.groups.edit import set_ball
+from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
@@ -57,7 +57,7 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
 
     def edit() -> None:
         group = rng.choice(ids)
-        change = set_ball(f"{names[group]}.png", None)
+        change = make_set_ball_edit(f"{names[group]}.png", None)
         submit_edit(store, group, change, if_match=load_group_state(store, group).etag, actor="ann")
 
     def take_back() -> None:
@@ -98,7 +98,7 @@ def test_one_change_reads_one_group_also_after_a_restart(store, fill, make_group
     StatisticsCache(store).get_statistics(1)
     assert len(looked) == 1
     etag = load_group_state(store, group).etag
-    submit_edit(store, group, set_ball("7.png", None), if_match=etag, actor="ann")
+    submit_edit(store, group, make_set_ball_edit("7.png", None), if_match=etag, actor="ann")
     give_verdicts(store, 1, "passes:no", "rejected", "other", "no ball", actor="ben")
     assert StatisticsCache(store).get_statistics(1) == read_statistics(store, 1)
     assert len(looked) == 1
