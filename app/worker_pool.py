@@ -234,7 +234,7 @@ class ReadyWorker(WorkerPool):
         self.is_ready = False
         """Whether the process has been prepared."""
 
-    def begin(self) -> bool:
+    def start_and_check_ready(self) -> bool:
         """Whether it is ready; the first call, and the first after a crash, start a process."""
         if self.is_ready and not self.has_all_processes:
             self.is_ready = self._begun = False
@@ -254,5 +254,5 @@ class ReadyWorker(WorkerPool):
 
 def choose_least_busy_worker(workers: Sequence[ReadyWorker]) -> ReadyWorker | None:
     """The ready worker that has fewest tasks; the workers are started one after the other."""
-    ready = list(takewhile(ReadyWorker.begin, workers))
+    ready = list(takewhile(ReadyWorker.start_and_check_ready, workers))
     return min(ready, key=lambda worker: worker.tasks, default=None)

@@ -83,7 +83,7 @@ def open_nested(
         if len(header) < _HEADER.size or not header.startswith(_HEADER_MARK):
             raise zipfile.BadZipFile("has no header where the zip file's list of members says")
         start = at + _HEADER.size + sum(_HEADER.unpack(header))
-        return _open_zip_of_part(file.part(start, member.file_size))
+        return _open_zip_of_part(file.restrict_to_part(start, member.file_size))
     if not isinstance(path, Path):
         # To reach a member of it, all of it would have to be fetched.
         raise zipfile.BadZipFile("is a zip compressed inside another; put it there by itself")
@@ -213,7 +213,7 @@ class FilePart(io.RawIOBase):
         self.lenient = False
         """Whether names in a list of members that are no text are marked as such, not as UTF-8."""
 
-    def part(self, start: int, size: int) -> FilePart:
+    def restrict_to_part(self, start: int, size: int) -> FilePart:
         """This file, restricted to a part of it from now on."""
         self._start, self._size, self._at = start, size, 0
         return self

@@ -84,7 +84,7 @@ class CameraScore:
 
 def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> FrameScore:
     """One camera against the lines of its frame, pixels of ``size``."""
-    pitch = pitch.with_goal("inner")
+    pitch = pitch.with_goal_edge("inner")
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     jac = tuple(
         jaccard(classify_markings(measured, lines, gamma / 100 * size.diagonal))
@@ -155,7 +155,7 @@ def measure_error_without_marking(
         return None
     problem = ResectionProblem.of(size, policy)
     seen = make_observations(
-        make_lines({marking: lines[marking]}), policy.with_fitted_goal(pitch), size
+        make_lines({marking: lines[marking]}), policy.pitch_for_fitted_lines(pitch), size
     )
     return float(problem.distances(problem.parameters(camera), seen).max())
 

@@ -225,7 +225,7 @@ class Disagreement:
     limit: float | None = None
 
     @property
-    def weight(self) -> float:
+    def severity(self) -> float:
         """By which disagreements are ordered: how many times the limit it is."""
         if self.value is None or not self.limit:
             return 2.0
@@ -263,7 +263,7 @@ def find_disagreements(
     found = list(_find_group_disagreements(distance, verdicts, limits))
     for view in distance.views:
         found.extend(_find_view_disagreements(view, limits))
-    return tuple(sorted(found, key=lambda item: -item.weight))
+    return tuple(sorted(found, key=lambda item: -item.severity))
 
 
 def compute_medians_and_tails(distances: Iterable[GroupDistance]) -> dict[str, MedianAndTail]:
@@ -305,7 +305,7 @@ def _find_group_disagreements(
             True: ", which both uncertainties explain",
             False: ", more than their uncertainties explain",
         }
-        explained = "" if ball.is_explained is None else words[ball.is_explained]
+        explained = "" if ball.is_within_uncertainty is None else words[ball.is_within_uncertainty]
         text = f"the 3D balls are {ball.distance_m:.2f} m apart{explained}"
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
 

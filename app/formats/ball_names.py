@@ -148,7 +148,7 @@ class CocoCategories:
         self._found[category.id] += 1
 
     @property
-    def balls(self) -> int:
+    def ball_count(self) -> int:
         """How many balls were read."""
         return sum(self._found.values())
 
@@ -159,9 +159,9 @@ class CocoCategories:
             alone: Whether no other file brought a ball either.
         """
         taken = [category for category in self._all if category.ball]
-        if self.balls:
+        if self.ball_count:
             names = " and ".join(item.shown for item in taken if self._found[item.id])
-            count = plural(self.balls, "annotation")
+            count = plural(self.ball_count, "annotation")
             why = "" if self.listed else "; the file lists no categories"
             self._report.add_remark(f"{self._path}: category {names} is the ball ({count}){why}")
             return

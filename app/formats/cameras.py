@@ -394,7 +394,7 @@ def write_camera_files(
                     hint="Rename one of them in the source, and import it again.",
                 )
             if len(written) > counts["cameras"]:
-                put(name, format_camera_file(camera, record.covariance(view), view.size))
+                put(name, format_camera_file(camera, record.camera_covariance(view), view.size))
                 counts["cameras"] = len(written)
     return counts
 

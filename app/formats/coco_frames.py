@@ -189,7 +189,9 @@ def _report_picture_problems(
             f" the name: {_format_first_names(guessed)}"
         )
     if missing:
-        where = ", ".join(f"{folder or '.'}/" for folder in list(file.home.folders())[:_SHOWN])
+        where = ", ".join(
+            f"{folder or '.'}/" for folder in list(file.home.list_picture_folders())[:_SHOWN]
+        )
         sentence = (
             f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_format_first_names(missing)}"
             f" (looked in {where} and everywhere else)"

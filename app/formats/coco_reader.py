@@ -96,7 +96,7 @@ def read_coco(
             if value is not None:
                 file = _CocoFileReader(tree, name, finder, value, report, ball_category)
                 files.append(file)
-                for view in file.read_views():
+                for view in file.read_views_and_frames():
                     yield from groups.add(view, tree.shown(name))
                 file.release_parsed_content()
         yield from groups.release_incomplete_groups()
@@ -131,7 +131,7 @@ def _read_coco_file(
 
 def _report_ball_categories(files: list[_CocoFileReader], report: ReaderReport) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
-    some = any(file.categories.balls for file in files)
+    some = any(file.categories.ball_count for file in files)
     foreign = [file for file in files if file.frames.frames]
     for file in [file for file in foreign if not file.captions] or foreign:
         file.categories.report_ball_category(alone=not some)
@@ -185,7 +185,7 @@ class _CocoFileReader:
     def _report_problem(self, record: str, field: str | None, problem: str) -> None:
         self._report.add_problem_at(self.path, record, field, problem)
 
-    def read_views(self) -> Iterator[PlacedView]:
+    def read_views_and_frames(self) -> Iterator[PlacedView]:
         """Images of ours as views; those of others become ``frames``.
 
         What is wrong with one is reported and leaves it out.
@@ -308,12 +308,12 @@ class _CocoFileReader:
         try:
             if not parts:
                 require_safe_path(text)
-                raise image.error("file_name", "is not a file name")
+                raise image.make_field_error("file_name", "is not a file name")
             if not _is_relative_path(text) and self._joined.is_unique_image_name(parts[-1]):
                 key = parts[-1]
             return require_safe_path(key)
         except UnsafePathError as error:
-            raise image.error("file_name", error.message) from error
+            raise image.make_field_error("file_name", error.message) from error
 
     def _add_annotation(self, frame: CocoFrame, item: Mapping[str, Any], record: str) -> None:
         """One annotation of a frame: its ball, or the box of something else."""
@@ -373,7 +373,7 @@ class _CocoFileReader:
         if view is None:
             view = PurePosixPath(key).name
         if isinstance(view, bool) or not isinstance(view, str | int | float):
-            raise image.error("view", "is not a name that a view can have")
+            raise image.make_field_error("view", "is not a name that a view can have")
         return _require_safe_path(image, "group_id", group), _require_safe_path(image, "view", view)
 
 
@@ -382,7 +382,7 @@ def _require_safe_path(image: RecordFieldReader, field: str, value: str | float)
     try:
         return str(PurePosixPath(require_safe_path(text)))
     except UnsafePathError as error:
-        raise image.error(field, error.message) from error
+        raise image.make_field_error(field, error.message) from error
 
 
 def _is_relative_path(name: str) -> bool:

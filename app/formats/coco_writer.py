@@ -69,7 +69,7 @@ def write_coco(
             for view in record.group.views:
                 teaches = every_view or record.is_training_view(view)
                 prefix = PREFIX if teaches else OUTSIDE
-                name = f"{prefix}{record.split(view) or UNASSIGNED}.json"
+                name = f"{prefix}{record.split_of_view(view) or UNASSIGNED}.json"
                 if name not in files:
                     files[name] = stack.enter_context(_CocoFileWriter(folder / name, info or {}))
                 counts["images" if teaches else "images_outside"] += 1
@@ -127,7 +127,7 @@ def _image_to_json(
     computed = {
         CAMERA: None if camera is None else camera_to_json(camera),
         "jac": None if jac is None else _jac_by_tolerance(jac),
-        "ball_3d": list(record.point) if fit is not None and record.point else None,
+        "ball_3d": list(record.ball_point) if fit is not None and record.ball_point else None,
         "verdict": record.verdict_text,
     }
     return {
@@ -180,7 +180,7 @@ def _ball_annotation_to_json(
 
 
 def _ball_fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tuple[str, Any]]:
-    yield "ball_3d", list(record.point) if fit is not None and record.point else None
+    yield "ball_3d", list(record.ball_point) if fit is not None and record.ball_point else None
     for name in ("error_px", "optimized_diameter_px", "optimized_error_m", "depth_m"):
         yield name, None if fit is None else getattr(fit, name)
 

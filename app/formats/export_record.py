@@ -40,7 +40,7 @@ class ExportRecord:
     frames: Mapping[str, str] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
 
-    def split(self, view: View) -> str:
+    def split_of_view(self, view: View) -> str:
         """``train``, ``test``, ``valid`` or empty: that of the view, or else of its group."""
         return self.splits.get(view.key, self.group.split)
 
@@ -57,12 +57,12 @@ class ExportRecord:
         solved = self.view_solution(view)
         return solved.calibration.camera if solved else None
 
-    def covariance(self, view: View) -> tuple[float, ...] | None:
+    def camera_covariance(self, view: View) -> tuple[float, ...] | None:
         """Covariance of the parameters of a view's camera, row by row, where it is known, (64,)."""
         solved = self.view_solution(view)
         return None if solved is None else solved.calibration.known_covariance
 
-    def is_calibrated(self, view: View) -> bool:
+    def passes_camera_gates(self, view: View) -> bool:
         """Whether the view has a camera that passed the gates on cameras."""
         solved = self.view_solution(view)
         return (
@@ -93,7 +93,7 @@ class ExportRecord:
         return replace(self, group=replace(self.group, views=views))
 
     @property
-    def point(self) -> tuple[float, float, float] | None:
+    def ball_point(self) -> tuple[float, float, float] | None:
         """The 3D ball, pitch frame, metres, z down; None where it is not a finite place."""
         ball = self.solution.ball if self.solution else None
         return ball.point if ball is not None and all(map(math.isfinite, ball.point)) else None
@@ -114,5 +114,5 @@ def find_export_frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
     placed, called = record.frames.get(view.key), record.with_export_file_key(view)
     return placed or frame_path_by_match(
-        record.group, called, record.split(view), guess_frame_suffix(view)
+        record.group, called, record.split_of_view(view), guess_frame_suffix(view)
     )

@@ -162,7 +162,7 @@ class ExportKeyAssigner:
                     if self._owners.setdefault(name, owner) != owner:
                         self._contested.add(name)
 
-    def of(self, group: Group, splits: Mapping[str, str]) -> dict[str, str]:
+    def assign_keys(self, group: Group, splits: Mapping[str, str]) -> dict[str, str]:
         """The keys of views that are called by another one than their own, by their own.
 
         Raises:

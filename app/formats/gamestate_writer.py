@@ -131,7 +131,7 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
         for record in run:
             counts["groups"] += 1
             for view in record.group.views:
-                split = record.split(view)
+                split = record.split_of_view(view)
                 if split not in touched:
                     path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
                     # Whatever its split, a sequence is known by the name of its folder.
@@ -323,7 +323,7 @@ def _make_ball_fields(
 
 def _locate_spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     """The spot below the 3D ball, where that holds: the box of a ball in the air stands elsewhere."""
-    camera, point = record.camera(view), record.point
+    camera, point = record.camera(view), record.ball_point
     if camera is None or point is None or not record.has_ball_3d(view):
         return None
     # To the right in the image, along the grass.

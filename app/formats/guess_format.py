@@ -132,13 +132,13 @@ class FormatGuess:
     advice: str = CONVERT
 
     @property
-    def sentence(self) -> str:
+    def advice_sentence(self) -> str:
         """What to tell whoever gave the files for something else."""
         if self.format is None:
             return f"It looks like {self.name}: {self.advice}."
         return f"It looks like {self.format}: choose that format and import it again."
 
-    def is_stated_by(self, problem: str) -> bool:
+    def is_advice_in_problem(self, problem: str) -> bool:
         """Whether a problem says already what to do about such files, as ``describe_document`` does."""
         if self.format is not None:
             return f"import it as {self.format}" in problem

@@ -190,7 +190,7 @@ def write_issia_3d(
                 ]
                 spill.add((frame, 0, "", 0), json_text(cells))
                 counts["groups"] += 1
-                counts["points"] += record.point is not None
+                counts["points"] += record.ball_point is not None
                 counts["balls"] += sum(map(record.has_ball_3d, annotating.values()))
         _write_table(root / TABLE_3D, spill, everything)
     _write_calibration(root, cameras)
@@ -227,14 +227,14 @@ def _make_table_row(record: ExportRecord, annotating: dict[int, View]) -> Iterat
     # The published layout: a number for every camera that annotates, in a valid pair or not.
     solved = {camera: record.view_solution(view) for camera, view in annotating.items()}
     fits = {
-        camera: item.ball if item is not None and record.point is not None else None
+        camera: item.ball if item is not None and record.ball_point is not None else None
         for camera, item in solved.items()
     }
     yield frame_number_of_group(record.group)
     for camera in CAMERAS:
         yield from _get_ball_center(annotating.get(camera))
     yield len(annotating)
-    yield format_number_list(record.point) if record.point else None
+    yield format_number_list(record.ball_point) if record.ball_point else None
     yield from (_get_fit_value(fits.get(camera), "error_px") for camera in CAMERAS)
     yield format_number_list(list(annotating))
     yield from (_get_fit_value(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)

@@ -101,7 +101,7 @@ class IssiaFolder:
             split = _choose_split_of_cameras(cameras)
             yield Group(str(frame), views, match=MATCH, split=split, label=f"Frame {frame}")
 
-    def persons(self) -> Iterator[FramePersons]:
+    def persons_without_ball(self) -> Iterator[FramePersons]:
         """Persons of camera and frame pairs without a ball, which no group holds."""
         for camera in sorted(self.tracks):
             track = self.tracks[camera]

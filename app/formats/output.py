@@ -292,7 +292,7 @@ def _is_zip_in_store(out: StoredPath) -> bool:
 def _may_replace_zip_in_store(out: StoredPath) -> bool:
     """Whether there is nothing, or a zip that holds what its manifest lists."""
     try:
-        present = out.of(out.store.head(out.key))
+        present = out.make_object_path(out.store.head(out.key))
     except NotFoundError:
         return True
     try:

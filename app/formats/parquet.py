@@ -81,7 +81,7 @@ class ViewRow:
         return self.record.camera(self.view)
 
     @property
-    def fit(self) -> BallFit | None:
+    def view_ball_fit(self) -> BallFit | None:
         """The 3D ball in the view."""
         return self.record.ball_fit(self.view, self.everything)
 
@@ -148,7 +148,7 @@ def _make_camera_getter(get: Callable[[Camera], Any]) -> Getter:
 
 
 def _get_camera_covariance(row: ViewRow) -> list[float] | None:
-    known = row.record.covariance(row.view)
+    known = row.record.camera_covariance(row.view)
     if row.camera is None or known is None:
         return None
     rows = covariance_to_json(known, row.camera, row.view.size)
@@ -156,7 +156,7 @@ def _get_camera_covariance(row: ViewRow) -> list[float] | None:
 
 
 def _make_ball_fit_getter(name: str) -> Getter:
-    return lambda row: None if row.fit is None else getattr(row.fit, name)
+    return lambda row: None if row.view_ball_fit is None else getattr(row.view_ball_fit, name)
 
 
 def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
@@ -165,8 +165,8 @@ def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
 
 def _make_ball_coordinate_getter(number: int) -> Getter:
     def get_center_coordinate(row: ViewRow) -> float | None:
-        point = row.record.point
-        return None if point is None or row.fit is None else float(point[number])
+        point = row.record.ball_point
+        return None if point is None or row.view_ball_fit is None else float(point[number])
 
     return get_center_coordinate
 
@@ -174,7 +174,7 @@ def _make_ball_coordinate_getter(number: int) -> Getter:
 def _make_ball_getter(name: str) -> Getter:
     def get_center_coordinate(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
-        return None if ball is None or row.fit is None else getattr(ball, name)
+        return None if ball is None or row.view_ball_fit is None else getattr(ball, name)
 
     return get_center_coordinate
 
@@ -237,7 +237,7 @@ def _find_first_failing_gate(row: ViewRow) -> str | None:
 
 
 def _get_reprojected_ball_pixels(row: ViewRow) -> Any:
-    point = row.fit.reprojected if row.fit else None
+    point = row.view_ball_fit.reprojected if row.view_ball_fit else None
     return None if point is None else [float(point.x), float(point.y)]
 
 
@@ -268,7 +268,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("view", TEXT, lambda row: row.view.key),
     ("position", WHOLE, lambda row: row.position),
     ("match", TEXT, lambda row: row.record.group.match),
-    ("split", TEXT, lambda row: row.record.split(row.view)),
+    ("split", TEXT, lambda row: row.record.split_of_view(row.view)),
     ("group_split", TEXT, lambda row: row.record.group.split),
     ("views", WHOLE, lambda row: len(row.record.group.views)),
     ("label", TEXT, lambda row: row.record.group.label),
@@ -353,7 +353,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("given_covariance", LIST, lambda row: row.annotated_values.get("given_covariance")),
     ("picture", TEXT, _make_optional_annotated_getter("picture")),
     ("proposed", TEXT, _make_optional_annotated_getter("proposed")),
-    ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
+    ("extras", TEXT, lambda row: json_text(row.view.extras.to_plain_values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver_version(row)),
     ("software", TEXT, lambda row: read_software_version()),

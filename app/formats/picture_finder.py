@@ -99,7 +99,7 @@ class LabelLocation:
         inside = place.name.lower() in LABEL_FOLDERS
         return _format_path(place.parent if inside else place)
 
-    def folders(self) -> Iterable[str]:
+    def list_picture_folders(self) -> Iterable[str]:
         """Folders in which tools put the pictures of such a file, the likeliest first."""
         tops = list(dict.fromkeys((self.folder, self.root)))
         tops += [top for top in ("",) if top not in tops]
@@ -180,7 +180,7 @@ class PictureFinder:
         if not parts:
             return PictureSearchResult()
         name = "/".join(parts)
-        for folder in home.folders():
+        for folder in home.list_picture_folders():
             place = self._places.get(_join_path(folder, name))
             if place is not None and home.can_hold_picture(place, parts):
                 return PictureSearchResult(place, len(parts))

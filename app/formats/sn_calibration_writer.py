@@ -144,7 +144,7 @@ def write_sn_calibration(
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
                 owner = find_camera_owner(record.group, view)
-                name = names.assign_frame_name(place, record.split(view), view.size, owner)
+                name = names.assign_frame_name(place, record.split_of_view(view), view.size, owner)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
                     put(f"{LINES}/{name}.json", format_line_file(lines, view.size, others))
@@ -155,7 +155,7 @@ def write_sn_calibration(
                     info.add(f"{LINES}/{name}.jpg", origin)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
-                    text = format_camera_file(camera, record.covariance(view), view.size)
+                    text = format_camera_file(camera, record.camera_covariance(view), view.size)
                     put(camera_file_name(f"{CAMERAS}/{name}"), text)
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}

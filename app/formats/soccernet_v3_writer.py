@@ -238,8 +238,8 @@ def _add_rows(
         table.add((*_list_row_values(record, view, fit), *verdict))
         counts["views"] += 1
         counts["balls"] += record.has_ball_3d(view)
-        if record.split(view) in lists:
-            lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
+        if record.split_of_view(view) in lists:
+            lists[record.split_of_view(view)].write(f"{match}/{Path(view.key).stem}\n")
 
 
 def _list_row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
@@ -254,10 +254,10 @@ def _list_row_values(record: ExportRecord, view: View, fit: BallFit | None) -> I
     yield format_box(box) if box else None
     yield repr(replace_non_finite(camera_to_json(camera))) if camera else None
     yield from _get_view_jac(record, view) or (None,) * len(JAC_NAMES)
-    yield f"[array({format_number_list(record.point)})]" if fit and record.point else None
+    yield f"[array({format_number_list(record.ball_point)})]" if fit and record.ball_point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
     yield fit.optimized_diameter_px if fit else None
-    yield record.split(view) or None
+    yield record.split_of_view(view) or None
 
 
 def format_box(box: Box) -> str:
@@ -279,12 +279,12 @@ def _build_match_labels(
         for view in record.group.views:
             images = labels["actions"] if view is main else labels["replays"]
             images[view.key][IMAGE] |= _collect_computed_fields(record, view, everything)
-        calibrated = [view.key for view in replays if record.is_calibrated(view)]
+        calibrated = [view.key for view in replays if record.passes_camera_gates(view)]
         labels["actions"][main.key][IMAGE]["calibrated_replays"] = calibrated
     labels[GAME]["reconstructions"] = [
         record.group.views[0].key
         for record in records
-        if sum(map(record.is_calibrated, record.group.views)) > 1
+        if sum(map(record.passes_camera_gates, record.group.views)) > 1
     ]
     return labels
 
@@ -316,8 +316,8 @@ def _collect_computed_fields(record: ExportRecord, view: View, everything: bool)
         values["calibration"] = camera_to_json(camera)
     if jac is not None:
         values["JaC"] = {name: float(value) for name, value in zip(JAC_NAMES, jac, strict=True)}
-    if fit is not None and record.point is not None:
-        values["ball_3D"] = [float(value) for value in record.point]
+    if fit is not None and record.ball_point is not None:
+        values["ball_3D"] = [float(value) for value in record.ball_point]
         values["rep_error"] = fit.error_px
         values["optimized_error"] = fit.optimized_error_m
         values["optimized_d"] = fit.optimized_diameter_px

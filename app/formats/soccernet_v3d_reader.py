@@ -76,7 +76,7 @@ class SoccerNetV3DTable:
     asked: set[tuple[str, str]] = field(default_factory=set)
     """Entries of the lists that some group has asked for."""
 
-    def split(self, match: str, main: str) -> str:
+    def find_split_of_group(self, match: str, main: str) -> str:
         """Split of a group: as the lists have it, else as its rows do."""
         folder, stem = PurePosixPath(match).name, PurePosixPath(main).stem
         self.asked.add((folder, stem))
@@ -331,7 +331,7 @@ class _DatasetReader:
                 f"has a row in {TABLE} and is not in this file; the row is not used",
             )
         views = tuple(self._add_row_to_view(view, rows.get(view.key), path) for view in group.views)
-        split = self._table.split(group.match, main) or group.split
+        split = self._table.find_split_of_group(group.match, main) or group.split
         return replace(group, views=views, split=split)
 
     def _add_row_to_view(self, view: View, row: TableRow | None, path: str) -> View:
@@ -400,6 +400,6 @@ class _DatasetReader:
             key=f"{match}/{main}",
             views=tuple(views),
             match=match,
-            split=self._table.split(match, main),
+            split=self._table.find_split_of_group(match, main),
             label=group_label(match, main, {}),
         )

@@ -120,7 +120,7 @@ class ZipTree:
 
     def _locate_member_media(self, member: str) -> Media:
         if isinstance(self.path, StoredPath):
-            return Media(self.path.make_sealed_address(), member)
+            return Media(self.path.make_pinned_address(), member)
         return Media(str(self.path), member)
 
     def close(self) -> None:
@@ -354,7 +354,7 @@ class StoreTree:
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
-        path = self.path.of(self._find_stored_object(name))
+        path = self.path.make_object_path(self._find_stored_object(name))
         return io.BufferedReader(FilePart(path.reads(STREAM).pread, 0, path.size))
 
     def shown(self, name: str) -> str:
@@ -363,15 +363,21 @@ class StoreTree:
 
     def media(self, name: str) -> Media:
         """Where an object can be read later, as long as it is this one."""
-        return Media(self.path.of(self._find_stored_object(name)).make_sealed_address())
+        return Media(
+            self.path.make_object_path(self._find_stored_object(name)).make_pinned_address()
+        )
 
     def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file in the store can be read later."""
-        return Media(self.path.of(self._find_stored_object(name)).make_sealed_address(), member)
+        return Media(
+            self.path.make_object_path(self._find_stored_object(name)).make_pinned_address(), member
+        )
 
     def open_nested_zip(self, name: str, report: ReaderReport) -> ZipTree:
         """The members of a zip file in the store, of which no more than its list is fetched."""
-        return ZipTree(self.path.of(self._find_stored_object(name)), report, self._limits)
+        return ZipTree(
+            self.path.make_object_path(self._find_stored_object(name)), report, self._limits
+        )
 
     def close(self) -> None:
         """Nothing to release."""

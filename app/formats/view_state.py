@@ -49,7 +49,7 @@ class GroupHead:
     views: int = 0
     """How many views the group has; 0 where that is not known."""
 
-    def group(self, views: tuple[View, ...]) -> Group:
+    def make_group(self, views: tuple[View, ...]) -> Group:
         """The group of that head."""
         return Group(self.key, views, self.match, self.pitch, self.split, self.label)
 
@@ -85,7 +85,7 @@ def view_to_json(view: View) -> dict[str, Any]:
             if station.picture is None
             else {"picture": picture_geometry_to_json(station.picture)}
         ),
-        "lines": lines_to_json(station.annotated_lines),
+        "lines": lines_to_json(station.lines_with_not_visible),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }
@@ -98,9 +98,9 @@ class RecordFieldReader:
         self.path, self.record = path, record
         self.value: Mapping[str, Any] = value if isinstance(value, dict) else {}
         if not isinstance(value, dict):
-            raise self.error(None, "is not an object")
+            raise self.make_field_error(None, "is not an object")
 
-    def error(self, field: str | None, problem: str) -> DatasetFormatError:
+    def make_field_error(self, field: str | None, problem: str) -> DatasetFormatError:
         """What is wrong with a field."""
         return DatasetFormatError(self.path, self.record, field, problem)
 
@@ -110,7 +110,7 @@ class RecordFieldReader:
         if found is None and default is not None:
             return default
         if not isinstance(found, str) or len(found) > MAX_TEXT:
-            raise self.error(
+            raise self.make_field_error(
                 name, "is not a text, or too long" if name in self.value else "is missing"
             )
         return found
@@ -121,7 +121,7 @@ class RecordFieldReader:
         try:
             return require_safe_path(found)
         except UnsafePathError as error:
-            raise self.error(name, error.message) from error
+            raise self.make_field_error(name, error.message) from error
 
     def read_flag(self, name: str, default: bool) -> bool:
         """True or false."""
@@ -135,9 +135,9 @@ class RecordFieldReader:
             try:
                 side = fields.parse_whole_number(self.value.get(name))
             except ValueError as error:
-                raise self.error(name, str(error)) from error
+                raise self.make_field_error(name, str(error)) from error
             if not 2 <= side <= MAX_SIDE:
-                raise self.error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
+                raise self.make_field_error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
             sides.append(side)
         return ImageSize(*sides)
 
@@ -147,7 +147,7 @@ class RecordFieldReader:
             length, width = fields.parse_numbers(self.value.get("pitch") or [105.0, 68.0], 2)
             pitch = Pitch(length, width)
         except (ValueError, InputError) as error:
-            raise self.error("pitch", str(error)) from error
+            raise self.make_field_error("pitch", str(error)) from error
         match = self.read_short_text("match", "")
         return GroupHead(
             self.read_path_safe_text("group"),
@@ -163,14 +163,14 @@ class RecordFieldReader:
         try:
             return max(fields.parse_whole_number(self.value.get(name) or 0), 0)
         except ValueError as error:
-            raise self.error(name, str(error)) from error
+            raise self.make_field_error(name, str(error)) from error
 
     def read_view(self, size: ImageSize, extras: Extras) -> View:
         """Back from ``view_to_json``."""
         key = self.read_path_safe_text("view")
         calibration = self.read_short_text("calibration", "given")
         if calibration not in CALIBRATIONS:
-            raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
+            raise self.make_field_error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
         given, (lines, not_visible) = self.value.get("given"), self.read_lines()
         station = Station(
             key=self.read_path_safe_text("station"),
@@ -187,7 +187,7 @@ class RecordFieldReader:
         try:
             station = station.with_given_camera(camera, self.read_covariance())
         except InputError as error:
-            raise self.error("given_covariance", error.message) from error
+            raise self.make_field_error("given_covariance", error.message) from error
         included = self.read_flag("included", True)
         why = None if included else self.read_left_out()
         return View(key, station, self.read_balls(), None, included, extras, why)
@@ -205,7 +205,7 @@ class RecordFieldReader:
                 )
             return validate_camera_covariance(fields.parse_numbers(found, 64))
         except ValueError as error:
-            raise self.error("given_covariance", str(error)) from error
+            raise self.make_field_error("given_covariance", str(error)) from error
 
     def read_picture_geometry(self) -> PictureGeometry | None:
         """What was done to the picture since it was taken; None where nothing was."""
@@ -219,7 +219,7 @@ class RecordFieldReader:
             sigma = fields.parse_numbers(value.get("sigma"), 3)
             return PictureGeometry(aspect, (right, down), (sigma[0], sigma[1], sigma[2]))
         except (ValueError, InputError) as error:
-            raise self.error("picture", str(error)) from error
+            raise self.make_field_error("picture", str(error)) from error
 
     def read_left_out(self) -> ViewExclusion | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
@@ -233,7 +233,7 @@ class RecordFieldReader:
                 raise ValueError("needs a reason, and a note that is a text or null")
             return make_view_exclusion(reason, note)
         except (ValueError, InputError) as error:
-            raise self.error("left_out", str(error)) from error
+            raise self.make_field_error("left_out", str(error)) from error
 
     def read_lines(self) -> tuple[Lines, tuple[str, ...]]:
         """Back from ``lines_to_json``: the lines, and what is said not to be visible."""
@@ -244,9 +244,9 @@ class RecordFieldReader:
                     self._read_point(p) for p in fields.require_list(points)
                 ]
         except UnknownMarkingError as error:
-            raise self.error("lines", error.message) from error
+            raise self.make_field_error("lines", error.message) from error
         except ValueError as error:
-            raise self.error("lines", str(error)) from error
+            raise self.make_field_error("lines", str(error)) from error
         return make_lines(lines), tuple(sorted(name for name in lines if not lines[name]))
 
     def read_proposed_lines(self, lines: Lines) -> tuple[str, ...]:
@@ -254,7 +254,7 @@ class RecordFieldReader:
         try:
             found = set(fields.require_list(self.value.get("proposed") or []))
         except (TypeError, ValueError) as error:
-            raise self.error("proposed", "is not a list of markings") from error
+            raise self.make_field_error("proposed", "is not a list of markings") from error
         return tuple(name for name in lines if name in found)
 
     def read_balls(self) -> tuple[BallAnnotation, ...]:
@@ -263,7 +263,7 @@ class RecordFieldReader:
             values = fields.require_list(self.value.get("balls") or [])
             return tuple(self._read_ball(fields.require_object(item)) for item in values)
         except ValueError as error:
-            raise self.error("balls", str(error)) from error
+            raise self.make_field_error("balls", str(error)) from error
 
     def _read_ball(self, value: Mapping[str, Any]) -> BallAnnotation:
         box, point = value.get("box"), value.get("point")
@@ -380,7 +380,9 @@ class GroupAssembler:
     def _make_group(self, items: list[PlacedView]) -> Group:
         self._report.imported += len(items)
         items.sort(key=lambda item: item.position)
-        return items[0].head.group(tuple(self._with_shared_station(item.view) for item in items))
+        return items[0].head.make_group(
+            tuple(self._with_shared_station(item.view) for item in items)
+        )
 
     def _with_shared_station(self, view: View) -> View:
         station = view.station

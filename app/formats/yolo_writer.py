@@ -181,7 +181,7 @@ def write_yolo(
             counts["groups"] += 1
             for view in record.group.views:
                 image = _write_label_file(put, record, view, table, boxes, counts)
-                split, group = folder_name_of_split(record.split(view)), record.group
+                split, group = folder_name_of_split(record.split_of_view(view)), record.group
                 lists.add(split, group.match, group.key, image)
     _write_data_yaml(root, lists, counts)
     return counts
@@ -196,7 +196,7 @@ def _write_label_file(
     counts: dict[str, int],
 ) -> str:
     """Write the label file of a view; returns the name of its image."""
-    group, present, split = record.group, view.key in record.frames, record.split(view)
+    group, present, split = record.group, view.key in record.frames, record.split_of_view(view)
     image = record.frames.get(view.key) or frame_path_in_split(
         group, view, split, guess_frame_suffix(view)
     )

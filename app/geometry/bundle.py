@@ -49,17 +49,17 @@ class Rays:
     half_diagonals: FloatArray
 
     @property
-    def points(self) -> int:
+    def point_count(self) -> int:
         """How many points there are."""
         return int(self.point.max(initial=-1)) + 1
 
-    def select_subset(self, kept: BoolArray) -> Rays:
+    def select_rays_of_points(self, kept: BoolArray) -> Rays:
         """The rays of some points, shape (points,), in the same order."""
         return self._select_rays(kept, kept[self.point])
 
     def select_common_points(self, *cameras: int) -> tuple[Rays, IntArray]:
         """The rays of points that all of some cameras see, from these alone, and the points' rows."""
-        seen = np.zeros((self.points, len(self.half_diagonals)), dtype=np.bool_)
+        seen = np.zeros((self.point_count, len(self.half_diagonals)), dtype=np.bool_)
         seen[self.point, self.camera] = True
         kept: BoolArray = np.logical_and.reduce([seen[:, camera] for camera in cameras])
         rays = self._select_rays(kept, kept[self.point] & np.isin(self.camera, cameras))
@@ -125,7 +125,7 @@ def triangulate_nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray
         parameters: Of the cameras, shape (K, 8).
         rays: What was seen.
     """
-    normal, pull = np.zeros((rays.points, 3, 3)), np.zeros((rays.points, 3))
+    normal, pull = np.zeros((rays.point_count, 3, 3)), np.zeros((rays.point_count, 3))
     for row in range(len(parameters)):
         mine = rays.camera == row
         camera = camera_from_parameters(parameters[row], (0.0, 0.0), rays.half_diagonals[row])
@@ -180,7 +180,7 @@ def bundle_equations(
     cameras = len(parameters)
     gradient = np.zeros((cameras, PARAMETERS))
     information = np.zeros((cameras, PARAMETERS, cameras, PARAMETERS))
-    coupling = np.zeros((rays.points, 3, cameras, PARAMETERS))
+    coupling = np.zeros((rays.point_count, 3, cameras, PARAMETERS))
     weighted = weights[:, None, None] * at.by_camera
     for row in range(cameras):
         mine = rays.camera == row
@@ -190,7 +190,7 @@ def bundle_equations(
         np.add.at(coupling[:, :, row], rays.point[mine], shared)
     of_points, _ = _point_equations(at, weights, rays)
     size = cameras * PARAMETERS
-    mixed = coupling.reshape(rays.points, 3, size)
+    mixed = coupling.reshape(rays.point_count, 3, size)
     carried = np.linalg.solve(of_points, mixed)
     reduced = information.reshape(size, size) - np.tensordot(mixed, carried, ((0, 1), (0, 1)))
     squares = (at.residuals**2).sum(axis=1)
@@ -203,7 +203,7 @@ def _point_equations(
     at: LinearizedRays, weights: FloatArray, rays: Rays
 ) -> tuple[FloatArray, FloatArray]:
     """J^T W J and gradient of each point, shapes (F, 3, 3) and (F, 3)."""
-    information, gradient = np.zeros((rays.points, 3, 3)), np.zeros((rays.points, 3))
+    information, gradient = np.zeros((rays.point_count, 3, 3)), np.zeros((rays.point_count, 3))
     weighted = weights[:, None, None] * at.by_point
     np.add.at(information, rays.point, weighted.transpose(0, 2, 1) @ at.by_point)
     pulls = (weighted.transpose(0, 2, 1) @ at.residuals[..., None])[..., 0]

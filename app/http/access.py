@@ -67,7 +67,7 @@ def get_current_visibility(scope: Mapping[str, Any]) -> Visibility:
 def get_current_visibility_of_whole_datasets(scope: Mapping[str, Any]) -> Visibility:
     """The same without the datasets of which some groups are hidden from whoever asks."""
     login = get_current_login(scope)
-    return EVERYTHING if login is None else login.whole_visibility
+    return EVERYTHING if login is None else login.visibility_without_hidden_groups
 
 
 class AccessControl:
@@ -90,7 +90,7 @@ class AccessControl:
             NotLoggedInError: Nobody's.
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
-        if read_bearer_token(scope) is None and not self._team.cookies.session(scope):
+        if read_bearer_token(scope) is None and not self._team.cookies.read_session_token(scope):
             raise _not_logged_in_error()
         login = self._find_login_without_waiting(scope)
         if login is None:
@@ -116,14 +116,14 @@ class AccessControl:
             return require_allowed(self._store, subject, login)
         return await run_sync(require_allowed, self._store, subject, login, limiter=self._threads)
 
-    async def require_there(self, owned: list[OwnedMention]) -> None:
+    async def require_all_found(self, owned: list[OwnedMention]) -> None:
         """Raise NotFoundError where something is not there, or not for whoever asks."""
         if any(item.ownership is None for item in owned):
             error = await run_sync(find_missing_error, self._store, owned, limiter=self._threads)
             if error is not None:
                 raise error
 
-    async def is_hidden(self, owned: list[OwnedMention]) -> bool:
+    async def is_any_hidden(self, owned: list[OwnedMention]) -> bool:
         """Whether anything is there that is not for whoever asks."""
         if all(item.ownership is not None for item in owned):
             return False
@@ -132,7 +132,7 @@ class AccessControl:
     def attach_login(self, scope: Scope, login: Login) -> None:
         """Let a request be its sender's from here on."""
         scope[LOGIN] = login
-        READER.set(login.reader)
+        READER.set(login.restricted_reader)
         self._record_use_later(login)
 
     def end_stream_when_not_allowed(
@@ -163,14 +163,16 @@ class AccessControl:
         if read_bearer_token(scope) is not None:
             return None
         with suppress(StorageError):
-            return self._team.logins.find(self._team.cookies.session(scope) or "", at_once=True)
+            return self._team.logins.find(
+                self._team.cookies.read_session_token(scope) or "", at_once=True
+            )
         return None
 
     def _find_login(self, scope: Scope) -> Login:
         bearer = read_bearer_token(scope)
         if bearer is not None:
             return self._team.find_login_by_token(bearer, Request(scope))
-        login = self._team.logins.find(self._team.cookies.session(scope) or "")
+        login = self._team.logins.find(self._team.cookies.read_session_token(scope) or "")
         if login is None:
             raise _not_logged_in_error()
         return login

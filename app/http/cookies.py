@@ -44,7 +44,7 @@ class Cookies:
         """Name of the session cookie."""
         return self._make_cookie_name(SESSION)
 
-    def session(self, scope: Scope) -> str | None:
+    def read_session_token(self, scope: Scope) -> str | None:
         """The token of the session that a browser sent."""
         return read_cookie(scope, self.session_name)
 

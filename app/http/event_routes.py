@@ -117,10 +117,10 @@ def read_current_events(
     feed: Annotated[EventListener, Depends(open_event_feed)],
 ) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
-    jobs = services.events.open_jobs(start.dataset_id, visibility)
+    jobs = services.events.list_open_job_events(start.dataset_id, visibility)
     if start.solution is None:
         return jobs
-    return [*services.events.list_solved_since(start.solution, feed), *jobs]
+    return [*services.events.list_solved_events_since(start.solution, feed), *jobs]
 
 
 @router.get(

@@ -206,7 +206,7 @@ class EventPublisher:
         banner = read_banner(self._store)
         return "" if banner is None else encode_document(banner).decode()
 
-    def list_solved_since(self, solution: int, feed: EventListener) -> list[bytes]:
+    def list_solved_events_since(self, solution: int, feed: EventListener) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
         found = read_groups_solved_since(self._store, solution)
         return [_change_event(item) for item in found if feed.listens_to_change(item)]
@@ -262,7 +262,7 @@ class EventPublisher:
             self._feeds.discard(feed)
             self._counts.lost += feed.lost
 
-    def open_jobs(self, dataset_id: int | None, visibility: Visibility) -> list[bytes]:
+    def list_open_job_events(self, dataset_id: int | None, visibility: Visibility) -> list[bytes]:
         """Jobs that are under way, for whoever begins to listen."""
         return [_job_event(job) for job in self._jobs.open_jobs(dataset_id, visibility)]
 

@@ -123,7 +123,7 @@ class ProcessCollector(Collector):
         yield from _worker_metrics()
 
     def _collect_request_metrics(self) -> Iterator[Metric]:
-        limits = {one.request_class.name: one for one in self._limits.all}
+        limits = {one.request_class.name: one for one in self._limits.class_limiters}
         busy = {name: one.busy for name, one in limits.items()}
         yield _make_labelled_gauge("requests_busy", "Requests at work, by class.", "class", busy)
         waiting = {name: one.waiting for name, one in limits.items()}

@@ -171,7 +171,7 @@ class IndexPage:
     modules: tuple[str, ...]
     """What the page asks for beside them: paths below the folder of the application."""
 
-    def at(self, moment: str, banner: str = "") -> IndexPage:
+    def with_moment_and_banner(self, moment: str, banner: str = "") -> IndexPage:
         """The page that says how things stood when it was asked for, and which notice is shown."""
         attributes = f'data-moment="{moment}" ' + (
             f'data-banner="{escape(banner)}" ' if banner else ""
@@ -361,7 +361,7 @@ def install_pages(
         if moment is not None:
             # A page without it asks once more for what it has read when its stream begins.
             with suppress(StorageError):
-                index = index.at(moment(), banner())
+                index = index.with_moment_and_banner(moment(), banner())
         headers = {"ETag": index.etag, "Cache-Control": REVALIDATED}
         if index.etag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)

@@ -242,7 +242,7 @@ def _find_owned_mentions(store: Store, subject: RequestSubject, login: Login) ->
     for mention in sorted(subject.mentions, key=lambda item: item.place != "query"):
         ownership = _find_ownership_if_needed(store, mention.named, login, visibility)
         if mention.place == "query" and ownership is not None and ownership.dataset is not None:
-            visibility = Visibility(False, frozenset({ownership.dataset}), login.owner)
+            visibility = Visibility(False, frozenset({ownership.dataset}), login.ownership_name)
         found.append(OwnedMention(mention, ownership))
     return found
 
@@ -265,7 +265,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
             _require_create_permission(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
-            role = find_role_by_ownership(item.ownership, roles, login.owner)
+            role = find_role_by_ownership(item.ownership, roles, login.ownership_name)
             require_permission(role, action, here)
             if query_of_request_reveals_hidden_work(subject):
                 require_permission(role, Action.REVIEW, here)
@@ -325,13 +325,17 @@ def _find_ownership_if_needed(
 ) -> Ownership | None:
     roles: DatasetRoles = login.roles
     if not _needs_ownership(named, roles):
-        return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
+        return (
+            None
+            if roles.everywhere is Role.NONE
+            else Ownership(None, frozenset({login.ownership_name}))
+        )
     found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
-    hidden = find_role_by_ownership(found, roles, login.owner) is Role.NONE or is_hidden_from(
-        store, named, found, login.reader
-    )
+    hidden = find_role_by_ownership(
+        found, roles, login.ownership_name
+    ) is Role.NONE or is_hidden_from(store, named, found, login.restricted_reader)
     return None if hidden else found
 
 

@@ -179,7 +179,7 @@ class RequestLimits:
         self._of = {one: ClassLimiter(one, team=team) for one in REQUEST_CLASSES}
 
     @property
-    def all(self) -> Collection[ClassLimiter]:
+    def class_limiters(self) -> Collection[ClassLimiter]:
         """Those of all classes."""
         return self._of.values()
 

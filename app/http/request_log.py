@@ -78,7 +78,7 @@ def find_client_address(scope: Scope) -> str:
     """Where a request comes from: behind a proxy of ours, the address that it forwards."""
     team: TeamLogin | None = getattr(scope["app"].state, "team", None)
     if team is not None:
-        return team.address(Request(scope))
+        return team.find_client_address(Request(scope))
     client = scope.get("client")
     return client[0] if client else ""
 

@@ -128,10 +128,10 @@ class Route(APIRoute):
         _replace_names_by_ids(scope, owned)
 
         async def answer_if_existing(request: Request) -> Response:
-            await access.require_there(owned)
+            await access.require_all_found(owned)
             return await handler(request)
 
-        hidden = partial(access.is_hidden, owned)
+        hidden = partial(access.is_any_hidden, owned)
         response = await self._answer_once_per_key(gate, request, body, answer_if_existing, hidden)
         if isinstance(response, StreamingResponse) and response.media_type == "text/event-stream":
             return access.end_stream_when_not_allowed(response, asked, login)

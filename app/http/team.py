@@ -83,7 +83,7 @@ class AttemptLimits:
         """
         self._count_attempt(CODE_LIMIT, "code", name.strip().lower()[:200])
 
-    def count_token(self, address: str) -> None:
+    def count_invalid_token(self, address: str) -> None:
         """Count a token that is not valid; those that are count nothing.
 
         Raises:
@@ -101,7 +101,9 @@ class AttemptLimits:
 
     def _count_attempt(self, limit: RateLimitItem, *key: str) -> None:
         if self._shared is not None:
-            wait = self._shared.count_attempt("/".join(key), limit.amount, limit.get_expiry())
+            wait = self._shared.count_attempt_or_get_wait(
+                "/".join(key), limit.amount, limit.get_expiry()
+            )
             if wait is not None:
                 raise TooManyTriesError(max(1, math.ceil(wait)))
         elif not self._windows.hit(limit, *key):
@@ -162,14 +164,14 @@ class TeamLogin:
         )
 
     @property
-    def secure(self) -> bool:
+    def uses_tls(self) -> bool:
         """Whether people come by TLS."""
         return (self.url or "").startswith("https://")
 
     @property
     def cookies(self) -> Cookies:
         """The cookies of its server."""
-        return Cookies(self.secure, self.devices)
+        return Cookies(self.uses_tls, self.devices)
 
     def count_login_attempt(self, request: Request, name: str | None = None) -> None:
         """Count that somebody asks whether a password is right.
@@ -178,7 +180,7 @@ class TeamLogin:
             TooManyTriesError: There were too many.
         """
         device = None if name is None else self.cookies.find_known_device(request.scope, name)
-        self.attempts.count_login(self.address(request), name, device)
+        self.attempts.count_login(self.find_client_address(request), name, device)
 
     def make_landing_url(self, request: Request) -> str:
         """The address to which the provider sends people back."""
@@ -218,13 +220,13 @@ class TeamLogin:
             " localhost.",
         )
 
-    def token(self, request: Request) -> str | None:
+    def get_session_token(self, request: Request) -> str | None:
         """The token that a browser sent."""
-        return self.cookies.session(request.scope)
+        return self.cookies.read_session_token(request.scope)
 
-    def login(self, request: Request) -> Login | None:
+    def find_login(self, request: Request) -> Login | None:
         """Who that is, on a route that anybody may ask."""
-        token = self.token(request)
+        token = self.get_session_token(request)
         return self.logins.find(token) if token else None
 
     def find_login_by_token(self, token: str, request: Request) -> Login:
@@ -235,16 +237,16 @@ class TeamLogin:
             TooManyTriesError: Nor were too many before, from the same address.
         """
         try:
-            return self.tokens.find(token)
+            return self.tokens.find_login_of_token(token)
         except NotLoggedInError:
-            self.attempts.count_token(self.address(request))
+            self.attempts.count_invalid_token(self.find_client_address(request))
             raise
 
     def get_base_url(self, request: Request) -> str:
         """The beginning of addresses that are shown to people."""
         return self.url or f"{request.url.scheme}://{request.headers['host']}"
 
-    def address(self, request: Request) -> str:
+    def find_client_address(self, request: Request) -> str:
         """Where a request comes from: the last address that a proxy of ours has seen."""
         peer = request.client.host if request.client else ""
         forwarded = request.headers.getlist("x-forwarded-for")

@@ -279,7 +279,7 @@ def _read_first_bytes(media: Media, count: int) -> bytes:
     path = Path(media.path)
     _require_regular_file(path)
     if media.member is not None:
-        return _ARCHIVES.head(path, media.member, count)
+        return _ARCHIVES.read_first_bytes(path, media.member, count)
     return _read_file(path, count)
 
 

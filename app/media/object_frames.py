@@ -52,12 +52,12 @@ class ArchiveMembers:
             TooLargeError: The member is larger than ``limit`` bytes, whatever it declares.
             ImageError: The archive or the member is damaged.
         """
-        data = self.head(path, member, limit + 1)
+        data = self.read_first_bytes(path, member, limit + 1)
         if len(data) > limit:
             raise TooLargeError(f"{path.name}/{member} is larger than {limit} bytes")
         return data
 
-    def head(self, path: _Place, member: str, count: int) -> bytes:
+    def read_first_bytes(self, path: _Place, member: str, count: int) -> bytes:
         """The first bytes of a member, so many at most; raises NotFoundError and ImageError."""
         archive, name = self._find_member(path, member)
         try:
@@ -136,7 +136,7 @@ def _open_nested_archive(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile
 
 def _archive_key(path: _Place) -> _Key:
     if isinstance(path, StoredPath):
-        return path.make_sealed_address(), 0, path.size, ""
+        return path.make_pinned_address(), 0, path.size, ""
     try:
         status = path.stat()
     except OSError as error:

@@ -125,7 +125,7 @@ class StoredPath:
         """Itself: there are no links."""
         return self
 
-    def of(self, stored: StoredObject) -> StoredPath:
+    def make_object_path(self, stored: StoredObject) -> StoredPath:
         """An object of the same store."""
         return StoredPath(self.store_name, self.settings, stored.key, stored)
 
@@ -133,7 +133,7 @@ class StoredPath:
         """Begin to read the object in ranges."""
         return RangeReader(self, ahead)
 
-    def make_sealed_address(self) -> str:
+    def make_pinned_address(self) -> str:
         """Address of the object with what its content is called: another content is not it."""
         assert self.stored is not None
         return pin_address_to_content(str(self), self.stored.etag)
@@ -159,7 +159,7 @@ def find_path(settings: Settings, address: str) -> StoredPath:
     path = StoredPath(name, store.settings, key)
     if key:
         with suppress(NotFoundError):
-            return path.of(store.head(key))
+            return path.make_object_path(store.head(key))
     if next(store.iterate_objects_below(key), None) is None:
         raise NotFoundError(f"there is nothing at {path}")
     return path

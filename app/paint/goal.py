@@ -67,7 +67,7 @@ class GoalHeight:
     planned: float
 
     @property
-    def is_square(self) -> bool:
+    def has_expected_height(self) -> bool:
         """Whether the goal is as high as it should be."""
         return LEAST_SQUARE < self.share < MOST_SQUARE
 
@@ -88,7 +88,7 @@ def find_goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
     """
     height, width = image.shape[:2]
     level, unit = _smooth_darkest_channel(image)
-    found, frame = {}, pitch.with_goal("middle")
+    found, frame = {}, pitch.with_goal_edge("middle")
     for name in GOAL_PARTS:
         places = frame.sample(name, 0.02, 0.02)
         pixels = camera.project(places, folded=True)
@@ -125,7 +125,7 @@ def measure_goal_height(image: Image, camera: Camera, pitch: Pitch) -> GoalHeigh
 def _measure_height_of_side(
     level: npt.NDArray[np.float32], unit: float, camera: Camera, pitch: Pitch, side: str
 ) -> GoalHeight | None:
-    bar = pitch.with_goal("middle").shapes[f"Goal {side} crossbar"]
+    bar = pitch.with_goal_edge("middle").shapes[f"Goal {side} crossbar"]
     assert isinstance(bar, Segment)
     ends = np.array([bar.start, bar.end])
     bars = [

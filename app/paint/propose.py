@@ -573,7 +573,7 @@ def explain_non_square_pixels(image: Image, camera: Camera, pitch: Pitch) -> str
         pitch: The pitch.
     """
     seen = measure_goal_height(image, camera, pitch)
-    if seen is not None and seen.is_square:
+    if seen is not None and seen.has_expected_height:
         return None
     if seen is not None and seen.is_certain:
         return (

@@ -111,7 +111,7 @@ class PictureToScore:
     center: FloatArray
 
     @property
-    def unit(self) -> float:
+    def scale_from_960_wide(self) -> float:
         """Pixels for a pixel at 960 wide."""
         return int(self.field.shape[1]) / 960.0
 
@@ -163,7 +163,7 @@ def _compute_unexplained_paint(
     def process_slice(part: slice) -> None:
         kernels.write_unexplained_paint(
             parameters[part], points, m.shapes, m.nearest, m.origin, CELL_M,
-            reach * picture.unit, picture.half_diagonal, cost[part],
+            reach * picture.scale_from_960_wide, picture.half_diagonal, cost[part],
         )  # fmt: skip
 
     list(executor.map(process_slice, _split_range(len(parameters))))
@@ -183,7 +183,7 @@ def compute_cost_terms(
     def process_slice(part: slice) -> None:
         kernels.write_unsupported_markings(
             parameters[part], m.samples, SPACING_M, picture.distance, picture.field,
-            picture.center, reach * picture.unit, picture.half_diagonal, result[part],
+            picture.center, reach * picture.scale_from_960_wide, picture.half_diagonal, result[part],
         )  # fmt: skip
 
     list(executor.map(process_slice, _split_range(len(parameters))))
@@ -218,7 +218,7 @@ def refine_cameras(
     """
     m = build_marking_table(pitch)
     moved = np.ascontiguousarray(parameters).copy()
-    pixels = np.asarray(scales) * picture.unit
+    pixels = np.asarray(scales) * picture.scale_from_960_wide
 
     def process_slice(part: slice) -> None:
         kernels.refine_camera_rows(
@@ -319,7 +319,7 @@ def _combine_scores(looked: FloatArray, picture: PictureToScore) -> FloatArray:
     """Explained times supported; markings drawn where no grass is count half."""
     unexplained, unsupported, on, off = looked.T
     score = (1 - unexplained) * (1 - unsupported) * (1 - 0.5 * off / (on + off + 1))
-    score = np.where(on > LEAST_LENGTH_PX * picture.unit, score, 0.0)
+    score = np.where(on > LEAST_LENGTH_PX * picture.scale_from_960_wide, score, 0.0)
     return np.where(np.isfinite(score), score, 0.0)
 
 
@@ -371,6 +371,9 @@ def is_same_view(shown: VisiblePaint, other: Camera, picture: PictureToScore) ->
         return False
     for turn in (1.0, -1.0):
         apart = np.hypot(*(other.project(shown.ground * (turn, turn, 1.0)) - shown.pixels).T)
-        if np.median(np.where(np.isfinite(apart), apart, np.inf)) < SAME_PX * picture.unit:
+        if (
+            np.median(np.where(np.isfinite(apart), apart, np.inf))
+            < SAME_PX * picture.scale_from_960_wide
+        ):
             return True
     return False

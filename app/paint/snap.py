@@ -79,7 +79,7 @@ class SnappedCamera:
     planned: FloatArray | None = None
 
     @property
-    def points(self) -> int:
+    def point_count(self) -> int:
         """How many places of paint hold the camera."""
         return len(self.evidence.offsets)
 
@@ -190,7 +190,7 @@ class _SnapProblem:
         self.problem = PaintProblem.of(resection, self.first, covariance)
         self._covariance = covariance
         self.size = reading.height, reading.width
-        self.unit = self.problem.unit
+        self.unit = self.problem.pixels_per_reference_pixel
 
     def camera(self, parameters: FloatArray) -> Camera:
         return camera_from_parameters(

@@ -49,7 +49,7 @@ class PictureScale:
         """A place of the picture in pixels of the annotations; centres of pixels are whole."""
         return ImagePoint((x + 0.5) / self.x - 0.5, (y + 0.5) / self.y - 0.5)
 
-    def box(self, box: Box) -> Box:
+    def to_picture_box(self, box: Box) -> Box:
         """A box of the annotations in pixels of the picture."""
         x, y = ((box.x + 0.5) * self.x - 0.5, (box.y + 0.5) * self.y - 0.5)
         return Box(x, y, box.width * self.x, box.height * self.y)
@@ -159,7 +159,7 @@ def read_paint_of_image(
         people: Boxes in which nothing is believed, pixels of ``size``; what is larger than people
             are is looked into all the same.
     """
-    pitch = policy.with_fitted_goal(pitch)
+    pitch = policy.pitch_for_fitted_lines(pitch)
     why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewPaint("nothing", sentence=why)
@@ -168,7 +168,7 @@ def read_paint_of_image(
     if why is not None:
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
-    hidden = [scale.box(box) for box in drop_boxes_larger_than_a_person(people, size)]
+    hidden = [scale.to_picture_box(box) for box in drop_boxes_larger_than_a_person(people, size)]
     seen_grass = exclude_hidden_boxes(grass, hidden)
     paint = find_line_like_pixels(image, grass) & seen_grass
     nothing = ViewPaint("nothing", line_like=scale.to_annotation_line_points(paint))

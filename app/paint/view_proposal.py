@@ -68,7 +68,7 @@ def propose_lines_in_image(
         pitch: The pitch.
         policy: Prior of the distortion, and which line of the paint its markings are.
     """
-    pitch = policy.with_painted_goal(pitch)
+    pitch = policy.pitch_for_paint(pitch)
     why = explain_unreadable_picture(image, size)
     if why is not None:
         return ViewProposal("nothing", why, {})
@@ -94,7 +94,7 @@ def propose_lines_in_image(
         None if seen is None else seen.explained,
         found.runner_up,
         None if snapped is None or snapped.error_px is None else snapped.error_px / scale.x,
-        0 if snapped is None else snapped.points,
+        0 if snapped is None else snapped.point_count,
     )
 
 
@@ -175,7 +175,7 @@ def _fit_drawn_lines(
 ) -> _DrawnLinesFit:
     camera = calibrate(lines, pitch, size, policy).camera
     fits = measure_calibration(
-        Calibration("lines", camera), drawn, policy.with_fitted_goal(pitch), size
+        Calibration("lines", camera), drawn, policy.pitch_for_fitted_lines(pitch), size
     ).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
     return _DrawnLinesFit(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})

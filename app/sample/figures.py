@@ -44,7 +44,7 @@ class Pose:
 
     joints: FloatArray
 
-    def of(self, name: str) -> FloatArray:
+    def joint_positions(self, name: str) -> FloatArray:
         """One joint of everybody, shape (people, 3)."""
         return self.joints[:, INDEX[name]]
 
@@ -221,7 +221,7 @@ def draw_person(
     low, high = person.joints.min(axis=0) - margin, person.joints.max(axis=0) + margin
     tall = float(high[1] - low[1])
     patch = Patch(low, high, int(np.clip(round(420 / max(tall, 1.0)), 2, 5)), image)
-    if patch.is_empty:
+    if patch.is_outside_frame:
         return
     rng = np.random.default_rng([look.seed, person.index])
     skin, hair, boots = (

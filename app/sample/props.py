@@ -43,7 +43,7 @@ class Patch:
         self.pixels = np.zeros(shape, np.uint8)
 
     @property
-    def is_empty(self) -> bool:
+    def is_outside_frame(self) -> bool:
         """Whether it lies outside the frame."""
         return self.pixels.size == 0
 
@@ -116,7 +116,7 @@ class Patch:
         Args:
             gain: Light on it, per channel.
         """
-        if self.is_empty:
+        if self.is_outside_frame:
             return
         size = (self.right - self.left, self.bottom - self.top)
         small = cv2.resize(self.pixels, size, interpolation=cv2.INTER_AREA).astype(np.float32)
@@ -145,7 +145,7 @@ def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     if scale is None or np.isnan(everything).any() or not _is_in_frame(everything, image):
         return
     patch = Patch(everything.min(axis=0) - 2, everything.max(axis=0) + 2, 2, image)
-    if patch.is_empty:
+    if patch.is_outside_frame:
         return
     # A cord of 4 mm is thinner than a pixel of the enlarged patch: it covers a part of it.
     wide = 0.005 * scale * 2
@@ -202,7 +202,7 @@ def draw_goal_posts(image: Image, camera: Camera, sign: float, gain: Colour) -> 
     radii = [POST_RADIUS * camera.focal_length[0] / depth for depth in depths]
     margin = max(float(r.max()) for r in radii) + 2
     patch = Patch(everything.min(axis=0) - margin, everything.max(axis=0) + margin, 3, image)
-    if patch.is_empty:
+    if patch.is_outside_frame:
         return
     for share, shift, colour in ((1.0, 0.0, (150.0, 150.0, 150.0)), (0.74, -0.22, WHITE)):
         for path, radius in zip(pixels, radii, strict=True):

@@ -124,13 +124,13 @@ class _FilmedShot:
     cameras: list[Camera]
     source: int | None
 
-    def picture(self, frame: int) -> float:
+    def picture_number_of(self, frame: int) -> float:
         """Which picture a frame shows; between two there is a share."""
         return (frame - self.begin) * self.part.speed * self.rate / FPS
 
     def shown(self, frame: int) -> tuple[float, bool]:
         """Which picture a frame shows in truth, and whether it mixes the two beside it."""
-        wanted = self.picture(frame)
+        wanted = self.picture_number_of(frame)
         whole = abs(wanted - round(wanted)) < 1e-6
         if whole or self.part.between == "repeat":
             return (float(round(wanted)) if whole else math.floor(wanted)), False

@@ -71,7 +71,7 @@ class Extras:
     lines: tuple[Mapping[str, Any], ...] = ()
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
-    def values(self) -> dict[str, Any] | None:
+    def to_plain_values(self) -> dict[str, Any] | None:
         """As plain values; None where there is nothing."""
         if not (self.boxes or self.lines or self.metadata):
             return None
@@ -82,7 +82,7 @@ class Extras:
         }
 
     @property
-    def places(self) -> tuple[Box, ...]:
+    def pixel_boxes(self) -> tuple[Box, ...]:
         """Where its boxes lie, pixels; what has no corners that are numbers is left out."""
         return tuple(box for item in self.boxes if (box := _box_from_corners(item)) is not None)
 

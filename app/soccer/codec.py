@@ -182,7 +182,7 @@ def station_to_json(station: Station) -> Json:
         "key": station.key,
         "size": [station.size.width, station.size.height],
         "shared": station.shared,
-        "lines": lines_to_json(station.annotated_lines),
+        "lines": lines_to_json(station.lines_with_not_visible),
         "given": None if station.given is None else camera_to_json(station.given),
         "calibration": station.calibration,
         "flipped": station.flipped,
@@ -260,7 +260,7 @@ def view_to_json(view: View, station: Json | None = None) -> Json:
         "balls": [ball_to_json(ball) for ball in view.balls],
         "media": media_to_json(view.media),
         "included": view.included,
-        "extras": view.extras.values(),
+        "extras": view.extras.to_plain_values(),
         **({} if why is None else {"left_out": why}),
         **({} if view.noise == 1 else {"noise": float(view.noise)}),
     }
@@ -287,7 +287,7 @@ def group_to_json(group: Group) -> Json:
         "views": [view_to_json(view) for view in group.views],
     }
     if group.paint:
-        whole["paint"] = {view: reading.text for view, reading in group.paint.items()}
+        whole["paint"] = {view: reading.canonical_json for view, reading in group.paint.items()}
     return whole
 
 
@@ -442,7 +442,9 @@ def hash_group_inputs(
     """
     pairs = views or ((view_digest(view), station_digest(view.station)) for view in group.views)
     read = paint_digests_to_json(group.paint) if paint is None else paint
-    return hash_solver_inputs(group.pitch, pairs, group.positions, read, group.noise)
+    return hash_solver_inputs(
+        group.pitch, pairs, group.positions, read, group.noise_factors_by_view
+    )
 
 
 def hash_imported_group(group: Group) -> str:

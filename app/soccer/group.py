@@ -194,7 +194,7 @@ class Station:
         )
 
     @property
-    def annotated_lines(self) -> Lines:
+    def lines_with_not_visible(self) -> Lines:
         """The lines, and those that are said not to be visible, without points: as they are kept."""
         if not self.not_visible:
             return self.lines
@@ -284,7 +284,7 @@ class Group:
     paint: Mapping[str, PaintReading] = field(default_factory=dict)
 
     @property
-    def noise(self) -> dict[str, float]:
+    def noise_factors_by_view(self) -> dict[str, float]:
         """How noisy balls are, where that is unlike the dataset's, by the view's key."""
         return {view.key: view.noise for view in self.views if view.noise != 1}
 

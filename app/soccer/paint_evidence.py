@@ -107,7 +107,7 @@ class PaintReading:
     tripod: TripodPitchCamera | None = None
 
     @cached_property
-    def text(self) -> str:
+    def canonical_json(self) -> str:
         """The one JSON text of it."""
         return json.dumps(
             reading_to_json(self),
@@ -120,7 +120,7 @@ class PaintReading:
     @cached_property
     def digest(self) -> str:
         """Digest of all of it, 32 hexadecimal digits."""
-        return digest_content(self.text.encode())
+        return digest_content(self.canonical_json.encode())
 
 
 def reading_to_json(reading: PaintReading) -> dict[str, Any]:

@@ -169,7 +169,7 @@ class Pitch:
         beside, inside = half * (self.goal != "inner"), half * (self.goal == "laws")
         return _make_marking_shapes(self.length / 2, self.width / 2, beside, inside)
 
-    def with_goal(self, goal: GoalEdge) -> Pitch:
+    def with_goal_edge(self, goal: GoalEdge) -> Pitch:
         """The same pitch with that line of its goals, and of its lines."""
         return self if goal == self.goal else replace(self, goal=goal)
 

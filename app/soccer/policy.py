@@ -155,13 +155,13 @@ class CalibrationPolicy:
     so that many of one say less than as many of several (``observations.SHARED_SHARE``). Not in the
     ``repr``: ``compute_calibration_key`` knows it where it is set."""
 
-    def with_fitted_goal(self, pitch: Pitch) -> Pitch:
+    def pitch_for_fitted_lines(self, pitch: Pitch) -> Pitch:
         """A pitch with the goals and lines that are fitted."""
-        return pitch.with_goal(self.goal)
+        return pitch.with_goal_edge(self.goal)
 
-    def with_painted_goal(self, pitch: Pitch) -> Pitch:
+    def pitch_for_paint(self, pitch: Pitch) -> Pitch:
         """A pitch with the lines that paint is fitted to where nothing was clicked; goals are not painted."""
-        return pitch.with_goal(self.goal) if self.goal == "laws" else pitch
+        return pitch.with_goal_edge(self.goal) if self.goal == "laws" else pitch
 
     @cached_property
     def cached_repr(self) -> str:

@@ -163,14 +163,14 @@ class Calibration:
     goal: GoalEdge = field(default="inner", metadata={"later": True})
 
     @property
-    def is_known(self) -> bool:
+    def has_known_covariance(self) -> bool:
         """Whether a covariance says how exact the camera is; one of zeros says nothing."""
         return self.covariance is not None and sum(self.covariance[::9]) > 0
 
     @property
     def known_covariance(self) -> tuple[float, ...] | None:
         """How exact the camera is, with what is not known of the pitch: as files and documents say it."""
-        known = self.covariance if self.camera is not None and self.is_known else None
+        known = self.covariance if self.camera is not None and self.has_known_covariance else None
         if known is None or not all(map(math.isfinite, known)):
             return None
         return tuple(map(sum, zip(known, self.pitch_covariance or [0.0] * 64, strict=True)))
@@ -178,7 +178,7 @@ class Calibration:
     @property
     def is_given_without_uncertainty(self) -> bool:
         """Whether the camera came with the data and nobody says how exact it is."""
-        return self.source == "given" and not self.is_known
+        return self.source == "given" and not self.has_known_covariance
 
     @property
     def agreement(self) -> float | None:
@@ -409,7 +409,7 @@ class Solution:
         return all(gate.passed for gate in self.gates if gate.active)
 
     @property
-    def unusable_ball(self) -> Finding | None:
+    def unusable_ball_finding(self) -> Finding | None:
         """Why nobody can use the ball, or None."""
         return next((item for item in self.findings if item.is_unusable_ball), None)
 

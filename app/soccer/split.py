@@ -49,7 +49,7 @@ class Split:
                 "a split by camera needs at least one test camera", pointer="/split/test_cameras"
             )
 
-    def values(self) -> dict[str, Any]:
+    def to_plain_values(self) -> dict[str, Any]:
         """What of it counts, as plain values."""
         values = asdict(self)
         wanted = {
@@ -99,7 +99,7 @@ class Splitter:
         sides = {self._split_of_view(view) for view in views}
         return sides.pop() if len(sides) == 1 else ""
 
-    def views(self, views: Sequence[str]) -> dict[str, str] | None:
+    def splits_by_view(self, views: Sequence[str]) -> dict[str, str] | None:
         """Split by view; None where all views go with their group."""
         if self.split.kind != "camera" or len({self._split_of_view(view) for view in views}) == 1:
             return None

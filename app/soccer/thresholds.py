@@ -57,7 +57,7 @@ class Threshold:
         return value
 
     @property
-    def is_word(self) -> bool:
+    def has_word_choices(self) -> bool:
         """Whether its values are words, the choices."""
         return any(isinstance(choice, str) for choice in self.choices)
 
@@ -72,7 +72,7 @@ class Threshold:
         return _COMPARISONS.get(self.name)
 
     @property
-    def text(self) -> str:
+    def label_with_unit(self) -> str:
         """What it is, in a line."""
         text = f"{self.label}, {self.unit}" if self.unit else self.label
         return f"{text}; must be exceeded" if self.comparison == "more than" else text

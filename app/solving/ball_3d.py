@@ -71,7 +71,7 @@ def judge_pairs(
         TriangulatedPair(
             a=item.a.view,
             b=item.b.view,
-            point=item.place,
+            point=item.point_as_tuple,
             errors_px=item.errors_px,
             baseline_m=item.baseline_m,
             parallax_degrees=item.parallax_degrees,

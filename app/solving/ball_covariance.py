@@ -221,8 +221,11 @@ def ray_covariances(
     found: FloatArray = noise[:, None, None] * np.eye(2)
     plain: dict[int, UncertainCameraParameters] = {}
     for row, observation in enumerate(observations):
-        if observation.camera_numbers is not None and observation.camera_numbers.picture is None:
-            plain[row] = observation.camera_numbers
+        if (
+            observation.uncertain_camera_parameters is not None
+            and observation.uncertain_camera_parameters.picture is None
+        ):
+            plain[row] = observation.uncertain_camera_parameters
         else:
             found[row] += calibration_covariance(
                 observation.calibration, observation.size, points[row]

@@ -84,7 +84,7 @@ def calibrate(
         size: Annotated size.
         policy: Robust scale, prior of the distortion, whether labels are checked.
     """
-    pitch = policy.with_fitted_goal(pitch)
+    pitch = policy.pitch_for_fitted_lines(pitch)
     observations = make_observations(lines, pitch, size)
     measurements = count_measurements(observations)
     if measurements < MIN_MEASUREMENTS:
@@ -125,7 +125,7 @@ def calibrate_near_position(
     """
     if alone.camera is None:
         return alone
-    problem, pitch = ResectionProblem.of(size, policy), policy.with_fitted_goal(pitch)
+    problem, pitch = ResectionProblem.of(size, policy), policy.pitch_for_fitted_lines(pitch)
     left_out = [suspect.marking for suspect in alone.suspects]
     observations = make_observations(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
@@ -152,7 +152,7 @@ def calibrate_picture(
     Args:
         picture: What was done to it.
     """
-    problem, pitch = ResectionProblem.of(size, policy), policy.with_fitted_goal(pitch)
+    problem, pitch = ResectionProblem.of(size, policy), policy.pitch_for_fitted_lines(pitch)
     observations = make_observations(lines, pitch, size)
     if count_measurements(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
@@ -203,7 +203,7 @@ def analyse_lone_frame(
         return None
     problem = ResectionProblem.of(size, policy)
     left_out = [suspect.marking for suspect in found.suspects]
-    pitch = policy.with_fitted_goal(pitch)
+    pitch = policy.pitch_for_fitted_lines(pitch)
     observations = make_observations(lines, pitch, size)
     parameters = problem.parameters(found.camera)
     return estimate_lone_frame_uncertainty(
@@ -235,7 +235,7 @@ def _covariances_with_picture(
         whole = search.covariance(unknowns)
     except DegenerateGeometryError:
         return np.full((PARAMETERS, PARAMETERS), np.inf), np.full((WIDTH, WIDTH), np.inf)
-    return search.transfer_covariance(unknowns, whole), whole
+    return search.fold_picture_into_camera_covariance(unknowns, whole), whole
 
 
 def _make_calibration(
@@ -291,7 +291,7 @@ def _measure_against_station(
 ) -> Calibration:
     """A calibration measured against the lines of its station, and what is said not to be visible."""
     size, shortest = station.size, min_counted_marking_px(policy, station.size)
-    fitted = policy.with_fitted_goal(pitch)
+    fitted = policy.pitch_for_fitted_lines(pitch)
     return measure_calibration(found, station.lines, fitted, size, station.not_visible, shortest)
 
 
@@ -321,7 +321,7 @@ def calibrate_from_paint(
     resection = ResectionProblem.of(size, policy)
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
     problem = PaintProblem.of(resection, resection.parameters(clicked.camera), known)
-    found = solve_paint(problem, reading.evidence, policy.with_fitted_goal(pitch))
+    found = solve_paint(problem, reading.evidence, policy.pitch_for_fitted_lines(pitch))
     if found is None:
         return replace(clicked, paint=replace(fit, reason=PAINT_DISAGREES))
     pitch_covariance = found.pitch

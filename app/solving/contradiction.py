@@ -63,7 +63,7 @@ class Contradiction:
         return group_sigma_widening(self.chi_square)
 
     @property
-    def is_motion(self) -> bool:
+    def may_be_motion(self) -> bool:
         """Whether a ball in play moves as far within a second."""
         least = self.gap_m if self.moved_m is None else self.moved_m
         return least is not None and least <= SPEEDS[1] * LONGEST_S

@@ -65,7 +65,7 @@ def estimate_view_line_noise(
     """
     problem, parameters = _make_resection_problem(calibration, size, policy)
     return problem.line_noise(
-        parameters, make_observations(lines, policy.with_fitted_goal(pitch), size)
+        parameters, make_observations(lines, policy.pitch_for_fitted_lines(pitch), size)
     )
 
 
@@ -78,10 +78,10 @@ def collect_view_line_evidence(
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
     problem, parameters = _make_resection_problem(calibration, size, policy)
-    rows = problem.compute_noise_rows(
-        parameters, make_observations(lines, policy.with_fitted_goal(pitch), size)
+    rows = problem.compute_line_noise_inputs(
+        parameters, make_observations(lines, policy.pitch_for_fitted_lines(pitch), size)
     )
-    return collect_line_evidence(*rows).rescaled_to_pixels(problem.unit)
+    return collect_line_evidence(*rows).rescaled_to_pixels(problem.pixels_per_reference_pixel)
 
 
 def compute_view_line_covariance(
@@ -274,7 +274,7 @@ class SourceNoiseFactors:
     covariance: FloatArray
     numbers: FloatArray
 
-    def of(self, kind: str) -> tuple[SourceNoise, ...]:
+    def noise_of_kind(self, kind: str) -> tuple[SourceNoise, ...]:
         """The sources of one kind, the noisiest first."""
         found = []
         for at, source in enumerate(self.sources):

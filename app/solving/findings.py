@@ -290,7 +290,7 @@ def _make_contradiction_finding(item: Contradiction, group: Group, ball: Ball3D 
         )
     if item.view is not None:
         sentences.append("Without this view the others agree.")
-    if item.gap_m is not None and item.is_motion and not _has_common_clock(group):
+    if item.gap_m is not None and item.may_be_motion and not _has_common_clock(group):
         sentences.append(_describe_time_gap(item.gap_m, item.moved_m))
     if item.view is not None:
         sentences.append("If its ball is drawn on the ball, leave the view out.")

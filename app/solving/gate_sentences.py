@@ -355,7 +355,7 @@ def _make_chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: 
     passed = "chi_square" not in group.failed
     cameras = [view.calibration for view in group.views if view.key in found.views]
     if active and not all(
-        item.is_known or (item.is_given_without_uncertainty and policy.given_sigma_px)
+        item.has_known_covariance or (item.is_given_without_uncertainty and policy.given_sigma_px)
         for item in cameras
     ):
         sentence = "not judged: a camera has no known uncertainty"

@@ -104,7 +104,7 @@ def project_markings_like_evaluator(
         lines: The annotated points of each marking, pixels.
         measured: Of ``measure_markings`` for that pitch.
     """
-    judged = pitch.with_goal("inner")
+    judged = pitch.with_goal_edge("inner")
     if judged == pitch:
         return dict(measured)
     others = MARKINGS if pitch.goal == "laws" else GOAL_PARTS
@@ -179,7 +179,7 @@ def camera_jaccard(
         symmetric: Benchmark mode: the better of the labels as given and turned by 180 degrees.
             Never for curation, where a wrong side is an error to be found.
     """
-    projected = project_markings(camera, pitch.with_goal("inner"), size)
+    projected = project_markings(camera, pitch.with_goal_edge("inner"), size)
     measured = measure_markings(projected, lines)
     values = tuple(jaccard(classify_markings(measured, lines, gamma)) for gamma in gammas_px)
     if not symmetric:

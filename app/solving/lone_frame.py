@@ -144,9 +144,9 @@ def estimate_lone_frame_uncertainty(
                 whole.largest_distance_px(left_out)
                 <= RELABELLED * GAMMA_SHARE * problem.size.diagonal
             ):
-                return replace(whole.to_lone_frame(), explains=tuple(left_out))
+                return replace(whole.to_uncertainty(), explains=tuple(left_out))
         kept = observations.without(*left_out)
-        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).to_lone_frame()
+        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).to_uncertainty()
     except np.linalg.LinAlgError:
         return None
 
@@ -175,7 +175,7 @@ class _LoneFrameFit:
         seen = np.isin(self.frame.observations.marking, [MARKINGS.index(name) for name in markings])
         return float(self.rows.distance[seen].max(initial=0.0))
 
-    def to_lone_frame(self) -> LoneFrameUncertainty:
+    def to_uncertainty(self) -> LoneFrameUncertainty:
         """As it is used."""
         carry = _camera_jacobian(self.rows)
         spread, off = self.frame.compute_covariance(self.rows), carry @ self.off
@@ -219,9 +219,9 @@ class _LoneFrameProblem:
         """Covariance of the thirteen, shape (13, 13)."""
         # Residuals in units of a click, so that the prior weighs what it says.
         freedom = max(len(rows.apart) - PARAMETERS, 1)
-        least = MIN_CLICK_SIGMA_PX * self.problem.unit
+        least = MIN_CLICK_SIGMA_PX * self.problem.pixels_per_reference_pixel
         click = max(float(np.sqrt(rows.apart @ rows.apart / freedom)), least)
-        known = self.problem.noise
+        known = self.problem.click_noise_prior
         known = replace(known, sigma_px=known.sigma_px / click, floor_px=known.floor_px / click)
         return compute_line_noise(
             rows.apart / click,
@@ -245,7 +245,11 @@ class _LoneFrameProblem:
         self, unknowns: FloatArray, rows: _WeightedResiduals, width: int = WIDTH
     ) -> FloatArray:
         """To the minimum about some unknowns, the first ``width`` of them free, shape (13,)."""
-        prior = self._prior_information() * CLICK_SIGMA_PX**2 * self.problem.unit**2
+        prior = (
+            self._prior_information()
+            * CLICK_SIGMA_PX**2
+            * self.problem.pixels_per_reference_pixel**2
+        )
         pull = prior * unknowns
         pull[KAPPA] -= prior[KAPPA] * self.problem.distortion_mean
         free = rows.jacobian[:, :width]
@@ -283,8 +287,8 @@ class _LoneFrameProblem:
     def _cost(self, unknowns: FloatArray, rows: _WeightedResiduals) -> float:
         """Robust cost of the points and of the prior, in variances of a click."""
         click, scale = (
-            CLICK_SIGMA_PX * self.problem.unit,
-            WIDE * self.problem.robust_scale_px * self.problem.unit,
+            CLICK_SIGMA_PX * self.problem.pixels_per_reference_pixel,
+            WIDE * self.problem.robust_scale_px * self.problem.pixels_per_reference_pixel,
         )
         robust = np.sqrt(1 + (rows.distance / scale) ** 2) - 1
         cost = 2 * (scale / click) ** 2 * float(self.problem.weights(self.observations) @ robust)
@@ -332,7 +336,7 @@ class _LoneFrameProblem:
         )
         offsets = offsets / length
         distance = np.hypot(offsets[:, 0], offsets[:, 1])
-        scale = WIDE * self.problem.robust_scale_px * self.problem.unit
+        scale = WIDE * self.problem.robust_scale_px * self.problem.pixels_per_reference_pixel
         weight = (1 + (offsets**2).sum(axis=1) / scale**2) ** -0.25
         beyond = np.flatnonzero(offsets[:, 1])
         rows = np.append(np.arange(len(offsets)), beyond)

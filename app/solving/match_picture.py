@@ -123,21 +123,21 @@ class _FittedFrame:
         # What markings have in common is in FRAME_SIGMA.
         problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
         observations = make_observations(
-            frame.lines, policy.with_fitted_goal(frame.pitch), frame.size
+            frame.lines, policy.pitch_for_fitted_lines(frame.pitch), frame.size
         )
         return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
-    def at(self, warp: FloatArray) -> _FittedFrame:
+    def refit_with_warp(self, warp: FloatArray) -> _FittedFrame:
         """The frame with another picture, its camera refined."""
         seen = undo_warp(self.problem, self.observations, warp)
         return replace(self, camera=self.problem.refine(seen, self.camera[None]).parameters)
 
-    def share(self, warp: FloatArray) -> Share:
+    def information_on_picture(self, warp: FloatArray) -> Share:
         """What the frame says of the picture, shapes (3,) and (3, 3), its camera eliminated."""
         search = PictureProblem(self.problem, self.observations, warp, np.full(3, np.inf))
         unknowns = np.append(self.camera, warp)
         apart, jacobian = search.rows(unknowns)
-        scale = self.problem.robust_scale_px * self.problem.unit
+        scale = self.problem.robust_scale_px * self.problem.pixels_per_reference_pixel
         weighted = jacobian / np.sqrt(1 + (apart / scale) ** 2)[:, None]
         gradient, information = weighted.T @ apart, weighted.T @ jacobian
         prior = self.problem.prior()
@@ -154,8 +154,8 @@ def _adjust_picture(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArra
     """The three numbers once they settle, and each frame's pull and information."""
     warp = np.zeros(3)
     for _ in range(_ROUNDS):
-        seen = [frame.at(warp) for frame in seen]
-        shares = [frame.share(warp) for frame in seen]
+        seen = [frame.refit_with_warp(warp) for frame in seen]
+        shares = [frame.information_on_picture(warp) for frame in seen]
         pull, informations = (np.array(part) for part in zip(*shares, strict=True))
         information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
         step = -np.linalg.solve(information, pull.sum(axis=0) + warp / PRIOR_SIGMA**2)

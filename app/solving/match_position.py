@@ -63,7 +63,7 @@ class CameraPlaceModel:
     chi_square: FloatArray
     cost: float
 
-    def at(self, pan: float) -> tuple[FloatArray, FloatArray]:
+    def place_at_pan(self, pan: float) -> tuple[FloatArray, FloatArray]:
         """Place for a pan (radians) and its variance along each axis, shapes (3,)."""
         turned = np.hstack([np.eye(3), pan * np.eye(3)])
         place: FloatArray = turned @ self.unknowns
@@ -177,7 +177,7 @@ class FrameCameraPlaces:
         scatter = float(np.median(model.chi_square))
         if scatter > GIVE_UP:
             return None
-        mean, variance = model.at(pan)
+        mean, variance = model.place_at_pan(pan)
         return make_match_position_prior(
             mean, np.sqrt((variance + WANDER_M**2) * max(1.0, scatter / SCATTER))
         )

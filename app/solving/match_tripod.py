@@ -78,7 +78,7 @@ def solve_match_tripod(
         problem = ResectionProblem.of(view.size, policy)
         points, sigmas = collect_curve_points(reading.evidence, view.size)
         frame = PaintSightings(problem.parameters(calibration.camera), points, sigmas)
-        at = (view.size, policy.with_fitted_goal(group.pitch))
+        at = (view.size, policy.pitch_for_fitted_lines(group.pitch))
         frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))
     for (size, pitch), some in frames.items():
         for number, tripod in _solve_tripod_cameras(some, size, pitch, policy).items():
@@ -102,7 +102,7 @@ def _solve_tripod_cameras(
             left = left[1:]
             continue
         cameras = {number: shown.fit_camera(frame) for number, frame in frames.items()}
-        worst = WORST_PX * ResectionProblem.of(size, policy).unit
+        worst = WORST_PX * ResectionProblem.of(size, policy).pixels_per_reference_pixel
         fitting = [
             number for number in left if shown.error_px(frames[number], cameras[number][0]) <= worst
         ]

@@ -75,9 +75,9 @@ class PaintProblem:
         )
 
     @property
-    def unit(self) -> float:
+    def pixels_per_reference_pixel(self) -> float:
         """Pixels of this picture for a pixel at 960 x 540."""
-        return max(self.resection.unit, LEAST_UNIT)
+        return max(self.resection.pixels_per_reference_pixel, LEAST_UNIT)
 
     def compute_step(self, parameters: FloatArray, seen: PaintOffsets, strict: bool) -> FloatArray:
         """The step towards the paint, shape (8,): iteratively reweighted least squares.
@@ -108,13 +108,13 @@ class PaintProblem:
         offsets, sigmas = np.ascontiguousarray(seen.offsets), np.ascontiguousarray(seen.sigmas)
         write_paint_step(
             offsets, sigmas, base, np.ascontiguousarray(seen.jacobian), information, pull, INNER_STEPS,
-            DAMPING, strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
+            DAMPING, strict, ROBUST_PX * self.pixels_per_reference_pixel, STRICT_SIGMAS, STRICT_PX * self.pixels_per_reference_pixel, moved,
         )  # fmt: skip
         return moved
 
     def robust_weights(self, rest: FloatArray, sigmas: FloatArray) -> FloatArray:
         """Strict weight of each place by how far off it lies, pixels, both shape (N,)."""
-        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
+        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.pixels_per_reference_pixel)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
 
     def mahalanobis_squared(self, parameters: FloatArray) -> float:
@@ -200,7 +200,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
     error = float(np.median(np.abs(seen.offsets)))
     if (
         noise is None
-        or error > problem.unit * WORST_PX
+        or error > problem.pixels_per_reference_pixel * WORST_PX
         or problem.mahalanobis_squared(parameters) > MOST_SURPRISING
     ):
         return None

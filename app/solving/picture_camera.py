@@ -151,7 +151,10 @@ class PictureProblem:
             start = self.mean + warp * (self.sigma > KNOWN_SIGMA)
             seen = undo_warp(self.problem, self.observations, start)
             starts.append(np.append(self.problem.refine(seen, camera[None]).parameters, start))
-        best, variance = np.array(starts), (CLICK_SIGMA_PX * self.problem.unit) ** 2
+        best, variance = (
+            np.array(starts),
+            (CLICK_SIGMA_PX * self.problem.pixels_per_reference_pixel) ** 2,
+        )
         for _ in range(_ROUNDS):
             found = levenberg_marquardt(self._make_normal_equations(variance), best, _STEPS)
             best = found.parameters[np.argmin(found.cost)][None]
@@ -165,7 +168,10 @@ class PictureProblem:
         scale = self._robust_scale
         robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
         freedom = max(len(apart) - WIDTH + 2, 1)
-        return max(float(robust.sum()) / freedom, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
+        return max(
+            float(robust.sum()) / freedom,
+            (MIN_CLICK_SIGMA_PX * self.problem.pixels_per_reference_pixel) ** 2,
+        )
 
     @_ABSURD_IS_INFINITE
     def covariance(self, unknowns: FloatArray) -> FloatArray:
@@ -182,7 +188,7 @@ class PictureProblem:
         prior[PARAMETERS:] = self.sigma**-2
         rows = jacobian * (weight / click_px)[:, None]
         require_determined_parameters(rows.T @ rows + np.diag(prior))
-        known = self.problem.noise
+        known = self.problem.click_noise_prior
         noise = compute_line_noise(
             apart * weight / click_px,
             rows,
@@ -194,7 +200,9 @@ class PictureProblem:
         return noise.parameters
 
     @_ABSURD_IS_INFINITE
-    def transfer_covariance(self, unknowns: FloatArray, covariance: FloatArray) -> FloatArray:
+    def fold_picture_into_camera_covariance(
+        self, unknowns: FloatArray, covariance: FloatArray
+    ) -> FloatArray:
         """Covariance of a camera's parameters that says for picture and camera where pixels lie.
 
         What an uncertain axis does to pixels, another direction of view does as well: the
@@ -219,7 +227,7 @@ class PictureProblem:
 
     @property
     def _robust_scale(self) -> float:
-        return self.problem.robust_scale_px * self.problem.unit
+        return self.problem.robust_scale_px * self.problem.pixels_per_reference_pixel
 
     def _cross_marking_distances(
         self, camera: FloatArray, seen: Observations, moved: FloatArray, with_slopes: bool = False
@@ -340,7 +348,7 @@ def _fit_picture_distortion(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
 ) -> PictureDistortion | None:
     warp = np.zeros(3)
-    floor = (MIN_CLICK_SIGMA_PX * problem.unit) ** 2
+    floor = (MIN_CLICK_SIGMA_PX * problem.pixels_per_reference_pixel) ** 2
     first = _linearize(problem, parameters, observations, warp)
     freedom = first.points - _WIDTH
     if freedom < 1:
@@ -408,7 +416,7 @@ def _linearize(
         for step in steps
     ]
     inside = offsets[:, 1] == 0
-    scale = 4 * problem.robust_scale_px * problem.unit
+    scale = 4 * problem.robust_scale_px * problem.pixels_per_reference_pixel
     weight = (1 + (offsets[:, 0] / scale) ** 2) ** -0.25
     rows = (np.column_stack([jacobians[:, 0], *by_warp]) * weight[:, None])[inside]
     errors = (offsets[:, 0] * weight)[inside]

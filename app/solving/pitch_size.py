@@ -194,7 +194,7 @@ def estimate_pitch(
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
             are of one match show pitches of several sizes.
     """
-    pitch = policy.with_fitted_goal(Pitch())
+    pitch = policy.pitch_for_fitted_lines(Pitch())
     seen = [
         _FittedFrame.of(frames[index], pitch, policy) for index in select_informative_frames(frames)
     ]
@@ -270,7 +270,7 @@ class _FittedFrame:
         observations = make_observations(frame.lines, pitch, frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations))
 
-    def on(self, pitch: Pitch) -> _FittedFrame:
+    def refit_on_pitch(self, pitch: Pitch) -> _FittedFrame:
         """The frame on another pitch, its camera refined."""
         moved = replace(self.observations, curves=pitch_curves(pitch))
         return replace(
@@ -279,7 +279,7 @@ class _FittedFrame:
             fit=self.problem.refine(moved, self.fit.parameters[None]),
         )
 
-    def share(self) -> Share:
+    def information_on_size(self) -> Share:
         """What the frame says of length and width, whatever its camera."""
         gradient, information = self._normal_equations()
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
@@ -302,7 +302,7 @@ class _FittedFrame:
         by_length = -by_camera[:, :, X] * length[:, None]
         by_width = -by_camera[:, :, Y] * width[:, None]
         rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
-        scale = self.problem.robust_scale_px * self.problem.unit
+        scale = self.problem.robust_scale_px * self.problem.pixels_per_reference_pixel
         weight = 1 / np.sqrt(1 + (offsets**2).sum(axis=1) / scale**2)
         weighted = weight[:, None, None] * rows
         gradient = np.einsum("nri,nr->i", weighted, offsets)
@@ -343,8 +343,8 @@ def _adjust_size(
 ) -> tuple[Pitch, list[_FittedFrame], list[Share]]:
     """Sizes and cameras adjusted together until the sizes settle."""
     for _ in range(_ROUNDS):
-        seen = [item.on(pitch) for item in seen]
-        shares = [item.share() for item in seen]
+        seen = [item.refit_on_pitch(pitch) for item in seen]
+        shares = [item.information_on_size() for item in seen]
         gradient, information = (sum(part) for part in zip(*shares, strict=True))
         step = -np.linalg.solve(information + np.eye(2) / _LOOSE_M**2, gradient)
         pitch = _resize_pitch(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))

@@ -164,15 +164,19 @@ class ResectionProblem:
         )
 
     @property
-    def unit(self) -> float:
+    def pixels_per_reference_pixel(self) -> float:
         """Pixels of this image for a pixel at 960 x 540."""
         return self.size.diagonal / REFERENCE_DIAGONAL
 
     @property
-    def noise(self) -> LinePrior:
+    def click_noise_prior(self) -> LinePrior:
         """What is known of the noise of its clicks before any is seen, pixels of this image."""
         sigma, floor = self.line_sigma_px or CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX
-        return LinePrior(sigma * self.unit, min(floor, sigma) * self.unit, self.line_share)
+        return LinePrior(
+            sigma * self.pixels_per_reference_pixel,
+            min(floor, sigma) * self.pixels_per_reference_pixel,
+            self.line_share,
+        )
 
     def resect(self, observations: Observations) -> Resection:
         """The best camera; where it fits badly, also sought thoroughly, and without the circles first.
@@ -189,7 +193,10 @@ class ResectionProblem:
             points and projected curves, and that cost.
         """
         fit = self.search(observations)
-        if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
+        if (
+            self.distances(fit.parameters, observations).max()
+            <= POOR_PX * self.pixels_per_reference_pixel
+        ):
             return fit
         fits = [fit]
         if not has_few_measurements(observations):
@@ -266,7 +273,7 @@ class ResectionProblem:
 
     def _data_cost(self, fit: Resection, observations: Observations) -> float:
         """Robust cost of the points alone, pixels squared."""
-        scale = self.robust_scale_px * self.unit
+        scale = self.robust_scale_px * self.pixels_per_reference_pixel
         apart = self.distances(fit.parameters, observations)
         robust = scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
         return float(self.weights(observations) @ robust)
@@ -298,10 +305,12 @@ class ResectionProblem:
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
-        rows = self.compute_noise_rows(parameters, observations)
-        return compute_line_noise(*rows, self.noise, self.row_weights(observations, rows[2]))
+        rows = self.compute_line_noise_inputs(parameters, observations)
+        return compute_line_noise(
+            *rows, self.click_noise_prior, self.row_weights(observations, rows[2])
+        )
 
-    def compute_noise_rows(
+    def compute_line_noise_inputs(
         self, parameters: FloatArray, observations: Observations
     ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
         """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
@@ -322,7 +331,7 @@ class ResectionProblem:
             parameters, observations.curves, observations.curve_points(), self.size.diagonal / 2
         )
         # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
-        scale = WIDE * self.robust_scale_px * self.unit
+        scale = WIDE * self.robust_scale_px * self.pixels_per_reference_pixel
         weight = (1 + (offsets**2).sum(axis=1) / scale**2) ** -0.25
         beyond = np.flatnonzero(offsets[:, 1])
         # What lies along the line has nothing in common with what lies across.
@@ -337,11 +346,14 @@ class ResectionProblem:
 
     def click_variance(self, parameters: FloatArray, observations: Observations) -> float:
         """Variance of the clicks' distances, from the robust fit, pixels squared."""
-        scale = self.robust_scale_px * self.unit
+        scale = self.robust_scale_px * self.pixels_per_reference_pixel
         apart = self.distances(parameters, observations)
         freedom = max(len(apart) - PARAMETERS + 1, 1)
         robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
-        return max(float(robust.sum()) / freedom, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
+        return max(
+            float(robust.sum()) / freedom,
+            (MIN_CLICK_SIGMA_PX * self.pixels_per_reference_pixel) ** 2,
+        )
 
     def camera(self, parameters: FloatArray) -> Camera:
         """Camera of one row of parameters, shape (8,), in pixels of this picture and the pitch frame."""
@@ -366,7 +378,7 @@ class ResectionProblem:
             observations.curves,
             observations.curve_points(self.fit_share),
             prior or self.prior(),
-            (stage.scale_px or self.robust_scale_px) * self.unit,
+            (stage.scale_px or self.robust_scale_px) * self.pixels_per_reference_pixel,
             self.size.diagonal / 2,
             stage.steps,
             tolerance=stage.tolerance,
@@ -375,7 +387,7 @@ class ResectionProblem:
 
     def prior(self) -> GaussianPrior:
         """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
-        focal = np.log(2000.0 * self.unit)
+        focal = np.log(2000.0 * self.pixels_per_reference_pixel)
         mean = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -15.0, focal, self.distortion_mean])
         level = np.radians(2)
         sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])

@@ -85,11 +85,11 @@ class RigCamera:
         return parameters_from_camera(self.camera, self.half_diagonal)
 
     @property
-    def unit(self) -> float:
+    def pixels_per_reference_pixel(self) -> float:
         """Pixels of this image for a pixel at 1920 x 1080."""
         return self.size.diagonal / CLICK_DIAGONAL
 
-    def with_parameters(self, parameters: FloatArray) -> Camera:
+    def camera_of_parameters(self, parameters: FloatArray) -> Camera:
         """The camera of a row of parameters, with the principal point that it has."""
         return camera_from_parameters(parameters, self.camera.principal_point, self.half_diagonal)
 
@@ -123,9 +123,9 @@ class Rig:
         """The cameras as they are thought to stand now, shape (K, 8)."""
         return np.array([camera.parameters for camera in self.cameras])
 
-    def only(self, kept: BoolArray) -> Rig:
+    def only_instants(self, kept: BoolArray) -> Rig:
         """The same cameras with some of the instants, shape (F,)."""
-        return replace(self, rays=self.rays.select_subset(kept), times=self.times[kept])
+        return replace(self, rays=self.rays.select_rays_of_points(kept), times=self.times[kept])
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def make_rig(
         )
     for camera in sharing:
         _require_adjustable(camera)
-    fitted = policy.calibration.with_fitted_goal(pitch)
+    fitted = policy.calibration.pitch_for_fitted_lines(pitch)
     rig = Rig(tuple(sharing), *_collect_rays_of_frames(sharing, frames, policy), fitted)
     points = optimize_points(rig.initial_parameters, rig.rays, np.inf)
     at = linearize(rig.initial_parameters, points, rig.rays)
@@ -177,9 +177,9 @@ def make_rig(
     limits = policy.tau_px(2 * rig.rays.half_diagonals)
     # Where the cameras are far off themselves, most rays pass each other that far.
     limits = np.maximum(limits, GROSS * np.median(apart))
-    gross = np.zeros(rig.rays.points, bool)
+    gross = np.zeros(rig.rays.point_count, bool)
     np.logical_or.at(gross, rig.rays.point, ~(apart < limits[rig.rays.camera]))
-    return rig.only(~gross), int(gross.sum())
+    return rig.only_instants(~gross), int(gross.sum())
 
 
 def adjust_rig(rig: Rig) -> RigFit:
@@ -248,7 +248,10 @@ class _RigProblem:
         self, place: int, camera: RigCamera, parameters: FloatArray
     ) -> tuple[float, FloatArray, FloatArray]:
         """What the annotated lines of a camera say."""
-        observed, sigma = self.observed[place], self.line_sigma_px * camera.unit
+        observed, sigma = (
+            self.observed[place],
+            self.line_sigma_px * camera.pixels_per_reference_pixel,
+        )
         cost, gradient, information = normal_equations(
             parameters[None],
             observed.curves,
@@ -269,13 +272,15 @@ class _RigProblem:
         information = np.diag(1 / PRIOR_SIGMA**2)
         if len(grass) == 0:
             return cost, gradient, information
-        pixels = camera.with_parameters(parameters).project(grass, folded=True)
+        pixels = camera.camera_of_parameters(parameters).project(grass, folded=True)
         moved = pixels - camera.camera.project(grass, folded=True)
         rows = np.repeat(parameters[None], len(grass), axis=0)
         slopes = projection_jacobians(rows, grass, np.full(len(grass), camera.half_diagonal))
         slopes[np.isnan(moved).any(axis=1)] = 0.0
         moved = np.nan_to_num(moved)
-        weight = ANCHOR_POINTS / len(grass) / (ANCHOR_SIGMA_PX * camera.unit) ** 2
+        weight = (
+            ANCHOR_POINTS / len(grass) / (ANCHOR_SIGMA_PX * camera.pixels_per_reference_pixel) ** 2
+        )
         cost += 0.5 * weight * float((moved**2).sum())
         gradient = gradient + weight * np.einsum("nia,ni->a", slopes, moved)
         information = information + weight * np.einsum("nia,nib->ab", slopes, slopes)
@@ -321,7 +326,7 @@ def _collect_rays_of_frames(
             rows.append((places[key], len(times)))
         times.append(frame.time)
     camera_rows, point_rows = np.array(rows, dtype=np.int64).reshape(-1, 2).T
-    units = np.array([camera.unit for camera in cameras])
+    units = np.array([camera.pixels_per_reference_pixel for camera in cameras])
     rays = Rays(
         np.array(pixels, float).reshape(-1, 2),
         camera_rows,
@@ -340,11 +345,11 @@ def _require_adjustable(camera: RigCamera) -> None:
             hint="Only one focal length and one radial term can be adjusted: keep this camera as it is.",
         )
     grass = sample_grass_in_view(camera)
-    plain = camera.with_parameters(camera.parameters)
+    plain = camera.camera_of_parameters(camera.parameters)
     if len(grass) == 0:
         return
     apart = np.abs(plain.project(grass) - camera.camera.project(grass)).max()
-    if not apart <= MAX_MODEL_ERROR_PX * camera.unit:
+    if not apart <= MAX_MODEL_ERROR_PX * camera.pixels_per_reference_pixel:
         raise InputError(
             f"the lens of camera {camera.key} has terms that cannot be adjusted",
             hint="Only one focal length and one radial term can be adjusted: keep this camera as it is.",
@@ -362,8 +367,8 @@ def _estimate_click_noise_factor(parameters: FloatArray, rays: Rays) -> float:
     """Noise of the clicks, robustly, as a multiple of what the rays are said to have."""
     points = optimize_points(parameters, rays, np.inf)
     squares = (linearize(parameters, points, rays).residuals ** 2).sum(axis=1)
-    total = np.bincount(rays.point, squares, minlength=rays.points)
-    freedom = 2 * np.bincount(rays.point, minlength=rays.points) - 3
+    total = np.bincount(rays.point, squares, minlength=rays.point_count)
+    freedom = 2 * np.bincount(rays.point, minlength=rays.point_count) - 3
     # The median of chi-square (Wilson and Hilferty).
     usual = freedom * (1 - 2 / (9 * freedom)) ** 3
     return float(np.sqrt(np.median(total / usual)))
@@ -374,7 +379,8 @@ def _line_sigma(
 ) -> float:
     """Noise of the line points, robustly, pixels at 1920 x 1080; 0 without lines."""
     apart = [
-        curve_distances(row, seen.curves, seen.curve_points(), camera.half_diagonal) / camera.unit
+        curve_distances(row, seen.curves, seen.curve_points(), camera.half_diagonal)
+        / camera.pixels_per_reference_pixel
         for row, camera, seen in zip(parameters, cameras, observed, strict=True)
     ]
     every = np.concatenate(apart)

@@ -143,7 +143,7 @@ def propose_rig(
     rig, gross = make_rig(cameras, frames, pitch, policy)
     odd = rig.times // BLOCK % 2 == 1
     fit = adjust_rig(rig)
-    halved = adjust_rig(rig.only(~odd)) if odd.any() and not odd.all() else None
+    halved = adjust_rig(rig.only_instants(~odd)) if odd.any() and not odd.all() else None
     balls = optimize_points(fit.parameters, rig.rays, np.inf)
     moved = np.linalg.norm(
         balls - optimize_points(rig.initial_parameters, rig.rays, np.inf), axis=1
@@ -156,7 +156,7 @@ def propose_rig(
         ),
         pairs=tuple(_compare_pairs(rig, fit, halved, odd)),
         left_alone=tuple(camera.key for camera in cameras if camera.key not in used),
-        frames=rig.rays.points,
+        frames=rig.rays.point_count,
         gross=gross,
         ball_sigma_px=fit.ball_sigma * policy.click_sigma_px,
         line_points=sum(len(item) for camera in rig.cameras for item in camera.lines.values()),
@@ -180,7 +180,7 @@ def compute_error_covariance(
         parameters: Of the adjusted camera, shape (8,).
         balls: That it shows, pitch frame, metres, shape (N, 3).
     """
-    after, step = camera.with_parameters(parameters), camera.parameters - parameters
+    after, step = camera.camera_of_parameters(parameters), camera.parameters - parameters
     moved = camera.camera.project(balls, folded=True) - after.project(balls, folded=True)
     shown = np.isfinite(moved).all(axis=1)
     grass = sample_grass_in_view(camera)
@@ -205,7 +205,7 @@ def _pixel_derivatives(camera: RigCamera, parameters: FloatArray, points: FloatA
 
 def _compare_camera(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> CameraChange:
     camera, parameters, covariance = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
-    after = camera.with_parameters(parameters)
+    after = camera.camera_of_parameters(parameters)
     turn = after.rotation @ camera.camera.rotation.T
     grass = sample_grass_in_view(camera)
     moved = after.project(grass) - camera.camera.project(grass)

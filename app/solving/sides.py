@@ -229,7 +229,9 @@ def _expected_ball_diameter_px(camera: Camera, point: FloatArray, diameter_m: fl
 
 def _is_informative_pair(item: PairPoint, pitch: Pitch, policy: Policy) -> bool:
     """Two rays can meet by accident, far from any pitch: such a pair says nothing."""
-    return not _is_behind_a_camera(item) and is_plausible_position(item.place, pitch, policy)
+    return not _is_behind_a_camera(item) and is_plausible_position(
+        item.point_as_tuple, pitch, policy
+    )
 
 
 def _is_behind_a_camera(pair_point: PairPoint) -> bool:

@@ -113,7 +113,7 @@ class BallObservation:
         return self.camera.undistort_jacobian(np.array(self.center))
 
     @cached_property
-    def camera_numbers(self) -> UncertainCameraParameters | None:
+    def uncertain_camera_parameters(self) -> UncertainCameraParameters | None:
         """The camera as numbers; None where nobody says how exact it is."""
         return UncertainCameraParameters.of(self.calibration, self.size.diagonal)
 
@@ -144,7 +144,7 @@ class PairPoint:
     parallax_degrees: float
 
     @property
-    def place(self) -> tuple[float, float, float]:
+    def point_as_tuple(self) -> tuple[float, float, float]:
         """The point as plain numbers."""
         x, y, z = self.point.tolist()
         return x, y, z

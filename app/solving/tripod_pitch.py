@@ -133,12 +133,12 @@ class TripodPitch:
         return self.shared[_PITCH]
 
     @property
-    def position(self) -> FloatArray:
+    def tripod_position(self) -> FloatArray:
         """Of the tripod, metres, shape (3,)."""
         return self.shared[_PLACE]
 
     @property
-    def position_covariance(self) -> FloatArray:
+    def tripod_position_covariance(self) -> FloatArray:
         """Shape (3, 3)."""
         return self.covariance[_PLACE, _PLACE]
 
@@ -184,7 +184,7 @@ class TripodPitch:
         which = np.full(len(points), MARKINGS.index(marking))
         return points + compute_paint_shift(points[:, :2], which, self.terms, self.pitch)
 
-    def compute_frame_shift(self, frame: PaintSightings) -> FloatArray:
+    def compute_paint_shift_of_frame(self, frame: PaintSightings) -> FloatArray:
         """How far each place of paint lies off the plan of the size that is shown, metres, shape (N, 3)."""
         grass = project_paint_to_grass(frame, self.size)
         return compute_paint_shift(grass, frame.sightings.curve, self.terms, self.pitch)
@@ -202,7 +202,9 @@ class TripodPitch:
     def error_px(self, frame: PaintSightings, parameters: FloatArray) -> float:
         """Median distance of a frame's paint from the pitch that is shown, by its camera there, pixels."""
         at = replace(frame, parameters=parameters)
-        seen = _TripodProblem([at], self.size, self.plan, self.policy, self).seen(0)
+        seen = _TripodProblem([at], self.size, self.plan, self.policy, self).measure_frame_offsets(
+            0
+        )
         return float(np.median(np.abs(seen.offsets)))
 
     def covariance_of(self, frame: PaintSightings, parameters: FloatArray) -> FloatArray:
@@ -257,7 +259,7 @@ def find_tripod_pitch(
         found = together.minimize_cost()
     except np.linalg.LinAlgError:
         return None
-    away = np.linalg.norm(together.parameters[:, X : Z + 1] - found.position, axis=1)
+    away = np.linalg.norm(together.parameters[:, X : Z + 1] - found.tripod_position, axis=1)
     sizes = np.array([found.pitch.length, found.pitch.width])
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     inside = (sizes > ends[:, 0] + _END_M) & (sizes < ends[:, 1] - _END_M)
@@ -312,7 +314,7 @@ class _TripodProblem:
             )
         self._known = known
 
-    def seen(self, at: int) -> PaintOffsets:
+    def measure_frame_offsets(self, at: int) -> PaintOffsets:
         frame, known = self._frames[at], self._known
         seen = measure_offsets(
             self._problem, self.parameters[at], frame.sightings, frame.sigmas, known.pitch
@@ -336,7 +338,7 @@ class _TripodProblem:
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
         level = MAIN_SIGMA[0] ** -2.0
         for at in range(count):
-            seen = self.seen(at)
+            seen = self.measure_frame_offsets(at)
             terms = paint_derivatives_by_pitch_and_marking(
                 self._grass[at], seen.marking, seen.jacobian, self._plan
             )
@@ -375,7 +377,7 @@ class _TripodProblem:
     def _prior_sigmas(self) -> FloatArray:
         """Of what is thought of the shared numbers beforehand, shape (SHARED,)."""
         lens = [self._policy.distortion_sigma, KAPPA_SLOPE_SIGMA]
-        is_main = is_main_position(self._known.position)
+        is_main = is_main_position(self._known.tripod_position)
         place = MAIN_SIGMA[1:] if is_main else np.full(3, np.inf)
         return np.concatenate([place, lens, np.ones(TERMS)])
 
@@ -404,7 +406,9 @@ class _TripodProblem:
             self._known = replace(self._known, shared=self._known.shared + step)
             if not np.isfinite(self.parameters).all():
                 raise np.linalg.LinAlgError("the frames do not determine the size of the pitch")
-            rest = [np.abs(self.seen(at).offsets) for at in range(len(self._frames))]
+            rest = [
+                np.abs(self.measure_frame_offsets(at).offsets) for at in range(len(self._frames))
+            ]
             sigmas = np.concatenate([frame.sigmas for frame in self._frames])
             # Of a normal distribution the median distance is 0.6745 standard deviations.
             noise = max(1.0, float(np.median(np.concatenate(rest) / sigmas) / 0.6745) ** 2)
@@ -413,7 +417,7 @@ class _TripodProblem:
                 break
         parts = self.build_normal_equations()
         covariance = np.linalg.inv(_eliminate_frames(parts, _parameter_derivatives(parts)))
-        away = self.parameters[:, X : Z + 1] - self._known.position
+        away = self.parameters[:, X : Z + 1] - self._known.tripod_position
         return replace(
             self._known,
             covariance=0.5 * (covariance + covariance.T),

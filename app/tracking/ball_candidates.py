@@ -86,7 +86,7 @@ def find_candidates(
     top, bottom = np.clip([low[1], high[1]], 0, height - 1).astype(int)
     found: list[Peak] = []
     if right > left and bottom > top:
-        wide = frame.part(left - border, top - border, right + border + 1, bottom + border + 1)
+        wide = frame.crop_grey(left - border, top - border, right + border + 1, bottom + border + 1)
         for smear, angle in smears:
             found += _find_peaks(wide, (left, top), border, size, smear, angle)
     found += [
@@ -182,7 +182,7 @@ def _measure_static_fraction(
         for row, (x, y) in enumerate(there.round().astype(int)):
             if not (0 <= x < frame.size[0] and 0 <= y < frame.size[1]):
                 continue
-            part = frame.part(x - reach, y - reach, x + reach + 1, y + reach + 1)
+            part = frame.crop_grey(x - reach, y - reach, x + reach + 1, y + reach + 1)
             alike, contrast = match_template(part, template)
             shares[row, column] = float((alike * np.maximum(contrast, 0)).max()) / worth[row]
     return shares
@@ -199,7 +199,7 @@ def _crop_around(frame: BallFrame, place: FloatArray, reach: float) -> tuple[Gre
     around = round(1.8 * reach) + 6
     x, y = place.round().astype(int)
     left, top = x - around, y - around
-    return frame.part(left, top, x + around + 1, y + around + 1), np.array([left, top], float)
+    return frame.crop_grey(left, top, x + around + 1, y + around + 1), np.array([left, top], float)
 
 
 def _refine_peak_position(values: FloatArray, row: int, column: int) -> tuple[float, float]:

@@ -44,7 +44,7 @@ class BallFrame:
         """Width and height."""
         return np.array(self.image.shape[1::-1], float)
 
-    def part(self, left: int, top: int, right: int, bottom: int) -> Grey:
+    def crop_grey(self, left: int, top: int, right: int, bottom: int) -> Grey:
         """The grey picture from a corner to before another one; beyond the rim it goes on as it ends."""
         height, width = self.image.shape[:2]
         rows = np.clip(np.arange(top, bottom), 0, height - 1)

@@ -216,7 +216,7 @@ class CameraFollower:
                 else found
             )
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
-            again = self.propose_frame_camera(picture)
+            again = self.propose_camera_from_paint_alone(picture)
             if again is not None:
                 return self._remember_frame(again)
         return self._remember_frame(found)
@@ -225,14 +225,14 @@ class CameraFollower:
         """The frame with the camera that the paint alone says where that agrees clearly better."""
         if self._was_recently_proposed(picture, self.patchy_every):
             return found
-        again = self.propose_frame_camera(picture, self.patchy_every)
+        again = self.propose_camera_from_paint_alone(picture, self.patchy_every)
         if again is not None and _agreement_product(again) > CLEARLY * _agreement_product(found):
             self.patchy_every = PATCHY_EVERY
             return again
         self.patchy_every = min(2 * self.patchy_every, PATCHY_LEAST_OFTEN)
         return found
 
-    def propose_frame_camera(
+    def propose_camera_from_paint_alone(
         self, picture: FramePicture, every: int = PROPOSED_EVERY
     ) -> TrackedFrame | None:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
@@ -316,7 +316,7 @@ class CameraFollower:
         best_score, best_why = -1.0, "the paint cannot be solved"
         told: str | None = best_why
         for reach in REACHES:
-            known = predicted_covariance(picture, camera, reach, unit, 1 + self.age)
+            known = predicted_covariance(picture, camera, reach, unit, 1 + self.frames_since_paint)
             try:
                 snapped = self._snap_camera(picture, camera, known, reach.windows)
                 seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
@@ -325,7 +325,7 @@ class CameraFollower:
             weakest = 0.0
             if snapped.reason is None:
                 weakest = measure_weakest_marking(picture.reading, snapped, self.pitch)
-            most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
+            most = reach.most_moved_px * unit * float(np.sqrt(1 + self.frames_since_paint))
             why = self._explain_rejection(snapped, seen, weakest, unit, most)
             outcome = TRACKED if why is None else BRIDGED
             found = replace(
@@ -401,7 +401,7 @@ class CameraFollower:
         return self.last is not None and self.last.camera is not None
 
     @property
-    def age(self) -> int:
+    def frames_since_paint(self) -> int:
         """Frames since one that lies on the paint."""
         return 0 if self.last is None else self.last.age
 

@@ -62,7 +62,7 @@ def fit_time_map(
         where = " near the instants given" if len(hints) else ""
         reason = f"The rays of the live shot and the replay do not meet long enough{where}."
         return TimeMap(reason)
-    best = max(found, key=fit.evidence)
+    best = max(found, key=fit.map_log_likelihood)
     made = judge_map(fit, best, found)
     return _split_into_pieces(fit, made, best, found) if whole else made
 
@@ -122,10 +122,10 @@ def _split_into_pieces(
     maps = [best, *found]
     for rows in np.array_split(np.arange(len(replay)), 3):
         near = LinkFit(live, replay.part(rows), fit.hints[:0])
-        at = float(best.live(np.array(near.middle)))
+        at = float(best.to_live_times(np.array(near.middle)))
         one = near.refine_map(replace(best, at=at, middle=near.middle))
         if one is not None:
-            near.set_noise(one)
+            near.set_noise_from_misses(one)
             fit.noise = min(fit.noise, near.noise)
             maps.append(one)
     left = [

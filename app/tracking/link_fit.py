@@ -62,7 +62,7 @@ class LinearTimeMap:
     speed: float
     middle: float
 
-    def live(self, times: FloatArray) -> FloatArray:
+    def to_live_times(self, times: FloatArray) -> FloatArray:
         """Live times of replay times."""
         return self.at + self.speed * (times - self.middle)
 
@@ -152,7 +152,7 @@ class LinkFit:
     def max_time_difference(self, a: LinearTimeMap, b: LinearTimeMap) -> float:
         """Most seconds between the live times that two maps give the replay."""
         ends = self.replay.times[[0, -1]]
-        return float(np.abs(a.live(ends) - b.live(ends)).max())
+        return float(np.abs(a.to_live_times(ends) - b.to_live_times(ends)).max())
 
     def find_candidate_maps(self) -> list[LinearTimeMap]:
         """Maps under which most rays meet, best first: every offset with every speed."""
@@ -198,7 +198,7 @@ class LinkFit:
     def find_ray_pairs(self, one: LinearTimeMap) -> RayPairs:
         """The rays that have a partner under a map."""
         live, replay = self.live, self.replay
-        times = one.live(replay.times)
+        times = one.to_live_times(replay.times)
         before = np.clip(np.searchsorted(live.times, times) - 1, 0, len(live) - 2)
         positions, directions, known = _interpolate_rays(live, before, times)
         rays = np.flatnonzero(known)
@@ -319,30 +319,34 @@ class LinkFit:
             return False
         return one.speed * float(np.ptp(times)) >= LEAST_OVERLAP_S / 2
 
-    def evidence(self, one: LinearTimeMap) -> float:
+    def map_log_likelihood(self, one: LinearTimeMap) -> float:
         """The same of all rays, and of a person's instants."""
-        off = (one.live(self.hints[:, 1]) - self.hints[:, 0]) / self.hint_sigma
+        off = (one.to_live_times(self.hints[:, 1]) - self.hints[:, 0]) / self.hint_sigma
         return float(self.ray_log_likelihoods(one).sum() - (off**2).sum() / 2)
 
     def is_as_good(self, other: LinearTimeMap, best: LinearTimeMap) -> bool:
         """Whether another map explains the rays as well, or most of them: those with partners."""
-        if self.evidence(other) > self.evidence(best) - _CLEARLY:
+        if self.map_log_likelihood(other) > self.map_log_likelihood(best) - _CLEARLY:
             return True
         mine, others = self.ray_log_likelihoods(best), self.ray_log_likelihoods(other)
         both = (mine != 0) & (others != 0)
         if both.sum() < LEAST_SHARE * (mine != 0).sum():
             return False
-        of_hints = self.evidence(other) - others.sum() - (self.evidence(best) - mine.sum())
+        of_hints = (
+            self.map_log_likelihood(other)
+            - others.sum()
+            - (self.map_log_likelihood(best) - mine.sum())
+        )
         return bool(others[both].sum() + of_hints > mine[both].sum() - _CLEARLY)
 
-    def set_noise(self, one: LinearTimeMap) -> None:
+    def set_noise_from_misses(self, one: LinearTimeMap) -> None:
         """Take the noise from the misses under a map."""
         pairs = self.find_ray_pairs(one)
         if pairs.inside.sum() >= FEWEST_PAIRS // 2:
             ratio = np.abs(pairs.miss / self.compute_miss_sigma(pairs))[pairs.inside]
             self.noise = max(self.noise * float(np.median(ratio)) / 0.6745, 1.0)
 
-    def described(self, one: LinearTimeMap, pairs: RayPairs) -> TimeMap:
+    def to_time_map(self, one: LinearTimeMap, pairs: RayPairs) -> TimeMap:
         """A map with its covariance, wider where neighbouring misses hang together."""
         jacobian, weigh = self._jacobian(pairs), self._make_weighting(pairs)
         hinted = np.column_stack([np.ones(len(self.hints)), self.hints[:, 1] - self.middle])

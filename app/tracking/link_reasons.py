@@ -35,10 +35,10 @@ _RESTS_M = 1.0
 def judge_map(fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap]) -> TimeMap:
     """What can be said of the best map among others."""
     for _ in range(3):
-        fit.set_noise(best)
+        fit.set_noise_from_misses(best)
         best = fit.refine_map(best) or best
     pairs = fit.find_ray_pairs(best)
-    made = fit.described(best, pairs)
+    made = fit.to_time_map(best, pairs)
     reason = _explain_mismatch(fit, made, pairs) or _explain_ambiguity(fit, best, found, pairs)
     return replace(made, reason=reason or _explain_uncertainty(fit, made, pairs))
 

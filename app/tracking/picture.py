@@ -67,7 +67,7 @@ class FramePicture:
         return self._field
 
     @property
-    def strength(self) -> Strength:
+    def paint_strength(self) -> Strength:
         """Of what looks like painted lines, 0 elsewhere, shape (H, W)."""
         if self._strength is None:
             self._strength = line_strength(self.image, self.field)
@@ -83,11 +83,11 @@ class FramePicture:
     @property
     def paint(self) -> BoolArray:
         """What looks like painted lines, shape (H, W)."""
-        return np.asarray(self.strength > 0)
+        return np.asarray(self.paint_strength > 0)
 
     def compute_all(self) -> FramePicture:
         """The same with all parts computed."""
-        _ = self.grey, self.strength, self.reading
+        _ = self.grey, self.paint_strength, self.reading
         return self
 
 
@@ -129,7 +129,9 @@ def propose_camera_in_picture(
     libraries: Sequence[CameraSearchSpace],
 ) -> FrameProposal:
     """As ``propose_for_frame``, for a picture of a clip."""
-    frame = prepare_frame_to_search(picture.image, picture.field, picture.strength, picture.reading)
+    frame = prepare_frame_to_search(
+        picture.image, picture.field, picture.paint_strength, picture.reading
+    )
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     return propose_for_frame(frame, picture.image, pitch, known, policy, libraries)

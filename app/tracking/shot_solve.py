@@ -112,13 +112,13 @@ def solve_shot(
         alone = [_take_own_paint_uncertainty(frame) for frame in frames]
         return SolvedShot(alone, None, alone)
     shot = _ShotProblem([frames[index] for index in chosen], chosen, matches, size, pitch, policy)
-    painted = shot.painted()
+    painted = shot.sightings_by_place()
     shown = find_tripod_pitch(list(painted.values()), size, pitch, policy)
     shot.minimize_cost()
     if shown is None:
         solved = _replace_cameras(frames, chosen, shot, shot.covariances())
         return SolvedShot(solved, None, solved)
-    on_shown = shot.on(shown)
+    on_shown = shot.with_shown_pitch(shown)
     on_shown.minimize_cost()
     for place in shot.given:
         on_shown.parameters[place] = shot.parameters[place]
@@ -205,15 +205,16 @@ class _ShotProblem:
         self.shared[6] = np.median(self.parameters[:, KAPPA])
         self._noise = 1.0
 
-    def on(self, shown: TripodPitch) -> _ShotProblem:
+    def with_shown_pitch(self, shown: TripodPitch) -> _ShotProblem:
         """The same problem on the pitch that is shown; lines that somebody drew say nothing of that."""
         other = copy(self)
         other._pitch, other._slope_sigma = shown.pitch, SHOWN_SLOPE_SIGMA
         other._shifts = {
-            place: shown.compute_frame_shift(each) for place, each in self.painted().items()
+            place: shown.compute_paint_shift_of_frame(each)
+            for place, each in self.sightings_by_place().items()
         }
         other.shared = np.zeros(SHARED)
-        other.shared[:3], other.shared[6] = shown.position, self.shared[6]
+        other.shared[:3], other.shared[6] = shown.tripod_position, self.shared[6]
         other.given, other._noise, other._seen_from = {}, 1.0, None
         return other
 
@@ -241,7 +242,7 @@ class _ShotProblem:
             points,
             np.full(len(points), self.half_diagonal),
         )[:, :, AIM].reshape(-1, len(AIM))
-        sigma = max(FLOW_PX * self._problem.unit, apart)
+        sigma = max(FLOW_PX * self._problem.pixels_per_reference_pixel, apart)
         return turned[AIM], FLOW_PLACES / len(points) * rows.T @ rows / sigma**2
 
     def camera(self, place: int) -> Camera:
@@ -250,7 +251,7 @@ class _ShotProblem:
             self.parameters[place], self.principal_point, self.half_diagonal
         )
 
-    def painted(self) -> dict[int, PaintSightings]:
+    def sightings_by_place(self) -> dict[int, PaintSightings]:
         """The frames with paint, by their place in the shot."""
         return {
             place: replace(sight, parameters=self.parameters[place])
@@ -378,7 +379,7 @@ class _ShotProblem:
         """Of each frame's parameters, with what no pitch has as planned, shape (8, 8)."""
         equations = self._build_equations()
         terms = np.zeros((len(self.parameters), PARAMETERS, TERMS))
-        for place, frame in self.painted().items():
+        for place, frame in self.sightings_by_place().items():
             seen = self._measure_all_offsets()[place]
             assert seen is not None
             grass = project_paint_to_grass(frame, self._size)

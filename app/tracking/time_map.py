@@ -61,7 +61,7 @@ class TimeMap:
         row = np.array([1.0, time])
         return float(np.sqrt(max(float(row @ self.covariance @ row), 0.0)))
 
-    def live(self, times: FloatArray) -> FloatArray:
+    def to_live_times(self, times: FloatArray) -> FloatArray:
         """Live times of replay times, each by the piece that it is in, or else the nearest one; shape (N,).
 
         There has to be an offset and a speed, or pieces.

@@ -91,7 +91,7 @@ def track_clip(
         ImageError: The clip cannot be read.
     """
     policy = policy or CalibrationPolicy()
-    pitch = policy.with_painted_goal(pitch or Pitch())
+    pitch = policy.pitch_for_paint(pitch or Pitch())
     clicked = replace(CLICKED, goal=pitch.goal) if pitch.goal == "laws" else CLICKED
     clip = clip if isinstance(clip, Clip) else Clip.open(clip)
     given: dict[int, GivenCamera] = {}

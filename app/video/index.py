@@ -124,10 +124,10 @@ class RecordingIndex:
     @property
     def is_variable(self) -> bool:
         """Whether some frame is shown for another time than others, beyond what rounding does."""
-        return bool(self.is_step_uneven.any())
+        return bool(self.uneven_step_mask.any())
 
     @property
-    def is_step_uneven(self) -> BoolArray:
+    def uneven_step_mask(self) -> BoolArray:
         """Whether the time to the next frame is another one than usual, shape (N - 1,)."""
         steps = np.diff(self.times) / 1000.0
         # A container may count in milliseconds, or coarser.

@@ -93,7 +93,7 @@ def _build_index(
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         while (skipped := grab_next_frame(video)) is not None:
             damaged += skipped
-            row, before = rows.add()
+            row, before = rows.append_row()
             if settings is not None:
                 done, picture = video.retrieve()
                 if not done:

@@ -218,7 +218,7 @@ class GrowingMeasures:
     def __len__(self) -> int:
         return self._count
 
-    def add(self) -> tuple[Any, Any]:
+    def append_row(self) -> tuple[Any, Any]:
         """A new record, and the one before it (None: it is the first)."""
         if self._count == len(self._rows):
             grown: Measured = np.zeros(len(self._rows) * 3 // 2, MEASURES)

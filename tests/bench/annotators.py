@@ -33,7 +33,7 @@ def bench_annotators() -> None:
         for how, made in (("dataset's", [made for made, _ in part]), ("their own", own)):
             row = judge(made, policy)
             rows.append([name, how, row.alarms, row.mean_inside, row.best_inside])
-    for item in factors.of("person"):
+    for item in factors.noise_of_kind("person"):
         rows.append([f"{item.source}: {item.low:.2f} to {item.high:.2f} px", *[None] * 4])
     title = f"Two people, balls of 0.7 and 2.5 px; the dataset's {policy.click_sigma_px:.2f} px"
     print_table(

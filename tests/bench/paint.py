@@ -364,10 +364,15 @@ def _print_real(folder: Path) -> None:
         problem = ResectionProblem.of(size, PAPER.calibration)
         seen = make_observations(lines, PITCH, size)
         apart = [
-            float(np.median(problem.distances(problem.parameters(camera), seen))) / problem.unit
+            float(np.median(problem.distances(problem.parameters(camera), seen)))
+            / problem.pixels_per_reference_pixel
             for camera in (found.camera, snapped.camera)
         ]
-        error = np.nan if snapped.error_px is None else snapped.error_px / problem.unit
+        error = (
+            np.nan
+            if snapped.error_px is None
+            else snapped.error_px / problem.pixels_per_reference_pixel
+        )
         rows.append([*apart, error, spent])
         reasons.append(snapped.reason)
     table = np.array(rows)

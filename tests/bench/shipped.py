@@ -47,7 +47,7 @@ def bench_shipped(sizes: Sequence[tuple[int, int]] = SIZES) -> None:
         for groups, datasets in sizes:
             for at, (line_px, ball_px) in enumerate(NOISES):
                 # Goals are clicked where the policy fits them.
-                pitch = TOUCHLINE.calibration.with_fitted_goal(Pitch())
+                pitch = TOUCHLINE.calibration.pitch_for_fitted_lines(Pitch())
                 case = Case("", ball_px=ball_px, line_px=line_px, pitch=pitch)
                 name = f"{groups} groups, lines {line_px:g} px, balls {ball_px:g} px"
                 held = [

@@ -42,7 +42,7 @@ def settings_page() -> str:
         f"| `TOUCHLINE_{name.upper()}` | {_default(name)} | {text} |" for name, text in _texts()
     ]
     thresholds = [
-        f"| `{item.name}` | {item.text} | {_value(item.default)} | {_value(item.value(STRICT))} | "
+        f"| `{item.name}` | {item.label_with_unit} | {_value(item.default)} | {_value(item.value(STRICT))} | "
         f"{_range(item)} |"
         for item in THRESHOLDS
     ]
@@ -98,7 +98,7 @@ def _value(value: object) -> str:
 
 
 def _range(item: Threshold) -> str:
-    if item.is_word:
+    if item.has_word_choices:
         return ", ".join(f"`{choice}`" for choice in item.choices)
     if item.minimum is None:
         return "yes, no"

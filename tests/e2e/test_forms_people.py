@@ -27,7 +27,7 @@ CHROME = "Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 Chrome/141.0.0.0 Sa
 def no_rule(team_home: Path) -> Iterator[None]:
     """Afterwards nobody has to have a second factor."""
     yield
-    in_store(team_home, lambda store: SecondFactors(store).require(False, actor="local"))
+    in_store(team_home, lambda store: SecondFactors(store).set_required(False, actor="local"))
 
 
 def let_in_by_provider(store: Store, name: str) -> None:

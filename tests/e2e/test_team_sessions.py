@@ -207,13 +207,15 @@ class TestSessions:
         page.goto(f"{team}/account")
         log_in(page, "nora")
         expect(page.get_by_role("heading", name="Sessions")).to_be_visible()
-        in_store(team_home, lambda store: SecondFactors(store).require(True, actor="local"))
+        in_store(team_home, lambda store: SecondFactors(store).set_required(True, actor="local"))
         try:
             page.reload()
             expect(page.get_by_role("heading", name="requires a second factor")).to_be_visible()
             expect(page.get_by_text("Back at noon")).to_be_visible()
         finally:
-            in_store(team_home, lambda store: SecondFactors(store).require(False, actor="local"))
+            in_store(
+                team_home, lambda store: SecondFactors(store).set_required(False, actor="local")
+            )
         page.reload()
         expect(page.get_by_role("heading", name="Sessions")).to_be_visible()
         in_store(team_home, lambda store: end_sessions(store, "nora"))

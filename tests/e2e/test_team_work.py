@@ -249,7 +249,7 @@ class TestWork:
             batch = make_batch(store, "sample", new, actor="local").id
             leases, sina = LeaseService(store), BatchMember("sina")
             copy = leases.lease_next_group(batch, sina).group
-            leases.submit(batch, copy, sina, actor="sina")
+            leases.submit_group(batch, copy, sina, actor="sina")
             return batch, copy
 
         batch, copy = in_store(team_home, submitted)

@@ -147,8 +147,8 @@ class Readers:
         source = ImportSource(kind, path, name="upload")
         done = import_source(self.store, "fuzz", source, self.settings, dry_run=True)
         _require_said(done.report)
-        json_text(done.values()).encode()
-        done.nothing_read_error()
+        json_text(done.to_report_values()).encode()
+        done.explain_nothing_imported()
         if whole and kind not in ("cameras", "touchline"):
             _use(list(islice(_groups_of(source, self.settings), GROUPS)))
 

@@ -122,7 +122,7 @@ class TestIssia:
     def test_nobody_is_lost(self, issia: tuple[IssiaFolder, ReaderReport]) -> None:
         folder, _ = issia
         in_views = sum(len(view.extras.boxes) for group in folder.groups() for view in group.views)
-        assert in_views + sum(len(item.boxes) for item in folder.persons()) == 131_392
+        assert in_views + sum(len(item.boxes) for item in folder.persons_without_ball()) == 131_392
 
     def test_six_stations_with_camera_and_lines(
         self, issia: tuple[IssiaFolder, ReaderReport]

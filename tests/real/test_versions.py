@@ -132,7 +132,7 @@ class TestExport:
 class TestVerify:
     def test_from_scratch_everything_comes_out_the_same(self, homes, versions) -> None:
         report = verify_version(homes[1], versions[1].id)
-        assert report.ok, report.values()
+        assert report.ok, report.to_values()
         assert report.equal == versions[1].counts["groups"]
 
 

@@ -92,7 +92,7 @@ class TestSecondFactor:
             scripted = team.ask("GET", f"{API}/datasets", Authorization=bearer, Origin="")
             assert scripted.status == 200, "a token is no login"
         finally:
-            SecondFactors(team.store).require(False, actor="local")
+            SecondFactors(team.store).set_required(False, actor="local")
         assert team.ask("GET", f"{API}/datasets", role="late").status == 200
 
 

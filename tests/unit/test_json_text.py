@@ -280,7 +280,7 @@ class TestCommandLine:
         solution = poisoned(record.solution, bad)
         values = GroupFindings(
             1, 1, record.group, solution.findings, (None,) * len(solution.findings)
-        ).values
+        ).findings_as_json
         print_json(values)
         (found,) = strict(capsys.readouterr().out)
         assert (found["number"], found["threshold"], found["confidence"]) == (None, None, None)

@@ -134,7 +134,7 @@ def _verdict_from_state(state: GroupState) -> str | None:
 
 
 def _find_largest_weight(found: Sequence[Disagreement]) -> float:
-    return max((item.weight for item in found), default=0.0)
+    return max((item.severity for item in found), default=0.0)
 
 
 def _rank_worst_views(
@@ -418,7 +418,7 @@ def _build_agreement_columns(
         "state": OPEN,
         "takes": " ".join(str(annotation.id) for annotation in annotations),
         "pairs": compress_json(to_json(StoredComparison(pairs))),
-        "worst": max((item.weight for item in disagreements), default=0.0),
+        "worst": max((item.severity for item in disagreements), default=0.0),
         "disagreements": len(disagreements),
         "found": now(),
         **dict.fromkeys(("outcome", "take_id", "decided", "decided_by")),

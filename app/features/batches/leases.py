@@ -59,7 +59,7 @@ class BatchMember:
     may_review: bool = True
     alone: bool = False
 
-    def parts(self, batch: Batch) -> set[BatchRole]:
+    def roles_in_batch(self, batch: Batch) -> set[BatchRole]:
         """What they do in a batch."""
         parts = set()
         if self.name in batch.annotators and self.may_annotate:
@@ -124,7 +124,7 @@ class LeaseService:
         """
         with self._store.write(lasting=False) as session:
             batch = _read_open_batch(session, batch_id)
-            if not makes_own_annotations(batch, worker.parts(batch)):
+            if not makes_own_annotations(batch, worker.roles_in_batch(batch)):
                 return self._lease_next_shared_group(session, batch, worker, after)
             back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
@@ -194,7 +194,7 @@ class LeaseService:
                 batch, group, here=_read_presences(session, batch, group, self._current_time_text())
             )
 
-    def submit(
+    def submit_group(
         self, batch_id: int, group: int, worker: BatchMember, *, actor: str, done: bool = True
     ) -> Lease:
         """Say that the annotation of a group is done, so that a reviewer gets it; or that it is not.
@@ -217,7 +217,7 @@ class LeaseService:
             batch = _read_open_batch(session, batch_id)
             _require_group_access(session, batch, group, worker)
             row = _require_batch_group(session, batch, group)
-            if BatchRole.ANNOTATOR not in worker.parts(batch):
+            if BatchRole.ANNOTATOR not in worker.roles_in_batch(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
             others = row.submitted is not None and row.submitted_by != worker.name
             if row.settled is not None or others:
@@ -370,7 +370,7 @@ def _read_open_batch(session: Session, batch_id: int) -> Batch:
 
 
 def _require_batch_roles(batch: Batch, worker: BatchMember) -> set[BatchRole]:
-    parts = worker.parts(batch)
+    parts = worker.roles_in_batch(batch)
     if not parts:
         raise ConflictError(
             f'the batch "{batch.name}" is assigned to other people',
@@ -393,7 +393,7 @@ def _require_group_access(session: Session, batch: Batch, group: int, worker: Ba
         NotFoundError: As of a group that is not in it.
     """
     if not has_hidden_groups(batch.dataset_id) or not makes_own_annotations(
-        batch, worker.parts(batch)
+        batch, worker.roles_in_batch(batch)
     ):
         return
     if group not in list_returned_groups(session, batch, worker.name):

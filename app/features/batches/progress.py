@@ -193,7 +193,7 @@ def list_own_batches(
         found = []
         for batch in read_batches(session, ids):
             worker = worker_in(batch.dataset_id)
-            parts = worker.parts(batch)
+            parts = worker.roles_in_batch(batch)
             if batch.is_open and parts:
                 own = makes_own_annotations(batch, parts)
                 left = (

@@ -448,7 +448,7 @@ def submit_group(
     worker = members.member_of_batch(services.store, batch)
     background.add_task(compare_or_adopt_submission, services.store, group, services.paint)
     return _announce_lease(
-        services, LeaseService(services.store).submit(batch, group, worker, actor=actor)
+        services, LeaseService(services.store).submit_group(batch, group, worker, actor=actor)
     )
 
 
@@ -465,7 +465,7 @@ def withdraw_submission(
 ) -> Lease:
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
     worker = members.member_of_batch(services.store, batch)
-    lease = LeaseService(services.store).submit(batch, group, worker, actor=actor, done=False)
+    lease = LeaseService(services.store).submit_group(batch, group, worker, actor=actor, done=False)
     return _announce_lease(services, lease)
 
 

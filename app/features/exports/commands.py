@@ -174,16 +174,16 @@ def import_(
         grouping=group_by,
         propose=propose,
     )
-    source.check(policy=policy is not None)
+    source.require_used_options(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
     with open_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
             actor=get_current_actor(), dry_run=dry_run, policy=chosen,
         )  # fmt: skip
-    print_import(imported.values(), json_)
+    print_import(imported.to_report_values(), json_)
     if not imported.imported_anything:
-        print_error(*imported.nothing_read_error())
+        print_error(*imported.explain_nothing_imported())
         raise typer.Exit(1)
     if format_ in ("issia", "issia-3d") and not dry_run and not json_:
         say(

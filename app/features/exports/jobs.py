@@ -107,7 +107,7 @@ class ExportFolder:
         """
         stored = None
         if isinstance(report.out, StoredPath):
-            stored = report.out.of(report.out.store.head(report.out.key))
+            stored = report.out.make_object_path(report.out.store.head(report.out.key))
         entry = ExportEntry(
             id=name,
             request=dict(request),
@@ -116,7 +116,7 @@ class ExportFolder:
             left_out=dict(report.left_out),
             missing_images=list(report.missing_images),
             bytes=self.get_zip_path(name).stat().st_size if stored is None else stored.size,
-            stored=None if stored is None else stored.make_sealed_address(),
+            stored=None if stored is None else stored.make_pinned_address(),
         )
         self._write_record(entry)
         return entry

@@ -124,7 +124,7 @@ class _ExportOptions:
                     pointer=f"/{name}",
                 )
 
-    def check(self, out: Root) -> None:
+    def require_valid_options(self, out: Root) -> None:
         for name, value, choices in (
             ("format", self.format, FORMATS),
             ("boxes", self.boxes, BOX_KINDS),
@@ -191,7 +191,7 @@ def export_dataset(
         StorageError: The disk refuses.
     """
     options = _ExportOptions(format, everything, boxes, images, views)
-    options.check(out)
+    options.require_valid_options(out)
     _require_no_version_conflict(format, everything, version)
     if format == CARRY:
         counts = export_edits(store, dataset, out, progress, beside)
@@ -458,7 +458,7 @@ class _ExportRun:
             options.includes_every_view,
             provenance,
             self.unassigned,
-            None if self.tracks is None else self.tracks.records,
+            None if self.tracks is None else self.tracks.make_track_records,
             self.kept,
         )
         return write_format(root, self._iterate_records(), wanted, put)
@@ -497,7 +497,7 @@ class _ExportRun:
             record = found.keep_training_views() if chosen else found
             if record.group.views:
                 self._licences.add(find_licence(record.group.match))
-                names = self._names.of(record.group, record.splits)
+                names = self._names.assign_keys(record.group, record.splits)
                 self._images.add(record.group, facts, record.splits, names)
                 self._note_verdict(record)
                 yield replace(record, frames=self._images.placed, names=names)

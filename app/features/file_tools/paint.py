@@ -305,7 +305,7 @@ def _snap_picture(
         UNSURE if snapped.reason else PROPOSED,
         supported=seen.supported,
         explained=seen.explained,
-        points=snapped.points,
+        points=snapped.point_count,
         error_px=snapped.error_px,
         ms=spent,
         moved_px=snapped.moved_px,

@@ -205,7 +205,7 @@ def _build_result_row(frame: str, found: FrameProposal, milliseconds: float) -> 
         "outcome": found.outcome,
         "supported": None if agreement is None else agreement.supported,
         "explained": None if agreement is None else agreement.explained,
-        "points": 0 if snapped is None else snapped.points,
+        "points": 0 if snapped is None else snapped.point_count,
         "error_px": None if snapped is None else snapped.error_px,
         "runner_up": found.runner_up,
         "ms": milliseconds,

@@ -208,7 +208,7 @@ def pitch_to_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any]
         return None
     (crown, crown_sigma), (inward, inward_sigma) = shown.crown, shown.inward_paint_shift
     (knows_length, knows_width), (length, width) = shown.are_sizes_known, shown.size_sigmas.tolist()
-    spread = np.linalg.eigvalsh(shown.position_covariance)[-1]
+    spread = np.linalg.eigvalsh(shown.tripod_position_covariance)[-1]
     other = shown.clearly_different_pitch()
     return {
         "cameras": "shown" if on_shown else "plan",
@@ -216,7 +216,7 @@ def pitch_to_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any]
         "width": shown.pitch.width if knows_width else None,
         "crown": crown,
         "inward": inward,
-        "tripod": shown.position.tolist(),
+        "tripod": shown.tripod_position.tolist(),
         "sigma": {
             "length": length if knows_length else None,
             "width": width if knows_width else None,

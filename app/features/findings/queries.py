@@ -284,7 +284,7 @@ class GroupDismissals:
     last: int = 0
     standing: tuple[Dismissal, ...] = ()
 
-    def of(self, findings: Sequence[Finding]) -> tuple[Dismissal | None, ...]:
+    def find_dismissals(self, findings: Sequence[Finding]) -> tuple[Dismissal | None, ...]:
         """The dismissal of each finding; None: it is open."""
         return tuple(
             next((item for item in self.standing if item.covers(finding)), None)
@@ -366,7 +366,7 @@ def split_open_and_dismissed_kinds(
     findings: Sequence[Finding], dismissals: GroupDismissals
 ) -> tuple[list[str], list[str]]:
     """Kinds of findings that are open, and of those that are dismissed; a kind may be both."""
-    found = dismissals.of(findings)
+    found = dismissals.find_dismissals(findings)
     pairs = list(zip(findings, found, strict=True))
     opened = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is None)
     closed = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is not None)

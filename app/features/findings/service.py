@@ -47,7 +47,7 @@ class GroupFindings:
     """Of each finding: who has checked it; None: nobody."""
 
     @property
-    def values(self) -> list[dict[str, Any]]:
+    def findings_as_json(self) -> list[dict[str, Any]]:
         """The findings as plain values, each with the key of the group."""
         return [
             {
@@ -96,7 +96,7 @@ def iterate_findings_as_json(store: Store, dataset: str) -> Iterator[dict[str, A
     while groups := read_findings(store, found, after=after, limit=BATCH):
         after = groups[-1].number
         for group in groups:
-            yield from group.values
+            yield from group.findings_as_json
 
 
 def _finding_conditions(kind: str | None, dismissed: bool | None) -> list[Condition]:
@@ -171,7 +171,9 @@ def set_dismissal(
         before = record.make_state(solution)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_unchanged_content(session, group_id, record.content, if_match, what)
+            require_unchanged_content(
+                session, group_id, record.content_part_of_etag, if_match, what
+            )
             require_group_open(session, stored.dataset_id, group_id)
             # After the ETag: a person who saw another state is told so first.
             finding = _find_named_finding(

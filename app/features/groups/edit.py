@@ -323,7 +323,7 @@ class SetBallNoise:
 
     def inverse(self, group: Group) -> SetBallNoise:
         """The noise as it was."""
-        return SetBallNoise(group.noise)
+        return SetBallNoise(group.noise_factors_by_view)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def station_to_columns(station: Station) -> dict[str, Any]:
         "height": station.size.height,
         "flipped": station.flipped,
         "calibration": station.calibration,
-        "lines": canonical_json_text(codec.lines_to_json(station.annotated_lines)),
+        "lines": canonical_json_text(codec.lines_to_json(station.lines_with_not_visible)),
         "given": None if given is None else canonical_json_text(given),
         "picture": None
         if station.picture is None
@@ -41,7 +41,7 @@ def station_to_columns(station: Station) -> dict[str, Any]:
 
 def view_to_columns(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
-    media, extras = view.media, view.extras.values()
+    media, extras = view.media, view.extras.to_plain_values()
     why = codec.view_exclusion_to_json(view.left_out)
     return {
         "key": view.key,

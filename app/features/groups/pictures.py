@@ -97,7 +97,7 @@ class PaintTask:
 
 def digest_people_boxes(view: View) -> str:
     """Digest of the boxes that hide paint in a view; empty where there are none."""
-    boxes = drop_boxes_larger_than_a_person(view.extras.places, view.size)
+    boxes = drop_boxes_larger_than_a_person(view.extras.pixel_boxes, view.size)
     if not boxes:
         return ""
     return digest_json(sorted([box.x, box.y, box.width, box.height] for box in boxes))
@@ -166,7 +166,7 @@ def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintRead
     if explain_unreadable_picture(image, size) is not None:
         return replace(task.make_reading_without_frame, frame=frame)
     seen = read_paint_of_image(
-        image, size, clicked, task.group.pitch, policy, task.view.extras.places
+        image, size, clicked, task.group.pitch, policy, task.view.extras.pixel_boxes
     )
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING

@@ -68,9 +68,9 @@ class StoredGroup:
     @property
     def edited(self) -> bool:
         """Whether a person changed this group (a shared station is not the group's)."""
-        return any(self.is_edited(key) for key in self.view_ids)
+        return any(self.is_view_edited(key) for key in self.view_ids)
 
-    def is_edited(self, key: str) -> bool:
+    def is_view_edited(self, key: str) -> bool:
         """Whether a person changed a view or its own station."""
         own = self.stations[key]
         return key in self.edited_views or (not own.station.shared and own.edited)

@@ -69,7 +69,7 @@ def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGro
         bases.append(base)
         kept.extend(noticed)
     for view in stored.group.views:
-        if incoming.view(view.key) is None and stored.is_edited(view.key):
+        if incoming.view(view.key) is None and stored.is_view_edited(view.key):
             views.append(view)
             bases.append(view)
             sentence = f"{view.key} is no longer in the imported files; it is kept because a person edited it"

@@ -305,7 +305,7 @@ def _build_rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, An
             "dataset_id": key[0],
             "camera": key[1],
             "frame": key[2],
-            "extras": compress_json(extras.values()),
+            "extras": compress_json(extras.to_plain_values()),
         }
         for key, extras in snapshot.unassigned.items()
     ]

@@ -65,7 +65,7 @@ def digest_imported_group(group: Group) -> str:
         [
             view_digest(view),
             view.station.key if view.station.shared else station_digest(view.station),
-            view.extras.values(),
+            view.extras.to_plain_values(),
         ]
         for view in group.views
     ]
@@ -132,7 +132,7 @@ class RevisionChains:
         self._session, self._dataset_id = session, dataset_id
         self._shared = {item.id: item for item in list_shared_stations(session, dataset_id)}
 
-    def of(self, groups: Iterable[StoredGroup]) -> dict[int, RevisionChain]:
+    def read_chains_by_group_id(self, groups: Iterable[StoredGroup]) -> dict[int, RevisionChain]:
         """Lineages by group id; what nobody touched since its import costs no look at it."""
         found = list(groups)
         touched = filter_groups_with_history(self._session, [item.id for item in found])

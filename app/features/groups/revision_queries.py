@@ -112,7 +112,7 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
             pairs,
             group.positions,
             codec.paint_digests_to_json(group.paint),
-            group.noise,
+            group.noise_factors_by_view,
         ),
         group=group,
         stations=stations,

@@ -209,7 +209,7 @@ def _make_calibration_document(
     """The document of a calibration, with its markings where they are seen."""
     seen = {}
     if calibration.camera is not None:
-        drawn = pitch.with_goal(calibration.goal)
+        drawn = pitch.with_goal_edge(calibration.goal)
         seen = project_markings(calibration.camera, drawn, size)
     markings = [
         {

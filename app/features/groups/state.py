@@ -241,7 +241,7 @@ class GroupWithoutSolution:
         return tuple(findings_from_rows(self.said, self.stored.inputs_hash))
 
     @property
-    def content(self) -> str:
+    def content_part_of_etag(self) -> str:
         """What people said: the part of the ETag that a change builds on."""
         newest = self.newest_verdict
         verdict_id = 0 if newest is None else newest.id
@@ -275,7 +275,9 @@ class GroupWithoutSolution:
             number=stored.number,
             key=stored.group.key,
             revision=stored.revision,
-            etag=group_etag(self.content, stored.policy.hash, stored.policy.name, kinds, revisions),
+            etag=group_etag(
+                self.content_part_of_etag, stored.policy.hash, stored.policy.name, kinds, revisions
+            ),
             group=stored.group,
             view_ids=stored.view_ids,
             station_ids={item.station.key: item.id for item in stations},
@@ -287,7 +289,9 @@ class GroupWithoutSolution:
             can_undo=self.stacks.can_undo,
             can_redo=self.stacks.can_redo,
             stored=stored,
-            dismissed=() if solution is None else self.dismissals.of(solution.findings),
+            dismissed=()
+            if solution is None
+            else self.dismissals.find_dismissals(solution.findings),
         )
 
 

@@ -330,7 +330,9 @@ def submit_change(
         with store.read() as session:
             before = read_group_without_solution(session, find(session))
             what = f"group {before.stored.group.key}"
-            require_unchanged_content(session, before.stored.id, before.content, if_match, what)
+            require_unchanged_content(
+                session, before.stored.id, before.content_part_of_etag, if_match, what
+            )
             change = plan(session, before, actor)
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])

@@ -409,7 +409,7 @@ def _measure_fit_without_marking(
     camera: Camera, marking: str, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[tuple[float, ...], float | None]:
     """JaC of the other markings, and the largest distance of this one."""
-    pitch, size, lines = policy.with_fitted_goal(pitch), station.size, station.lines
+    pitch, size, lines = policy.pitch_for_fitted_lines(pitch), station.size, station.lines
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     judged = project_markings_like_evaluator(camera, pitch, size, lines, measured)
     for short in find_unannotated_not_missing(

@@ -233,7 +233,7 @@ def _iterate_undrawn_marking_candidates(
     ]
     verb = "were" if len(names) > 1 else "was"
     advice = f"{' and '.join(names)} {verb} drawn in {letter}"
-    fitted = group.pitch.with_goal(solved.calibration.goal)
+    fitted = group.pitch.with_goal_edge(solved.calibration.goal)
     seen = project_markings(camera, fitted, view.size)
     drawn = {fit.marking: _sample_clicks_along_polyline(seen[fit.marking]) for fit in undrawn}
     fix = SuggestedFix("draw_marking", view.key, undrawn[0].marking)

@@ -69,7 +69,7 @@ class ViewPaintRequest:
         station = self.view.station
         return frames.request_work_on_frame(
             self.media, station.flipped, read_paint,
-            station.size, self.start, self.group.pitch, self.policy, self.view.extras.places,
+            station.size, self.start, self.group.pitch, self.policy, self.view.extras.pixel_boxes,
         )  # fmt: skip
 
     def request_proposal(self, frames: FrameProvider) -> PoolTask:

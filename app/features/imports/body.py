@@ -91,7 +91,7 @@ def save_missing_group_findings(
     """Save a finding for each group that has none of the kind yet; returns how many."""
     fresh = sorted(set(ids) - filter_groups_with_finding(session, ids, GONE))
     stored = read_groups(session, fresh)
-    chains = RevisionChains(session, dataset_id).of(stored.values())
+    chains = RevisionChains(session, dataset_id).read_chains_by_group_id(stored.values())
     at, entries = now(), []
     for number, item in stored.items():
         base = chains[number].base

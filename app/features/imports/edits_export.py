@@ -134,7 +134,10 @@ def _iterate_exported_groups(
     ids = [group.id for group in list_known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):
         stored = read_groups(session, ids[start : start + _BATCH])
-        known, verdicts = chains.of(stored.values()), list_verdicts_of_groups(session, stored)
+        known, verdicts = (
+            chains.read_chains_by_group_id(stored.values()),
+            list_verdicts_of_groups(session, stored),
+        )
         checked = read_dismissals_to_export(session, stored)
         for item in stored.values():
             exported = _export_group(session, item, known[item.id], verdicts.get(item.id, []))

@@ -370,7 +370,7 @@ def save_findings(
         if view is not None
         and view not in fresh
         and view in stored.view_ids
-        and stored.is_edited(view)
+        and stored.is_view_edited(view)
     ]
     noticed.extend(kept)
     sentences = ((item.view, item.sentence) for item in noticed)
@@ -432,7 +432,7 @@ def _save_unassigned_frame_batch(
     known = read_unassigned_extras(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
-        place, body = (item.camera, item.frame), compress_json(item.extras.values())
+        place, body = (item.camera, item.frame), compress_json(item.extras.to_plain_values())
         if known.get(place) == body:
             report.unchanged += 1
         else:

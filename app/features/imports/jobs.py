@@ -68,7 +68,7 @@ class ImportRequest:
     policy: str | None = None
     frames: Mapping[str, str] | None = None
 
-    def values(self) -> dict[str, Json]:
+    def to_job_json(self) -> dict[str, Json]:
         """As a job keeps it."""
         return {
             "dataset": self.dataset,
@@ -125,7 +125,7 @@ def request_import(
         partial(run_import_job, jobs, store, settings),
         dataset_id=None if row is None else int(row.id),
         actor=actor,
-        request=request.values(),
+        request=request.to_job_json(),
     )
 
 
@@ -213,8 +213,8 @@ def import_in_this_process(
         store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
     )
     result = imported.result
-    nothing = None if imported.imported_anything else imported.nothing_read_error()
-    return ImportOutcome(imported.values(), bool(result.new + result.changed), nothing)
+    nothing = None if imported.imported_anything else imported.explain_nothing_imported()
+    return ImportOutcome(imported.to_report_values(), bool(result.new + result.changed), nothing)
 
 
 def _request_following_jobs(
@@ -322,7 +322,7 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
         grouping=options.get("grouping", ""),
         propose=options.get("propose", True),
     )
-    source.check(policy=request.policy is not None)
+    source.require_used_options(policy=request.policy is not None)
     return source
 
 

@@ -206,7 +206,7 @@ class _MergeRun:
     counted: set[str]
     """Static cameras that are counted already."""
 
-    def origin(self, session: Session) -> ImportOrigin:
+    def ensure_origin_dataset(self, session: Session) -> ImportOrigin:
         """The dataset, made with the other's policy when there is none of that name."""
         row = find_dataset(session, self.dataset)
         number = (
@@ -264,7 +264,7 @@ def _merge_tree(
         item.station.key: item for item in _parse_records(tree, STATIONS, report, parse_station)
     }
     with open_import_session(run.store, keep=run.keep) as session:
-        origin = run.origin(session)
+        origin = run.ensure_origin_dataset(session)
         _report_policy_difference(session, run)
         merge_stations(session, origin, stations.values(), run.report)
     known = {key: item.station for key, item in stations.items()}
@@ -310,7 +310,7 @@ def _merge_batch(
     batch: Sequence[MergeGroup],
     stations: Mapping[str, MergeStation],
 ) -> None:
-    origin = run.origin(session)
+    origin = run.ensure_origin_dataset(session)
     if not run.keep:
         # A dry run took its stations back; the groups need them for a moment.
         merge_stations(session, origin, stations.values(), IngestReport())
@@ -321,7 +321,7 @@ def _merge_batch(
     counted = {group.key for group in upstream}
     ids = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
     stored = read_groups(session, list(ids.values()))
-    chains = RevisionChains(session, origin.dataset_id).of(stored.values())
+    chains = RevisionChains(session, origin.dataset_id).read_chains_by_group_id(stored.values())
     touched = []
     for key, number in ids.items():
         item = items[key]
@@ -344,7 +344,7 @@ def _list_groups_only_in_other(
 ) -> list[Group]:
     """What the other's dataset brought and this one's never did: groups as they came."""
     stored = read_groups(session, list(known.values()))
-    chains = RevisionChains(session, origin.dataset_id).of(stored.values())
+    chains = RevisionChains(session, origin.dataset_id).read_chains_by_group_id(stored.values())
     shared = _read_static_cameras(session, origin.dataset_id)
     upstream = []
     for key, item in items.items():

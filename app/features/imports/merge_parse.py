@@ -269,7 +269,7 @@ def _validate_station(station: Station) -> Station:
     _require_booleans(
         "a static camera whose `flipped` or `shared`", station.flipped, station.shared
     )
-    for marking in station.annotated_lines:
+    for marking in station.lines_with_not_visible:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
     if (count := count_points(station.lines)) > MAX_POINTS:

@@ -106,7 +106,7 @@ class PictureCheck:
             )
         return found
 
-    def note(self, store: Store, dataset: str) -> int:
+    def save_shape_findings(self, store: Store, dataset: str) -> int:
         """Put findings at the views whose picture has another shape; such a group passes its gates, and
         nobody shall take it for a sound one. Returns how many there are."""
         with store.write() as session:
@@ -178,7 +178,7 @@ class PictureCheck:
             center = ball.center
             if center is not None and _is_outside(center.x, center.y, size):
                 yield f"the ball at ({center.x:.0f}, {center.y:.0f})"
-        for box in view.extras.places:
+        for box in view.extras.pixel_boxes:
             if _is_outside(box.x + box.width / 2, box.y + box.height / 2, size):
                 yield f"a box at ({box.x:.0f}, {box.y:.0f})"
         station = view.station

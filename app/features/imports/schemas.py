@@ -32,7 +32,7 @@ class ImportPlace(BaseModel):
             raise ValueError("name an upload or a folder, and not both")
         return self
 
-    def values(self) -> dict[str, str]:
+    def to_place_by_kind(self) -> dict[str, str]:
         """The place that was given, by its kind."""
         return {"upload": self.upload} if self.upload else {"folder": self.folder or ""}
 
@@ -122,12 +122,12 @@ class ImportBody(BaseModel):
         return ImportRequest(
             self.dataset,
             self.format,
-            self.source.values(),
-            None if lines is None else lines.values(),
+            self.source.to_place_by_kind(),
+            None if lines is None else lines.to_place_by_kind(),
             options,
             dry_run or self.dry_run,
             self.policy,
-            None if frames is None else frames.values(),
+            None if frames is None else frames.to_place_by_kind(),
         )
 
 

@@ -146,7 +146,7 @@ class ImportSource:
     grouping: str = ""
     propose: bool = True
 
-    def check(self, *, policy: bool = False) -> None:
+    def require_used_options(self, *, policy: bool = False) -> None:
         """Refuse an option that the format does not use.
 
         Args:
@@ -205,7 +205,7 @@ class ImportResult:
         missing = self.result.without_picture or report.counts["views without frame"]
         return self.imported_anything and not (report.problems or report.dropped or missing)
 
-    def nothing_read_error(self) -> tuple[str, str]:
+    def explain_nothing_imported(self) -> tuple[str, str]:
         """Why nothing could be imported, naming the file, and what to do about it."""
         source = self.source
         problems = [problem.message for problem in self.report.problems] + self.result.problems
@@ -219,8 +219,8 @@ class ImportResult:
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
         look = guess_other_format(source.path, source.format)
-        if look is not None and not (problems and look.is_stated_by(problems[0])):
-            return sentence, look.sentence
+        if look is not None and not (problems and look.is_advice_in_problem(problems[0])):
+            return sentence, look.advice_sentence
         if self.report.read:
             return sentence, "Every record was left out; the report names each with its reason."
         return sentence, (
@@ -245,7 +245,7 @@ class ImportResult:
             return self.report.problems
         return [DatasetFormatError(str(self.source.path), None, None, unannotated[0])]
 
-    def values(self) -> dict[str, Any]:
+    def to_report_values(self) -> dict[str, Any]:
         """Everything that there is to tell, as plain values."""
         shown = self.source.shown
         return {
@@ -306,7 +306,7 @@ def import_source(
     Raises:
         InputError: The format does not use one of the options.
     """
-    source.check()
+    source.require_used_options()
     report, limits = ReaderReport(), ImportLimits.of(settings)
     if source.format == "cameras":
         sizes: dict[str, ImageSize] = {}
@@ -363,7 +363,7 @@ def import_source(
     if dry_run or not result.new + result.changed + result.unchanged:
         result.findings += len(check.found)
     else:
-        result.findings += check.note(store, dataset)
+        result.findings += check.save_shape_findings(store, dataset)
     if folder is not None and source.calibration is None:
         _report_contradicted_cameras(folder, dataset, source, report)
     if folder is not None and not dry_run:
@@ -447,5 +447,5 @@ def _report_contradicted_cameras(
 
 
 def _iterate_unassigned_frames(folder: IssiaFolder) -> Iterator[UnassignedFrame]:
-    for item in folder.persons():
+    for item in folder.persons_without_ball():
         yield UnassignedFrame(item.camera, str(item.frame), Extras(boxes=item.boxes))

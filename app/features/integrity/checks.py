@@ -331,7 +331,7 @@ def _check_sign_on(settings: Settings) -> CheckResult:
         rules = read_rules(settings.model_copy(update={"team": True}))
         if rules is None:
             return CheckResult(name, True, "not set up")
-        return CheckResult(name, True, Provider(rules).examine())
+        return CheckResult(name, True, Provider(rules).refetch_and_describe())
     except (InputError, ConflictError) as error:
         return CheckResult(
             name, False, error.message, error.hint if isinstance(error, InputError) else mend

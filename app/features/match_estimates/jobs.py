@@ -67,7 +67,7 @@ class MatchJobContext:
         match = self.job.request.get("match")
         return None if match is None else [match]
 
-    def solve_stale_groups(self) -> None:
+    def request_solve_of_stale_groups(self) -> None:
         """Solve what it leaves stale, soon."""
         request_solve_job(self.jobs, self.store, self.dataset_id, actor=self.job.actor)
 
@@ -235,7 +235,7 @@ def _share_positions(call: MatchJobContext, progress: JobProgress) -> Json:
             )
     finally:
         # What some matches were given before it ended is solved, however it ended.
-        call.solve_stale_groups()
+        call.request_solve_of_stale_groups()
     return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
 
 
@@ -265,7 +265,7 @@ def _adjust_rig(call: MatchJobContext, progress: JobProgress) -> Json:
                 hint="Make a new proposal, and accept that.",
             )
         accept_rig(call.store, proposed, what, actor=call.job.actor)
-        call.solve_stale_groups()
+        call.request_solve_of_stale_groups()
     return {**rig_proposal_to_json(proposed), "accepted": what}
 
 

@@ -303,7 +303,7 @@ def _inputs_digest(item: MatchPositions, policy: CalibrationPolicy) -> str:
     # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
     values = asdict(replace(policy, share_position=True))
     del values["source"]
-    return digest_json([SOLVER_VERSION, values, item.inputs])
+    return digest_json([SOLVER_VERSION, values, item.inputs_digest])
 
 
 def _list_matches_to_share(

@@ -150,7 +150,7 @@ class MatchPositions:
     positions: list[SharedPosition] = field(default_factory=list)
 
     @property
-    def inputs(self) -> str:
+    def inputs_digest(self) -> str:
         """Digest of the parts, in whatever order they were read."""
         return digest_json(sorted(self.parts))
 

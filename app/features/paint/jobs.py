@@ -37,7 +37,7 @@ def _run_paint_job(call: MatchJobContext, progress: JobProgress) -> Json:
         )
     finally:
         # What some groups were given before it ended is solved, however it ended.
-        call.solve_stale_groups()
+        call.request_solve_of_stale_groups()
     return {name: sum(getattr(item, name) for item in found.items) for name in REPORTED}
 
 

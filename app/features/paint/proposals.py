@@ -59,7 +59,7 @@ class DatasetProposalCounts:
     dataset: str
     items: tuple[MatchProposalCounts, ...]
 
-    def count(self, name: str) -> int:
+    def sum_counts(self, name: str) -> int:
         """Sum of a count over the matches."""
         return sum(getattr(item, name) for item in self.items)
 
@@ -84,7 +84,7 @@ class ProposalRun:
     changed: int = 0
     missing: int = 0
 
-    def then(self, task: ProposalTask, found: Proposal | None) -> ProposalRun:
+    def add_view(self, task: ProposalTask, found: Proposal | None) -> ProposalRun:
         """With one view more."""
         if found is None:
             return replace(self, views=self.views + 1, left=self.left + 1)
@@ -169,7 +169,7 @@ def propose_cameras_for_views(
                     require_wanted()
                 save_proposals(session, [item for item in answers if item is not None])
             for task, answer in zip(tasks, answers, strict=True):
-                run = run.then(task, answer)
+                run = run.add_view(task, answer)
             if progress is not None:
                 progress(run.views, total)
     return run
@@ -212,7 +212,7 @@ def _make_task(
         return None
     station, pitch = view.station, stored.group.pitch
     # Which line of the paint is sought, where that is another than it always was.
-    lines = [policy.goal] if policy.with_painted_goal(pitch) != pitch else []
+    lines = [policy.goal] if policy.pitch_for_paint(pitch) != pitch else []
     inputs = [
         SEARCH_VERSION,
         [camera_to_json(camera) for camera in known],

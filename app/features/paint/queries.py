@@ -74,7 +74,7 @@ def insert_paint_readings(
                     "digest": digest,
                     "dataset_id": dataset_id,
                     "reason": reading.reason,
-                    "body": zlib_ng.compress(reading.text.encode()),
+                    "body": zlib_ng.compress(reading.canonical_json.encode()),
                 }
                 for digest, reading in unique.items()
             ],

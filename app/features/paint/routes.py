@@ -322,7 +322,7 @@ def request_line_proposals(
     if dry_run or request.dry_run:
         matches = None if request.match is None else [request.match]
         found = get_proposal_counts(services.store, dataset, matches)
-        counts = {name: found.count(name) for name in ("views", "looked")}
+        counts = {name: found.sum_counts(name) for name in ("views", "looked")}
         return make_document_response(ProposalPlanDocument(**counts))
     return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 

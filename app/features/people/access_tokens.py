@@ -160,7 +160,7 @@ class AccessTokens:
             made = next(row for row in list_access_tokens(session, person.id) if row.id == token_id)
         return self._token_from_row(made), text
 
-    def find(self, text: str) -> Login:
+    def find_login_of_token(self, text: str) -> Login:
         """Who asks with a token, and what it is for.
 
         Raises:
@@ -176,7 +176,7 @@ class AccessTokens:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
         roles = dataset_roles_from_rights(Role(row.role), rights_from_row(row))
         if row.dataset_id is not None:
-            roles = roles.only(row.dataset_id)
+            roles = roles.restrict_to_dataset(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
         use = TokenUse(row.name, _parse_scopes(row), fresh=row.used is None)
         return Login(row.id, row.person_id, row.person, roles, seen, use)

@@ -221,7 +221,7 @@ def require_second_factor(
     from app.features.people.second_factor import SecondFactors
 
     with open_store() as store:
-        SecondFactors(store).require(switch is Switch.ON, actor=get_current_actor())
+        SecondFactors(store).set_required(switch is Switch.ON, actor=get_current_actor())
     print_values({"second_factor_required": switch is Switch.ON}, json_)
 
 

@@ -104,7 +104,7 @@ class AttemptWindow:
     def __init__(self, store: Store, clock: Callable[[], float] = time.time):
         self._store, self._clock = store, clock
 
-    def count_attempt(self, whose: str, most: int, seconds: float) -> float | None:
+    def count_attempt_or_get_wait(self, whose: str, most: int, seconds: float) -> float | None:
         """Count a try; None, or after how many seconds there may be another where there were too many.
 
         Who is refused writes nothing: a flood keeps nobody from writing.

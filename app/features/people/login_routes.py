@@ -53,7 +53,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
         unavailable = None
     except ConflictError as error:
         unavailable = f"{error.message}. {error.hint}"
-    items = team.passkeys.of(me.person_id)
+    items = team.passkeys.list_of_person(me.person_id)
     return PasskeyList(items=items, unavailable=unavailable)
 
 
@@ -70,7 +70,7 @@ def begin_passkey(
     team.require_passwords()
     team.count_login_attempt(request, me.name)
     return PasskeyCreationOptions(
-        options=team.passkeys.begin(me, body.password, team.make_passkey_site(request))
+        options=team.passkeys.begin_creation(me, body.password, team.make_passkey_site(request))
     )
 
 
@@ -114,9 +114,9 @@ def begin_passkey_login(
 ) -> PasskeyRequestOptions:
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
     team.require_passwords()
-    team.attempts.count_challenge(team.address(request))
+    team.attempts.count_challenge(team.find_client_address(request))
     asker = secrets.token_urlsafe()
-    options = team.passkeys.ask(asker, team.make_passkey_site(request))
+    options = team.passkeys.begin_login(asker, team.make_passkey_site(request))
     response.set_cookie(**team.cookies.make_passkey_cookie(asker))
     return PasskeyRequestOptions(options=options)
 
@@ -132,7 +132,7 @@ def log_in_with_passkey(
 ) -> SessionDocument:
     """Log in with a passkey: no name, no password, and no code."""
     team.require_passwords()
-    address = team.address(request)
+    address = team.find_client_address(request)
     team.count_login_attempt(request)
     try:
         token = team.passkeys.log_in(
@@ -141,7 +141,7 @@ def log_in_with_passkey(
             team.make_passkey_site(request),
             browser=request.headers.get("user-agent", ""),
             address=address,
-            before=team.token(request),
+            before=team.get_session_token(request),
         )
     except NotLoggedInError:
         log.warning("a login with a passkey was refused", address=address)
@@ -222,7 +222,7 @@ def get_team_settings(team: AppTeam, _me: Me) -> TeamSettings:
 @may(Action.ADMINISTER)
 def put_team_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
     """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
-    team.factors.require(wanted.require_second_factor, actor=me.actor)
+    team.factors.set_required(wanted.require_second_factor, actor=me.actor)
     return wanted
 
 

@@ -114,22 +114,22 @@ class Login:
         return self.roles.everywhere
 
     @property
-    def owner(self) -> str:
+    def ownership_name(self) -> str:
         """Under which name it is theirs what belongs to no dataset: a token of one has its own."""
         return self.actor if self.roles.limited else self.name
 
     @property
     def visibility(self) -> Visibility:
         """What they see."""
-        return self.roles.visibility(self.owner)
+        return self.roles.visibility(self.ownership_name)
 
     @property
-    def whole_visibility(self) -> Visibility:
+    def visibility_without_hidden_groups(self) -> Visibility:
         """What they see and nothing of which is hidden from them."""
-        return self.roles.whole_visibility(self.owner)
+        return self.roles.visibility_without_hidden_groups(self.ownership_name)
 
     @property
-    def reader(self) -> RestrictedReader | None:
+    def restricted_reader(self) -> RestrictedReader | None:
         """What is hidden from them; None: nothing."""
         if self.roles.is_admin:
             return None

@@ -110,13 +110,15 @@ class Passkeys:
             make_pending_action_store(store, clock, LASTS, "passkey")
         )
 
-    def of(self, person_id: int) -> list[Passkey]:
+    def list_of_person(self, person_id: int) -> list[Passkey]:
         """The passkeys of a person, the oldest first."""
         with self._store.read() as session:
             rows = list_passkeys(session, person_id)
         return [Passkey(row.id, row.name, row.created, row.used) for row in rows]
 
-    def begin(self, login: Login, password: str | None, site: PasskeySite) -> dict[str, Any]:
+    def begin_creation(
+        self, login: Login, password: str | None, site: PasskeySite
+    ) -> dict[str, Any]:
         """What a browser needs to make a passkey (PublicKeyCredentialCreationOptionsJSON).
 
         Raises:
@@ -201,7 +203,7 @@ class Passkeys:
                 session, login.name, login.name, "no passkey", login.role, passkey=name
             )
 
-    def ask(self, asker: str, site: PasskeySite) -> dict[str, Any]:
+    def begin_login(self, asker: str, site: PasskeySite) -> dict[str, Any]:
         """What a browser needs to log in with a passkey (PublicKeyCredentialRequestOptionsJSON).
 
         Args:

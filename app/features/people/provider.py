@@ -205,7 +205,7 @@ class Provider:
         """
         return self._verify_claims(self._exchange_code_for_token(request, code), request)
 
-    def examine(self) -> str:
+    def refetch_and_describe(self) -> str:
         """A sentence on where it is, having asked it anew.
 
         Raises:

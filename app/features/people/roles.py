@@ -156,7 +156,7 @@ class DatasetRoles:
         single = (role for key, role in self.single.items() if key <= COPIES)
         return max((self.everywhere, *single), key=_RANKS.index)
 
-    def only(self, dataset_id: int) -> DatasetRoles:
+    def restrict_to_dataset(self, dataset_id: int) -> DatasetRoles:
         """The same rights in one dataset, and none in any other."""
         role = self.find_role_in(dataset_id)
         return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
@@ -182,7 +182,7 @@ class DatasetRoles:
         }
         return Visibility(all_but, frozenset(named), name, frozenset(copies))
 
-    def whole_visibility(self, name: str) -> Visibility:
+    def visibility_without_hidden_groups(self, name: str) -> Visibility:
         """The same without the datasets of which some groups are hidden from them."""
         visibility = self.visibility(name)
         if self.is_admin or not self.blind:

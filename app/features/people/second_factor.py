@@ -183,7 +183,7 @@ class SecondFactors:
         with self._store.read() as session:
             return is_second_factor_required(session)
 
-    def require(self, on: bool, *, actor: str) -> None:
+    def set_required(self, on: bool, *, actor: str) -> None:
         """Let everybody need one: whoever has none makes one before anything else.
 
         Raises:

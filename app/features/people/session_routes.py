@@ -107,7 +107,9 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             allows=ALLOWS,
         )
     bearer = read_bearer_token(request.scope)
-    login = team.login(request) if bearer is None else team.find_login_by_token(bearer, request)
+    login = (
+        team.find_login(request) if bearer is None else team.find_login_by_token(bearer, request)
+    )
     found = make_session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
@@ -141,7 +143,7 @@ def _begin_session(
     password: str,
     code: str | None = None,
 ) -> SessionDocument:
-    address = team.address(request)
+    address = team.find_client_address(request)
     team.count_login_attempt(request, name)
     try:
         token = team.logins.log_in(
@@ -151,7 +153,7 @@ def _begin_session(
             on_code=lambda: team.attempts.count_code(name),
             browser=request.headers.get("user-agent", ""),
             address=address,
-            before=team.token(request),
+            before=team.get_session_token(request),
         )
     except NotLoggedInError:
         # Without the name: people type passwords into the wrong field.
@@ -172,7 +174,7 @@ def log_out(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log out: the session ends on the server, and the cookie goes."""
-    login = team.login(request)
+    login = team.find_login(request)
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookies.make_session_cookie(None))
@@ -274,7 +276,7 @@ def begin_sign_on(
 ) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
-    team.attempts.count_challenge(team.address(request))
+    team.attempts.count_challenge(team.find_client_address(request))
     asker = secrets.token_urlsafe()
     address = sign_on.begin(
         asker, redirect=team.make_landing_url(request), to=body.to, link=body.link, name=body.name
@@ -298,7 +300,7 @@ def finish_sign_on(
     Whoever has a second factor is asked for its code by a 401 whose pointer is `/factor`, unless the
     provider says, as the operator wants it, that it has asked for one.
     """
-    sign_on, address = team.require_sign_on(), team.address(request)
+    sign_on, address = team.require_sign_on(), team.find_client_address(request)
     team.count_login_attempt(request)
     try:
         entered = sign_on.finish(
@@ -307,10 +309,10 @@ def finish_sign_on(
             body.code,
             factor=body.factor,
             issuer=body.iss,
-            login=team.login(request),
+            login=team.find_login(request),
             browser=request.headers.get("user-agent", ""),
             address=address,
-            before=team.token(request),
+            before=team.get_session_token(request),
             on_code=team.attempts.count_code,
         )
     except AccessError as error:
@@ -318,7 +320,9 @@ def finish_sign_on(
         raise
     response.set_cookie(**team.cookies.make_sign_on_cookie(None))
     if entered.token is None:
-        return SignOnEnd(session=make_session_document(team.login(request), store), to=entered.to)
+        return SignOnEnd(
+            session=make_session_document(team.find_login(request), store), to=entered.to
+        )
     response.set_cookie(**team.cookies.make_session_cookie(entered.token))
     return SignOnEnd(
         session=make_session_document(team.logins.find(entered.token), store), to=entered.to
@@ -352,7 +356,9 @@ def begin_identity_link(
     sign_on = team.require_sign_on()
     team.count_login_attempt(request, me.name)
     asker = secrets.token_urlsafe()
-    address = sign_on.begin_link(asker, me, body.password, redirect=team.make_landing_url(request))
+    address = sign_on.begin_linking_account(
+        asker, me, body.password, redirect=team.make_landing_url(request)
+    )
     response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
     return SignOnStarted(address=address)
 

@@ -69,12 +69,12 @@ class _PendingLogin:
     session: int | None = None
     claims: Mapping[str, Any] | None = None
 
-    def text(self) -> bytes:
+    def to_json_bytes(self) -> bytes:
         """As JSON."""
         return json_text(asdict(self)).encode()
 
     @staticmethod
-    def read(text: bytes) -> _PendingLogin:
+    def from_json_bytes(text: bytes) -> _PendingLogin:
         """What ``text`` made."""
         values = json.loads(text)
         return _PendingLogin(**{**values, "asked": LoginRequest(**values["asked"])})
@@ -139,7 +139,9 @@ class SignOn:
             name = normalize_user_name(name or "")
         return self._begin_login(asker, redirect, to, link=link, name=name)
 
-    def begin_link(self, asker: str, login: Login, password: str | None, *, redirect: str) -> str:
+    def begin_linking_account(
+        self, asker: str, login: Login, password: str | None, *, redirect: str
+    ) -> str:
         """The address where somebody who is logged in shows which account is theirs.
 
         Raises:
@@ -188,7 +190,7 @@ class SignOn:
             ConflictError: The account is another person's, a name is taken, or the provider does not answer.
         """
         found = self._begun.take(hash_token(state))
-        begun = None if found is None else _PendingLogin.read(found)
+        begun = None if found is None else _PendingLogin.from_json_bytes(found)
         if begun is None or not compare_digest(begun.browser, hash_token(asker)):
             raise NotLoggedInError(LATE, hint="Begin again.")
         if issuer is not None and issuer != self.rules.issuer:
@@ -229,7 +231,7 @@ class SignOn:
             if error.pointer == FACTOR:
                 # Whoever followed a link has come by it; what is missing is asked for again.
                 waits = replace(begun, claims=claims, link=None)
-                self._begun.put(hash_token(state), waits.text())
+                self._begun.put(hash_token(state), waits.to_json_bytes())
             raise
         return SignOnResult(token, begun.to)
 
@@ -239,7 +241,8 @@ class SignOn:
         )
         address = self._provider.make_login_url(request)
         self._begun.put(
-            hash_token(request.state), _PendingLogin(hash_token(asker), request, to, **more).text()
+            hash_token(request.state),
+            _PendingLogin(hash_token(asker), request, to, **more).to_json_bytes(),
         )
         return address
 

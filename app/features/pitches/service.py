@@ -71,7 +71,7 @@ class PitchState:
     previous: Pitch | None
 
     @property
-    def sentence(self) -> str:
+    def proposal_reason(self) -> str:
         """Why the proposed size is proposed."""
         found = self.estimate
         assert found is not None and self.proposed is not None
@@ -254,7 +254,7 @@ def update_pitch_findings(session: Session, dataset_id: int) -> None:
 
 
 def _save_proposal_findings(session: Session, state: DatasetPitches) -> None:
-    found = ((item.group_id, item.sentence) for item in state.proposals)
+    found = ((item.group_id, item.proposal_reason) for item in state.proposals)
     refresh_queue(session, replace_pitch_findings(session, state.dataset_id, found))
 
 

@@ -84,7 +84,7 @@ class ThresholdAdvice:
         return self.present is not None and self.low <= self.present <= self.high
 
     @property
-    def moved(self) -> bool:
+    def differs_from_present(self) -> bool:
         """Whether an estimate that is followed is another by now than the present value."""
         if self.present is None:
             return True
@@ -129,7 +129,9 @@ class Noise:
     @property
     def values(self) -> dict[str, float]:
         """The thresholds that would make the policy agree; nothing where it does already."""
-        if not any(item.moved if self.follows else not item.agrees for item in self.advice):
+        if not any(
+            item.differs_from_present if self.follows else not item.agrees for item in self.advice
+        ):
             return {}
         return {item.name: item.estimate for item in self.advice}
 
@@ -161,8 +163,8 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         groups=groups,
         solved=len(ids),
         ball=noise.ball,
-        stations=found.of("camera"),
-        people=found.of("person"),
+        stations=found.noise_of_kind("camera"),
+        people=found.noise_of_kind("person"),
         factors=_factors_by_camera_and_person(found),
         used=used,
         line_estimate=noise.lines,
@@ -198,7 +200,7 @@ def update_policy_noise(store: Store, dataset: str | int, actor: str) -> bool:
     state = read_policy(store, dataset)
     noise = _estimate_noise(store, _solved_group_ids(store, state.dataset_id), state.policy)[2]
     advice = _make_advice(noise, state.policy)
-    if not any(item.moved for item in advice):
+    if not any(item.differs_from_present for item in advice):
         return False
     values = {item.name: item.estimate for item in advice}
     policy = replace_thresholds(
@@ -370,7 +372,7 @@ def _describe_notices(advice: Sequence[ThresholdAdvice], policy: Policy) -> Iter
             "policy is used."
         )
     if policy.noise == ESTIMATED:
-        moved = any(item.moved for item in advice)
+        moved = any(item.differs_from_present for item in advice)
         yield ESTIMATED_WORDS + (" The next solve uses what they show now." if moved else "")
         return
     if policy.name in POLICIES:

@@ -25,7 +25,8 @@ class _PolicyIdentity(Document):
 
 
 _thresholds: dict[str, Any] = {
-    item.name: (item.hint, Field(description=item.text)) for item in list_thresholds(Policy)
+    item.name: (item.hint, Field(description=item.label_with_unit))
+    for item in list_thresholds(Policy)
 }
 _PolicyFields: Any = create_model("_PolicyFields", __base__=_PolicyIdentity, **_thresholds)
 

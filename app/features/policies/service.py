@@ -174,9 +174,9 @@ def policy_to_yaml(policy: Policy) -> str:
         name = threshold.name.removeprefix(f"{CALIBRATION}.")
         line = f"{name}: {_yaml_scalar(threshold.value(policy))}"
         if name == threshold.name:
-            lines.append(f"{line:30}  # {threshold.text}")
+            lines.append(f"{line:30}  # {threshold.label_with_unit}")
         else:
-            inner.append(f"  {line:28}  # {threshold.text}")
+            inner.append(f"  {line:28}  # {threshold.label_with_unit}")
     return "\n".join([*lines, "", f"{CALIBRATION}:", *inner[1:], ""])
 
 
@@ -258,7 +258,7 @@ def _check_threshold(
         return value
     if value is None and threshold.optional:
         return None
-    if threshold.is_word:
+    if threshold.has_word_choices:
         if not isinstance(value, str) or value not in threshold.choices:
             raise InputError(f"{name} is {' or '.join(map(str, threshold.choices))}", pointer=place)
         return value

@@ -221,7 +221,7 @@ def judge_replay_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingL
             told = f"It is linked to frames {mine[0].live.first} to {mine[0].live.last}, which the replay does not show."
     else:
         middle = (replay.first + replay.last) / 2
-        shown = known.map.live(np.array([(middle - known.replay.first) / truth.fps]))[0]
+        shown = known.map.to_live_times(np.array([(middle - known.replay.first) / truth.fps]))[0]
         shown += known.live.first / truth.fps
         off = float(abs(shown - truth.offset_s - truth.speed * middle / truth.fps) * truth.fps)
         told = f"In the middle of the replay its time is off by {off:.1f} live frames."

@@ -94,7 +94,7 @@ class AcceptPlan:
     refused: dict[str, int]
 
     @property
-    def groups(self) -> int:
+    def group_count(self) -> int:
         """How many groups change."""
         return len({item.group_id for item in self.changes})
 
@@ -163,7 +163,7 @@ def accept_predicted_balls(
     groups = list(_group_by_group_id(plan.changes))
     for number, (group_id, items) in enumerate(groups):
         if progress is not None:
-            progress(number, plan.groups, "Accepting predictions.")
+            progress(number, plan.group_count, "Accepting predictions.")
         for item in items:
             if item is groups[-1][1][-1]:
                 done = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))

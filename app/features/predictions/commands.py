@@ -172,7 +172,11 @@ def accept(
         request = AcceptRequest(chosen.id, query, None, min_score, replace)
         if dry_run:
             plan = plan_accept(store, dataset, request)
-            values = {"views": len(plan.changes), "groups": plan.groups, "refused": plan.refused}
+            values = {
+                "views": len(plan.changes),
+                "groups": plan.group_count,
+                "refused": plan.refused,
+            }
         else:
             report = run_accept(
                 store, dataset, request, actor=get_current_actor(), progress=progress
@@ -404,7 +408,7 @@ def evaluate(
         PredictionFiles(careful, careful_format, category=careful_category, size=careful_size),
         version,
     )
-    request.check()
+    request.refuse_unused_options()
     server = get_current_server()
     run = _evaluate_locally if server is None else partial(_evaluate_on_server, server)
     with show_progress("Evaluating") as progress:

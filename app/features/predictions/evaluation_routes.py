@@ -111,7 +111,7 @@ class EvaluationBody(BaseModel):
             raise ValueError("give predictions, reference boxes, or both")
         return self
 
-    def value(self, version: int | None) -> EvaluationRequest:
+    def to_evaluation_request(self, version: int | None) -> EvaluationRequest:
         """The request as the review floor takes it; ``version`` is the id of the one it names."""
         return EvaluationRequest(**{**self.model_dump(), "version": version})
 
@@ -262,7 +262,7 @@ def start_evaluation(
     """
     store, named = services.store, request.version
     version = None if named is None else find_version_id(store, str(named), dataset)
-    wanted = request.value(version)
+    wanted = request.to_evaluation_request(version)
     return request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
 
 

@@ -397,14 +397,14 @@ class SourcesEvaluationRequest:
     careful: PredictionFiles
     version: str | None = None
 
-    def check(self) -> None:
+    def refuse_unused_options(self) -> None:
         """Refuse options that nothing uses.
 
         Raises:
             InputError: Naming the option.
         """
-        self.predictions.check()
-        self.careful.check("careful-")
+        self.predictions.refuse_unused_options()
+        self.careful.refuse_unused_options("careful-")
         refuse_group_rule_beside_version(self.request.groups, self.version)
 
 
@@ -437,7 +437,7 @@ def evaluate_sources(
         NotFoundError: There is no such dataset, version, file or set.
         InputError: A file cannot be used, or nothing is left to evaluate.
     """
-    wanted.check()
+    wanted.refuse_unused_options()
     pinned = None if wanted.version is None else find_version(store, dataset, wanted.version).id
     found, drawn = (
         None

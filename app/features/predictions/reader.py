@@ -76,7 +76,7 @@ class PredictionFiles:
         """Whether it names nothing at all."""
         return self.path is None and self.cameras is None
 
-    def check(self, prefix: str = "") -> None:
+    def refuse_unused_options(self, prefix: str = "") -> None:
         """Refuse options of a command that nothing uses: those of files where none is read.
 
         Args:

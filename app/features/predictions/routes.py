@@ -106,7 +106,7 @@ def _make_accepted_response(found: AcceptReport | Job) -> Response:
     return (
         make_job_response(found)
         if isinstance(found, Job)
-        else make_document_response(AcceptOutcome.done(found))
+        else make_document_response(AcceptOutcome.of_report(found))
     )
 
 
@@ -133,10 +133,10 @@ def accept_predictions(
     Only the surest prediction of a view counts. Named views are changed at once (200); a query
     makes a job (202), whose result has `changed`, `groups` and `refused`.
     """
-    store, value = services.store, request.value()
+    store, value = services.store, request.to_accept_request()
     if dry_run or request.dry_run:
         return make_document_response(
-            AcceptOutcome.planned(plan_accept(store, request.dataset, value))
+            AcceptOutcome.of_plan(plan_accept(store, request.dataset, value))
         )
     if request.views is not None:
         return accept_predicted_balls(store, request.dataset, value, actor=actor)

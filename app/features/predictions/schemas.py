@@ -238,7 +238,7 @@ class AcceptBody(BaseModel):
             raise ValueError('give "q" or "views"; an empty "q" means every group')
         return self
 
-    def value(self) -> AcceptRequest:
+    def to_accept_request(self) -> AcceptRequest:
         """The request as the review floor takes it."""
         views = None if self.views is None else tuple(self.views)
         return AcceptRequest(self.predictions, self.q, views, self.min_score, self.replace)
@@ -269,18 +269,18 @@ class AcceptOutcome(Document):
     sample: list[AcceptedView] = Field(description="The first views of a dry run.")
 
     @staticmethod
-    def planned(plan: AcceptPlan) -> AcceptOutcome:
+    def of_plan(plan: AcceptPlan) -> AcceptOutcome:
         """The document of a dry run."""
         return AcceptOutcome(
             dry_run=True,
             changed=len(plan.changes),
-            groups=plan.groups,
+            groups=plan.group_count,
             refused=plan.refused,
             sample=plan.changes[:SHOWN],
         )
 
     @staticmethod
-    def done(report: AcceptReport) -> AcceptOutcome:
+    def of_report(report: AcceptReport) -> AcceptOutcome:
         """The document of what was done."""
         return AcceptOutcome(
             dry_run=False,

@@ -232,12 +232,12 @@ class RowOrder:
         return [key.column for key in self._keys]
 
     @property
-    def ascending(self) -> list[ColumnElement[Any]]:
+    def order_by_columns(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the order."""
         return [key.sort_expression(backwards=False) for key in self._keys]
 
     @property
-    def backwards(self) -> list[ColumnElement[Any]]:
+    def reversed_order_by_columns(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the reverse."""
         return [key.sort_expression(backwards=True) for key in self._keys]
 
@@ -245,11 +245,11 @@ class RowOrder:
         """The keys of a row that was read with them."""
         return [getattr(row, key.name) for key in self.keys]
 
-    def after(self, values: Sequence[Key]) -> ColumnElement[bool]:
+    def after_condition(self, values: Sequence[Key]) -> ColumnElement[bool]:
         """Whether a row comes after the one with these keys."""
         return self._after_or_before(values, forward=True)
 
-    def before(self, values: Sequence[Key]) -> ColumnElement[bool]:
+    def before_condition(self, values: Sequence[Key]) -> ColumnElement[bool]:
         """Whether a row comes before the one with these keys."""
         return self._after_or_before(values, forward=False)
 
@@ -289,11 +289,13 @@ class GroupListing:
         found: int | None = self.session.scalar(self._filter_statement(select(func.count())))
         return found or 0
 
-    def place(self, order: RowOrder, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
+    def find_position_and_total(
+        self, order: RowOrder, keys: Sequence[Key], group_id: int
+    ) -> tuple[int | None, int]:
         """How many groups come before some keys, None where the group is not here; and how many
         there are."""
         here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
-        before = func.sum(case((order.before(keys), 1), else_=0))
+        before = func.sum(case((order.before_condition(keys), 1), else_=0))
         statement = self._filter_statement(select(func.count(), here, before), order)
         total, found, index = self.session.execute(statement).one()
         return (index if found else None), total
@@ -311,13 +313,13 @@ class GroupListing:
 
     def rows_after(self, order: RowOrder, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
         """Rows in order with their keys, from the one after these keys on, or from the first."""
-        after = [] if keys is None else [order.after(keys)]
+        after = [] if keys is None else [order.after_condition(keys)]
         statement = _select_rows(order).where(*self._conditions, *after).limit(limit)
         return self.session.execute(statement).all()
 
     def ids(self, order: RowOrder, limit: int | None = None) -> list[int]:
         """Ids in order, of all or of the first."""
-        return self._read_ids(self._ids_statement.order_by(*order.ascending).limit(limit))
+        return self._read_ids(self._ids_statement.order_by(*order.order_by_columns).limit(limit))
 
     def ids_from(self, order: RowOrder, start: int, limit: int, total: int) -> list[int]:
         """Ids from a position on, in order, out of ``total``.
@@ -331,8 +333,8 @@ class GroupListing:
         behind = total - start - count
         ids = self._select_page_of_ids(order, min(start, behind) + count, total)
         if start <= behind:
-            return self._read_ids(ids.order_by(*order.ascending).offset(start).limit(count))
-        backwards = ids.order_by(*order.backwards).offset(behind).limit(count)
+            return self._read_ids(ids.order_by(*order.order_by_columns).offset(start).limit(count))
+        backwards = ids.order_by(*order.reversed_order_by_columns).offset(behind).limit(count)
         return self._read_ids(backwards)[::-1]
 
     def ids_around(
@@ -340,8 +342,14 @@ class GroupListing:
     ) -> tuple[list[int], list[int]]:
         """Ids just before some keys and just after, the nearest first, out of ``total``."""
         ids = self._select_page_of_ids(order, limit, total)
-        before = ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
-        after = ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
+        before = (
+            ids.where(order.before_condition(keys))
+            .order_by(*order.reversed_order_by_columns)
+            .limit(limit)
+        )
+        after = (
+            ids.where(order.after_condition(keys)).order_by(*order.order_by_columns).limit(limit)
+        )
         return self._read_ids(before), self._read_ids(after)
 
     @property
@@ -504,4 +512,4 @@ def _select_columns(names: Iterable[str]) -> Select[Any]:
 
 
 def _select_rows(order: RowOrder) -> Select[Any]:
-    return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)
+    return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.order_by_columns)

@@ -253,7 +253,7 @@ def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
             raise NotFoundError.group(group_id)
         dataset_id, keys = place
         listing = GroupListing(session, dataset_id, parsed.conditions)
-        index, total = listing.place(order, keys, group_id)
+        index, total = listing.find_position_and_total(order, keys, group_id)
         before, after = listing.ids_around(order, keys, _NEIGHBOURS, total)
     return Neighbours(index, total, tuple(before), tuple(after))
 

@@ -83,7 +83,7 @@ def add_one(
     The click is put onto the ball's centre. Cameras over time and boxes that a detector predicted help where there are
     any. Nothing becomes an annotation before a person accepts it.
     """
-    click = wanted.value()
+    click = wanted.to_ball_click()
     return add_ball_run(services.store, services.balls, recording, click, actor=actor)
 
 
@@ -117,7 +117,7 @@ def mend_one(
     if_match: IfMatch,
 ) -> StoredRun:
     """Say where the ball is in one more frame, and follow it from there, up to where both agree."""
-    store, click = services.store, wanted.value()
+    store, click = services.store, wanted.to_ball_click()
     with add_current_state_to_conflicts(
         lambda: BallRunFrames.of(get_ball_run(store, recording, run))
     ):
@@ -150,7 +150,7 @@ def change_one(
         lambda: BallRunFrames.of(get_ball_run(store, recording, run))
     ):
         return review_ball_run(
-            store, recording, run, wanted.value(), if_match, actor=actor, paint=services.paint
+            store, recording, run, wanted.to_review(), if_match, actor=actor, paint=services.paint
         )
 
 

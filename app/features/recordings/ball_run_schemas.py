@@ -27,7 +27,7 @@ class BallClickRequest(BaseModel):
     x: Pixel = Field(description="About the middle of the ball, pixels of the recording.")
     y: Pixel = Field(description="About the middle of the ball, pixels of the recording.")
 
-    def value(self) -> BallClick:
+    def to_ball_click(self) -> BallClick:
         """The click as a value."""
         return BallClick(self.frame, self.x, self.y)
 
@@ -45,7 +45,7 @@ class BallRunReviewRequest(BaseModel):
         default=None, description="All uncertain frames that are right."
     )
 
-    def value(self) -> BallRunReview:
+    def to_review(self) -> BallRunReview:
         """The change as a value."""
         confirmed = None if self.confirmed is None else tuple(self.confirmed)
         return BallRunReview(self.accepted, confirmed)

@@ -45,7 +45,7 @@ class StoredRun:
     etag: str
 
     @property
-    def name(self) -> str:
+    def ball_source_name(self) -> str:
         """What balls that come from it say they come from."""
         return f"ball run {self.id}"
 

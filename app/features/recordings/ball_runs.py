@@ -297,7 +297,7 @@ def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequen
 def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
     half = ball.diameter / 2
     box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
-    return BallAnnotation(box=box, predicted_by=run.name)
+    return BallAnnotation(box=box, predicted_by=run.ball_source_name)
 
 
 def _require_unaccepted_and_unchanged(run: StoredRun, if_match: str) -> None:

@@ -50,7 +50,7 @@ class RecordingFrames:
         self._settings = settings
         self._pool = WorkerPool(LIMITS, 1, WAITING, "frames", COUNTS["recordings"])
 
-    def ask(self, recording: Recording, number: int, width: int | None) -> PoolTask:
+    def request_frame(self, recording: Recording, number: int, width: int | None) -> PoolTask:
         """Have a frame decoded; the future has a JPEG, or the errors of ``read_jpeg``.
 
         Args:
@@ -108,7 +108,7 @@ class _OpenRecording:
         """Whether a frame can be given at once."""
         return (number, self.width) in self.ready or self.reader.has(number)
 
-    def make_ready(self, number: int) -> None:
+    def cache_encoded_frame(self, number: int) -> None:
         """Keep a frame that is decoded as somebody will ask for it."""
         data = _encode_jpeg(self.reader.read(number), self.width)
         self.ready[number, self.width] = data
@@ -159,7 +159,7 @@ def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool
                 asked_next = range(max(before - together, 0), max(number, 1))
                 found.planned = [one for one in asked_next if not found.has_frame(one)]
         if found.planned and found.reader.prefetch(found.planned[0], STEP):
-            found.make_ready(found.planned.pop(0))
+            found.cache_encoded_frame(found.planned.pop(0))
         return bool(found.planned)
     return False
 

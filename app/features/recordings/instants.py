@@ -81,7 +81,7 @@ class _ShownFrame:
     link: Mapping[str, Any] | None = None
 
     @property
-    def place(self) -> str:
+    def picture_path(self) -> str:
         """Where it is kept, below the recordings of the home."""
         return f"{self.index.facts.sha256}/{self.number}.png"
 
@@ -217,7 +217,7 @@ def _find_linked_views(
                 "blended": frame in same.blended,
             }
             view = _ShownFrame(replay, index, frame, tracked.get(frame), told)
-            if all(view.place != other.place for other in found.of[number]):
+            if all(view.picture_path != other.picture_path for other in found.of[number]):
                 found.of[number].append(view)
     return found
 
@@ -272,13 +272,15 @@ def _strip_edits_from_view(stored: StoredGroup, view: View, live: _ShownFrame) -
 
 def _store_frame_images(settings: Settings, views: Sequence[_ShownFrame]) -> None:
     """Keep frames, each recording read once and forwards."""
-    by_place = {view.place: view for view in views}
-    missing = [one for one in by_place.values() if not (settings.recordings / one.place).is_file()]
+    by_place = {view.picture_path: view for view in views}
+    missing = [
+        one for one in by_place.values() if not (settings.recordings / one.picture_path).is_file()
+    ]
     for number in {one.recording.id for one in missing}:
         mine = {one.number: one for one in missing if one.recording.id == number}
         any_one = next(iter(mine.values()))
         for at, image in read_frames(any_one.recording.path, any_one.index, sorted(mine)):
-            _store_frame_png(settings.recordings / mine[at].place, image)
+            _store_frame_png(settings.recordings / mine[at].picture_path, image)
 
 
 def _build_view(settings: Settings, shown: _ShownFrame, name: str, key: str) -> View:
@@ -293,7 +295,7 @@ def _build_view(settings: Settings, shown: _ShownFrame, name: str, key: str) -> 
         station = station.with_given_camera(frame.camera, frame.covariance)
         # Another camera may be given later: this is what was given now.
         told["camera_when_taken"] = _describe_tracked_camera(frame)
-    media = Media(str(settings.recordings / shown.place))
+    media = Media(str(settings.recordings / shown.picture_path))
     return View(name, station, media=media, extras=Extras(metadata={"recording": told}))
 
 

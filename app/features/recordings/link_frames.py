@@ -52,7 +52,7 @@ def find_linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
     nearest: list[int | None] = [None] * len(live)
     off: list[float | None] = [None] * len(live)
     if link.map.is_usable:
-        replay = link.map.live(read_shot_times(settings, row.replay_sha256, link.replay))
+        replay = link.map.to_live_times(read_shot_times(settings, row.replay_sha256, link.replay))
         half = compute_frame_interval(live) / 2
         frames, later = find_nearest_frames(live, replay, np.logical_or(*marks), half)
         for at in np.flatnonzero(frames >= 0):

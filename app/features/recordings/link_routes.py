@@ -158,7 +158,7 @@ def put_instants(
             store,
             recording,
             link,
-            wanted.pairs(),
+            wanted.to_frame_pairs(),
             wanted.assumed_speed,
             if_match,
             actor=actor,

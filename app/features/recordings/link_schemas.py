@@ -78,7 +78,7 @@ class InstantsEdit(BaseModel):
         description="Speed of the replay while one instant is linked; null: that of the live shot.",
     )
 
-    def pairs(self) -> list[tuple[int, int]]:
+    def to_frame_pairs(self) -> list[tuple[int, int]]:
         """The frames of each."""
         return [(one.live, one.replay) for one in self.instants]
 

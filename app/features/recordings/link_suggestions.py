@@ -103,7 +103,7 @@ def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[Live
         store, mine.recording, half, LIKENED - len(candidates)
     )
     paths = _ViewPathCache(store)
-    path = paths.of(mine.recording, replay)
+    path = paths.find_longest_path(mine.recording, replay)
     known = {
         (one.live.recording, one.live.first): one.id
         for one in list_links(store, recording_id)
@@ -113,7 +113,7 @@ def suggest_live_shots(store: Store, recording_id: int, frame: int) -> list[Live
     for number, one in enumerate(candidates):
         like = None
         if path is not None and number < LIKENED:
-            live = paths.of(one.recording, one.shot)
+            live = paths.find_longest_path(one.recording, one.shot)
             like = None if live is None else compare_paths(live, path)
         short = one.seconds < SLOWEST * (end - start)
         rank = _compute_rank_key(like)
@@ -189,7 +189,7 @@ class _ViewPathCache:
         self._store = store
         self._stretches: dict[int, list[ShotCameras]] = {}
 
-    def of(self, recording: Recording, shot: Shot) -> ViewPath | None:
+    def find_longest_path(self, recording: Recording, shot: Shot) -> ViewPath | None:
         """The path of the stretch with the most frames of a shot; None where none is tracked."""
         if recording.id not in self._stretches:
             self._stretches[recording.id] = list_shot_cameras(self._store, recording.id)

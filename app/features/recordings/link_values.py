@@ -124,13 +124,13 @@ class LinkTimeMap:
         """Whether it says a live time for each time of the replay."""
         return self.outcome in ("offset", "linked")
 
-    def live(self, times: FloatArray) -> FloatArray:
+    def to_live_times(self, times: FloatArray) -> FloatArray:
         """Live times of times of the replay, seconds after the first frames, shape (N,)."""
         pieces = tuple(
             TimeMap(None, one.offset_s, one.speed, first=one.first_s, last=one.last_s)
             for one in self.pieces
         )
-        return TimeMap(None, self.offset_s, self.speed, pieces=pieces).live(times)
+        return TimeMap(None, self.offset_s, self.speed, pieces=pieces).to_live_times(times)
 
 
 @dataclass(frozen=True)

@@ -337,6 +337,6 @@ def compute_link_residuals(
     if not made.is_usable:
         return [None] * len(given)
     residuals: list[float | None] = (
-        (made.live(given[:, 1]) - given[:, 0]) / compute_frame_interval(live)
+        (made.to_live_times(given[:, 1]) - given[:, 0]) / compute_frame_interval(live)
     ).tolist()
     return residuals

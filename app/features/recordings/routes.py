@@ -105,7 +105,7 @@ def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> 
         services.store,
         services.settings,
         wanted.dataset,
-        wanted.source.values(),
+        wanted.source.to_place_by_kind(),
         actor=actor,
     )
 
@@ -135,7 +135,7 @@ def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: A
 
     Groups that are taken afterwards have `match_half` and `match_seconds` in `metadata.recording`.
     """
-    return set_clock_readings(store, recording, wanted.values(), actor=actor)
+    return set_clock_readings(store, recording, wanted.to_clock_readings(), actor=actor)
 
 
 @router.delete(
@@ -174,7 +174,7 @@ async def get_frame(
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
-    task = services.recordings.ask(found, frame, wide)
+    task = services.recordings.request_frame(found, frame, wide)
     data = await task.result_unless_client_gone(request.is_disconnected)
     if data is None:
         return Response(status_code=CLIENT_GONE)
@@ -231,7 +231,7 @@ def set_shots(
 ) -> RecordingShots:
     """Replace the list of shots: split, merged, of another kind, kept or dropped."""
     with add_current_state_to_conflicts(lambda: ShotList.of(get_shots(store, recording))):
-        return replace_shots(store, recording, wanted.values(), if_match, actor=actor)
+        return replace_shots(store, recording, wanted.to_shots(), if_match, actor=actor)
 
 
 @router.post(

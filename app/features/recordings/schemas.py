@@ -92,7 +92,7 @@ class RecordingChange(BaseModel):
         description="All readings of the clock of the match."
     )
 
-    def values(self) -> list[MatchClockReading]:
+    def to_clock_readings(self) -> list[MatchClockReading]:
         """The readings."""
         return [MatchClockReading(**clock.model_dump()) for clock in self.clocks]
 
@@ -123,7 +123,7 @@ class ShotsEdit(BaseModel):
 
     shots: Annotated[list[ShotEdit], Field(max_length=MAX_SHOTS)] = Field(description="The shots.")
 
-    def values(self) -> list[Shot]:
+    def to_shots(self) -> list[Shot]:
         """The shots."""
         return [Shot(**shot.model_dump()) for shot in self.shots]
 

@@ -84,7 +84,7 @@ class TrackSource:
     facts: list[dict[str, Any]] = field(default_factory=list)
     followed: Mapping[str, Sequence[FollowedObservation]] = field(default_factory=dict)
 
-    def records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
+    def make_track_records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
         """The tracks of groups, in the order of their keys.
 
         Raises:

@@ -140,7 +140,7 @@ def get_track_around(
 
     What an edit makes of the ball is known at once; the track is stale until it is made again.
     """
-    return TrackExcerptDocument.around(compute_track_excerpt(store, track, frame))
+    return TrackExcerptDocument.of_excerpt(compute_track_excerpt(store, track, frame))
 
 
 @router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
@@ -171,4 +171,4 @@ def change_track(
     with add_current_state_to_conflicts(
         lambda: TrackDocument.model_validate(tracks.get_track(store, track))
     ):
-        return tracks.review_track(store, track, edit.change(), if_match, actor=actor)
+        return tracks.review_track(store, track, edit.to_track_review(), if_match, actor=actor)

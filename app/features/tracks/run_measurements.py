@@ -191,7 +191,7 @@ def _iterate_observations(
             read_frame_times(settings, run.link_row.live_sha256),
         )
         _, replay = read_link_times(settings, run.link_row)
-        live = seconds[link.live.first] + link.map.live(replay)
+        live = seconds[link.live.first] + link.map.to_live_times(replay)
         unsound = find_repeated_or_blended_frames(settings, row.video, link.replay)
         times = {
             number: float(live[number - link.replay.first])

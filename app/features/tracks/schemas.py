@@ -241,7 +241,7 @@ class TrackExcerptDocument(TrackFrames):
     reason: str | None = Field(description="Why no track comes of them; null: one does.")
 
     @staticmethod
-    def around(found: TrackExcerpt) -> TrackExcerptDocument:
+    def of_excerpt(found: TrackExcerpt) -> TrackExcerptDocument:
         """The document of what was tracked around a frame."""
         frames = TrackFrames.of(found, found.frame - AROUND, found.frame + AROUND)
         return TrackExcerptDocument(**vars(frames), reason=found.ball.reason)
@@ -273,7 +273,7 @@ class TrackEdit(BaseModel):
         Field(default=None, description="All events that are added and removed; it is judged anew.")
     )
 
-    def change(self) -> TrackReview:
+    def to_track_review(self) -> TrackReview:
         """The change."""
         found = self.corrections
         corrections = (

@@ -268,7 +268,9 @@ def _measure_group(
         )
         for item in collect_clicked_balls(views, calibrations)
     ]
-    return _GroupMeasurements(instant, group.pitch, observations, record.point, cameras, unused)
+    return _GroupMeasurements(
+        instant, group.pitch, observations, record.ball_point, cameras, unused
+    )
 
 
 def _get_recording_metadata(view: View) -> Mapping[str, Any]:

@@ -188,12 +188,14 @@ def give_verdicts(
         chunk = places[start : start + CHUNK]
         with store.write() as session:
             rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
-            run.save(session, select_groups_for_verdict(session, dataset_id, rows, verdict).change)
+            run.save_chunk(
+                session, select_groups_for_verdict(session, dataset_id, rows, verdict).change
+            )
             if start + CHUNK < len(places):
                 here, end = chunk[-1][0], places[-1][0]
                 run.save_remaining(session, {"after": here, "until": end, "refused": counts})
             else:
-                run.close(session)
+                run.log_completion(session)
                 report = BatchReport(run.batch, run.changed, refused)
                 session.respond(report)
     return report
@@ -347,7 +349,7 @@ class BatchRun:
         self._left = {"batch": self.batch, **left}
         save_progress(session, self._left)
 
-    def save(self, session: Session, rows: Sequence[Any]) -> None:
+    def save_chunk(self, session: Session, rows: Sequence[Any]) -> None:
         """Save the verdicts of one chunk with its log entries, in one transaction.
 
         Raises:
@@ -364,7 +366,7 @@ class BatchRun:
         spans = [] if given is None else given.spans
         self._save_batch(session, at, append_span(spans, [item.id for item in verdicts]))
 
-    def close(self, session: Session) -> None:
+    def log_completion(self, session: Session) -> None:
         """Say in the log that the batch is complete."""
         if self.batch is None:
             return

@@ -207,7 +207,7 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
             ids = _list_unchanged_groups(session, batch.spans, first, last)
             rows = read_columns(session, ids, (), ASKED)
             found = select_groups_for_verdict(session, batch.dataset_id, rows, verdict)
-            run.save(session, found.change)
+            run.save_chunk(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
                 update_batch(session, batch_id, redone=run.batch)
@@ -215,7 +215,7 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
                 left = [list(span) for span in spans[number:]]
                 run.save_remaining(session, {"left": left, "refused": dict(refused)})
             else:
-                run.close(session)
+                run.log_completion(session)
                 report = _redo_report(batch, run, refused)
                 session.respond(report)
     return report

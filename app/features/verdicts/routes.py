@@ -128,12 +128,12 @@ class BulkResult(Document):
     refused: list[RefusedGroups]
 
     @staticmethod
-    def planned(plan: BulkPlan) -> BulkResult:
+    def of_plan(plan: BulkPlan) -> BulkResult:
         """The document of a dry run."""
         return BulkResult(dry_run=True, batch=None, changed=0, **vars(plan))
 
     @staticmethod
-    def done(report: BatchReport) -> BulkResult:
+    def of_report(report: BatchReport) -> BulkResult:
         """The document of what was done."""
         return BulkResult(
             dry_run=False, matches=None, would_change=None, sample=None, **vars(report)
@@ -227,7 +227,7 @@ def put_dismissal(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET)
-@respond_with(make_document_responder(BulkResult.done))
+@respond_with(make_document_responder(BulkResult.of_report))
 def post_verdicts(
     dataset: DatasetPath,
     verdict: BulkVerdict,
@@ -244,7 +244,7 @@ def post_verdicts(
     found = dataset_id(store, dataset)
     values = (verdict.q, verdict.state, verdict.reason, verdict.note)
     if dry_run:
-        return make_document_response(BulkResult.planned(bulk.plan_verdicts(store, found, *values)))
+        return make_document_response(BulkResult.of_plan(bulk.plan_verdicts(store, found, *values)))
     return bulk.give_verdicts(store, found, *values, actor=actor, expected=verdict.expected)
 
 

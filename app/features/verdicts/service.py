@@ -68,7 +68,9 @@ def set_verdict(
         _require_picture_to_accept(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_unchanged_content(session, group_id, record.content, if_match, what)
+            require_unchanged_content(
+                session, group_id, record.content_part_of_etag, if_match, what
+            )
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
                 given = _make_verdict(session, stored, verdict, override, actor)
@@ -118,7 +120,7 @@ def _overridden_gate(solution: Solution | None, verdict: Verdict) -> str | None:
 
 def _require_usable_ball(solution: Solution | None, verdict: Verdict) -> None:
     """Refuse a bare acceptance of a group whose ball nobody can use, though it passes."""
-    found = None if solution is None else solution.unusable_ball
+    found = None if solution is None else solution.unusable_ball_finding
     if verdict.state == "accepted" and verdict.note is None and found is not None:
         raise InputError(
             f"the ball of this group cannot be used ({found.sentence.rstrip('.')}); accepting it "

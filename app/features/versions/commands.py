@@ -139,7 +139,7 @@ def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json =
         ids = [find_version(store, dataset, name).id for name in (older, newer)]
         found = diff_versions(store, *ids)
     if json_:
-        print_json(found.values())
+        print_json(found.to_values())
         return
     for line in describe_diff(found):
         say(line)
@@ -171,7 +171,7 @@ def verify(
         report = verify_and_save_report(
             store, chosen.id, executor, progress, actor=get_current_actor()
         )
-    print_values(report.values(), json_)
+    print_values(report.to_values(), json_)
     if not report.ok:
         if not json_:
             _print_first_lines([f"  {_format_difference(item)}" for item in report.differences])
@@ -182,7 +182,7 @@ def verify(
 def version_to_values(version: Version) -> dict[str, Any]:
     """A version as plain values."""
     policy = {"policy": version.policy.name, "policy_hash": version.policy.hash}
-    own = {"counts": dict(version.counts), "split": version.split.values()}
+    own = {"counts": dict(version.counts), "split": version.split.to_plain_values()}
     values = {**vars(version), **own, **policy}
     return {name: values[name] for name in VERSION}
 

@@ -70,7 +70,7 @@ class VersionDiff:
     settings: tuple[ChangedSetting, ...]
     unchanged: int
 
-    def values(self, most: int | None = None) -> dict[str, Any]:
+    def to_values(self, most: int | None = None) -> dict[str, Any]:
         """Everything as plain values; each list with at most so many, all are counted."""
         lists = {
             name: [asdict(item) for item in getattr(self, name)[:most]]
@@ -237,7 +237,9 @@ def _iterate_changed_settings(older: Version, newer: Version) -> Iterable[Change
     ]
     pairs.append(({"solver": older.solver_version}, {"solver": newer.solver_version}))
     pairs.append(({"groups": older.groups}, {"groups": newer.groups}))
-    pairs.append(({"split": older.split.values()}, {"split": newer.split.values()}))
+    pairs.append(
+        ({"split": older.split.to_plain_values()}, {"split": newer.split.to_plain_values()})
+    )
     for before, after in pairs:
         for name in sorted({*before, *after}):
             if before.get(name) != after.get(name):

@@ -175,9 +175,9 @@ def freeze_dataset(
         require_solved(candidates, found.name)
         _require_any_member(found, candidates, request.groups)
         run = _FreezeRun(store, session, found, request, candidates, progress)
-        rows = run.rows()
+        rows = run.freeze_groups()
         run.freeze_tracks()
-    values = run.values(rows, actor)
+    values = run.make_version_columns(rows, actor)
     with store.write() as session:
         _require_unused_name(session, found, request.name)
         name = request.name or find_next_version_name(session, found.id)
@@ -204,7 +204,7 @@ class _FreezeRun:
         self._cameras: set[str] = set()
         self._tracks: dict[str, str] = {}
 
-    def rows(self) -> list[dict[str, Any]]:
+    def freeze_groups(self) -> list[dict[str, Any]]:
         """The rows of all groups, in their order; content is frozen on the way."""
         rows: list[dict[str, Any]] = []
         for start in range(0, len(self._candidates), BATCH):
@@ -227,7 +227,7 @@ class _FreezeRun:
         self._tracks = {key: TRACK + digest_content(text.encode()) for key, text in texts.items()}
         self._store_new_content({self._tracks[key]: text for key, text in texts.items()}, {}, set())
 
-    def values(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
+    def make_version_columns(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
         """Columns of the version itself."""
         request, dataset = self._request, self._dataset
         return {
@@ -243,7 +243,7 @@ class _FreezeRun:
             "policy_hash": dataset.policy.hash,
             "solver_version": SOLVER_VERSION,
             "software_version": read_software_version(),
-            "split": canonical_json_text(request.split.values()),
+            "split": canonical_json_text(request.split.to_plain_values()),
             "counts": canonical_json_text(self._make_counts(rows)),
         }
 
@@ -279,7 +279,7 @@ class _FreezeRun:
         self, group: Group, annotations: str, solution: str, solved: Json
     ) -> dict[str, Any]:
         views = [view.key for view in group.views]
-        splits = self._splitter.views(views)
+        splits = self._splitter.splits_by_view(views)
         split = self._splitter.split_of_group(group.match, group.split, views)
         self._cameras.update(views)
         for view in solved["views"]:
@@ -347,7 +347,7 @@ class _FreezeRun:
             "groups": len(members),
             "views": sum(self._views.values()),
             "balls": sum(self._balls.values()),
-            "overrides": sum(bool(item.overrides) for item in self._candidates),
+            "overrides": sum(bool(item.overrides_failed_gate) for item in self._candidates),
             "splits": splits,
             "left_out": _count_reasons(self._candidates),
             **({"tracks": len(self._tracks)} if self._tracks else {}),
@@ -386,7 +386,7 @@ def _finding_from_json(value: Json) -> Finding:
 
 def _select_dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
     """What of a group's findings was dismissed, without people and times."""
-    pairs = zip(findings, dismissals.of(findings), strict=True)
+    pairs = zip(findings, dismissals.find_dismissals(findings), strict=True)
     return [
         {
             "kind": finding.kind,

@@ -47,7 +47,7 @@ class FrozenAnnotations:
 def freeze_annotations(group: Group) -> FrozenAnnotations:
     """A group as canonical JSON without media; a shared station is a text of its own, and so is what
     was read of a picture's paint."""
-    texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
+    texts = {PAINT + reading.digest: reading.canonical_json for reading in group.paint.values()}
     views = []
     for view in group.views:
         station = _station_to_json_without_mirroring(view.station)

@@ -40,7 +40,7 @@ def request_freeze(
         partial(run_freeze_job, store),
         dataset_id=found.id,
         actor=actor,
-        request={**vars(request), "split": request.split.values()},
+        request={**vars(request), "split": request.split.to_plain_values()},
     )
 
 
@@ -128,7 +128,7 @@ def _freeze_in_worker(
 
 def _verify_in_worker(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:
     report = verify_and_save_report(store, version_id, progress=progress, actor=actor)
-    return {"version_id": version_id, **report.values()}
+    return {"version_id": version_id, **report.to_values()}
 
 
 def _request_from_job(job: Job) -> FreezeRequest:

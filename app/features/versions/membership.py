@@ -51,7 +51,7 @@ class Candidate:
     unsolved: bool
 
     @property
-    def overrides(self) -> bool:
+    def overrides_failed_gate(self) -> bool:
         """Whether the group enters although a gate fails."""
         return self.why is None and self.verdict is not None and bool(self.verdict["override"])
 
@@ -161,7 +161,7 @@ def describe_version_settings(version: Version) -> dict[str, Json]:
     return {
         **describe_policy_settings(version.policy, version.solver_version),
         "groups": version.groups,
-        "split": version.split.values(),
+        "split": version.split.to_plain_values(),
     }
 
 

@@ -76,7 +76,7 @@ class SplitChoice(BaseModel):
     ] = 0.2
     test_cameras: Annotated[list[Camera], Field(min_length=1, max_length=100)] = list(TEST_CAMERAS)
 
-    def value(self) -> Split:
+    def to_split(self) -> Split:
         """The split that this asks for."""
         return Split(self.kind, self.seed, self.test_share, tuple(self.test_cameras))
 
@@ -105,9 +105,9 @@ class VersionRequest(BaseModel):
     )
     dry_run: StrictBool = Field(default=False, description="Count, and freeze nothing.")
 
-    def value(self) -> FreezeRequest:
+    def to_freeze_request(self) -> FreezeRequest:
         """The request as the review floor takes it."""
-        return FreezeRequest(self.name, self.note, self.licence, self.split.value(), self.groups)
+        return FreezeRequest(self.name, self.note, self.licence, self.split.to_split(), self.groups)
 
 
 class VerificationDocument(Document):
@@ -142,7 +142,7 @@ class VerificationDocument(Document):
 
 
 def _split_to_dict(split: Any) -> Any:
-    return split.values() if isinstance(split, Split) else split
+    return split.to_plain_values() if isinstance(split, Split) else split
 
 
 class VersionDocument(Document):
@@ -294,10 +294,10 @@ def freeze_version(
     The job's result names the version.
     """
     if dry_run or request.dry_run:
-        plan = plan_freeze(services.store, dataset, request.value())
+        plan = plan_freeze(services.store, dataset, request.to_freeze_request())
         return make_document_response(plan)
     return version_jobs.request_freeze(
-        services.jobs, services.store, dataset, request.value(), actor=actor
+        services.jobs, services.store, dataset, request.to_freeze_request(), actor=actor
     )
 
 
@@ -347,7 +347,7 @@ def get_diff(
     older = versions.find_version_id(
         store, against, str(versions.get_version(store, version).dataset_id)
     )
-    return VersionDiffDocument.model_validate(diff_versions(store, older, version).values(limit))
+    return VersionDiffDocument.model_validate(diff_versions(store, older, version).to_values(limit))
 
 
 @router.post(

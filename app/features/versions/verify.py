@@ -100,7 +100,7 @@ class VerifyReport:
         """Whether everything came out as it was frozen."""
         return not self.different and self.equal == self.groups
 
-    def values(self) -> dict[str, Any]:
+    def to_values(self) -> dict[str, Any]:
         """Everything as plain values."""
         values = {name: value for name, value in vars(self).items() if name != "differences"}
         found = [asdict(item) for item in self.differences]
@@ -222,7 +222,7 @@ def verify_and_save_report(
         problem = error.message if isinstance(error, ReviewError) else UNEXPECTED
         save_verify_failure(store, version_id, problem, actor=actor)
         raise
-    save_verification(store, version_id, actor=actor, report=report.values())
+    save_verification(store, version_id, actor=actor, report=report.to_values())
     return report
 
 
@@ -401,7 +401,7 @@ def _find_split_differences(
     split = splitter.split_of_group(group.match, group.split, views)
     for place, frozen, now in (
         ("split", row.split, split),
-        ("splits", row.splits, splitter.views(views)),
+        ("splits", row.splits, splitter.splits_by_view(views)),
     ):
         if frozen != now:
             yield VersionDifference(row.key, place, frozen, now)

@@ -139,9 +139,9 @@ def _make_yield(
 ) -> Yield:
     return Yield(
         policy=policy,
-        groups=snapshot.solved + snapshot.unsolved,
+        groups=snapshot.solved_count + snapshot.unsolved_count,
         passing=total.passing,
-        unsolved=snapshot.unsolved,
+        unsolved=snapshot.unsolved_count,
         funnel=_funnel_steps(snapshot, total.dropped, policy),
         given_not_measured=total.unmeasured,
         curves=tuple(
@@ -154,7 +154,7 @@ def _make_yield(
             YieldPart(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
-        leakage=find_split_leaks(snapshot.places),
+        leakage=find_split_leaks(snapshot.counts_by_match_and_split),
         gained=total.gained,
         lost=total.lost,
         needs_solving=unanswered,
@@ -171,9 +171,9 @@ def _funnel_steps(
         "sigma": policy.max_sigma_m is None,
         "chi_square": policy.min_p_value is None,
     }
-    left, steps = snapshot.solved, []
-    if snapshot.unsolved:
-        steps.append(FunnelStep(UNSOLVED, left, snapshot.unsolved))
+    left, steps = snapshot.solved_count, []
+    if snapshot.unsolved_count:
+        steps.append(FunnelStep(UNSOLVED, left, snapshot.unsolved_count))
     for place, gate in enumerate(GATES):
         if not inactive.get(gate, False):
             left -= int(dropped[place])
@@ -183,7 +183,7 @@ def _funnel_steps(
 
 def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
     everyone: Counter[str] = Counter()
-    for (_, split), groups in snapshot.places.items():
+    for (_, split), groups in snapshot.counts_by_match_and_split.items():
         everyone[split] += groups
     return tuple(
         YieldPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
@@ -193,7 +193,7 @@ def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldP
 def _yield_by_distance(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
-    groups[-1] += snapshot.unsolved
+    groups[-1] += snapshot.unsolved_count
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
         YieldPart("", groups[bin_], passing[bin_], low, ends[bin_])

@@ -44,7 +44,10 @@ router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"], route_cla
 def _optional_thresholds_model(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
     fields: dict[str, Any] = {
-        item.name: (_threshold_type(item) | None, Field(default=None, description=item.text))
+        item.name: (
+            _threshold_type(item) | None,
+            Field(default=None, description=item.label_with_unit),
+        )
         for item in list_thresholds(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
@@ -52,7 +55,7 @@ def _optional_thresholds_model(part: type[Policy | CalibrationPolicy]) -> Any:
 
 def _threshold_type(item: Threshold) -> Any:
     """The type of a threshold, and between which ends it lies."""
-    if item.is_word or item.minimum is None:
+    if item.has_word_choices or item.minimum is None:
         return item.hint
     return Annotated[float, Field(ge=item.minimum, le=item.maximum)]
 
@@ -74,7 +77,7 @@ class WhatIf(_optional_thresholds_model(Policy)):  # type: ignore[misc]
 
     calibration: CalibrationThresholds | None = None
 
-    def values(self) -> dict[str, Any]:
+    def to_policy_values(self) -> dict[str, Any]:
         """The fields of a policy that shall differ."""
         sent = self.model_dump(exclude_unset=True)
         calibration = sent.pop("calibration", None) or {}

@@ -62,13 +62,20 @@ class TableBlock:
     def present_counts(self) -> GroupCounts:
         """What is counted of its groups under the present policy."""
         judgement = self.judged.judgement
-        return count_table_groups(self.table, self.live, self.judged.policy, judgement, judgement)
+        return count_table_groups(
+            self.table, self.live_rows, self.judged.policy, judgement, judgement
+        )
 
     def count_under_policy(self, policy: Policy) -> GroupCounts:
         """What is counted of them under another one."""
         judgement = self.judged.judge_with_policy(policy)
         return count_table_groups(
-            self.table, self.live, policy, self.judged.judgement, judgement, self.present_counts
+            self.table,
+            self.live_rows,
+            policy,
+            self.judged.judgement,
+            judgement,
+            self.present_counts,
         )
 
     @property
@@ -77,14 +84,14 @@ class TableBlock:
         return self.block.table
 
     @property
-    def live(self) -> BoolArray | slice:
+    def live_rows(self) -> BoolArray | slice:
         """Chooses the rows of those that count."""
         return slice(None) if self.block.live is None else self.block.live
 
     @cached_property
-    def places(self) -> Counter[tuple[str, str]]:
+    def counts_by_match_and_split(self) -> Counter[tuple[str, str]]:
         """How many groups that count lie in each match and split."""
-        return self.table.count_places(self.block.live)
+        return self.table.count_groups_by_match_and_split(self.block.live)
 
 
 @dataclass(frozen=True)
@@ -102,12 +109,12 @@ class TableSnapshot:
     bare: YieldTable
 
     @cached_property
-    def solved(self) -> int:
+    def solved_count(self) -> int:
         """How many groups are solved."""
         return sum(part.block.groups for part in self.blocks)
 
     @property
-    def unsolved(self) -> int:
+    def unsolved_count(self) -> int:
         """How many are not."""
         return self.bare.groups
 
@@ -123,11 +130,11 @@ class TableSnapshot:
         return loose + sum(part.judged.nbytes for part in self.blocks) + self.bare.nbytes
 
     @cached_property
-    def places(self) -> Counter[tuple[str, str]]:
+    def counts_by_match_and_split(self) -> Counter[tuple[str, str]]:
         """How many groups lie in each match and split, solved or not."""
-        total = self.bare.count_places()
+        total = self.bare.count_groups_by_match_and_split()
         for part in self.blocks:
-            total.update(part.places)
+            total.update(part.counts_by_match_and_split)
         return total
 
 

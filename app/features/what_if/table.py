@@ -123,7 +123,9 @@ class YieldTable:
         heads = {name: getattr(self, name)[kept] for name in HEADS}
         return YieldTable(**heads, splits=self.splits, matches=self.matches, facts=facts)
 
-    def count_places(self, kept: BoolArray | None = None) -> Counter[tuple[str, str]]:
+    def count_groups_by_match_and_split(
+        self, kept: BoolArray | None = None
+    ) -> Counter[tuple[str, str]]:
         """How many of the groups lie in each match and split."""
         chosen = slice(None) if kept is None else kept
         code = self.match[chosen] * max(len(self.splits), 1) + self.split[chosen]

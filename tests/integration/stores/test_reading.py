@@ -123,7 +123,7 @@ class TestReading:
         assert is_cached(media, settings)
         assert len(frame) < proxy.sent < len(frame) + 3 * 128 * 1024
         # Its list is known here; no range of another zip is taken for one of it.
-        sealed = Media(find_path(settings, "s3://frames/big.zip").make_sealed_address(), "1.bin")
+        sealed = Media(find_path(settings, "s3://frames/big.zip").make_pinned_address(), "1.bin")
         with contextlib.suppress(ReviewError):
             read_encoded_frame(replace(sealed, member="2.bin"), None, False, settings)
         store.put("big.zip", bytes(len(frame) * 5 + 1000))
@@ -290,7 +290,7 @@ def picture_object(settings: Settings, tree: Path) -> Media:
     with zipfile.ZipFile(archive) as frames:
         data = frames.read(frames.namelist()[0])
     open_store(settings, "frames").put("loose/7.png", data)
-    return Media(find_path(settings, "s3://frames/loose/7.png").make_sealed_address())
+    return Media(find_path(settings, "s3://frames/loose/7.png").make_pinned_address())
 
 
 class TestDoctor:

@@ -87,10 +87,10 @@ class TestCompareBalls3D:
         far = compare_balls_3d(ball_at(0, 0.01), ball_at(0.6, 0.01))
         # d^2 / (s1^2 + s2^2) is 2 and 18; 5 % of chi-square with three degrees lie above 7.81.
         assert near.p_value == pytest.approx(0.5724, abs=1e-4)
-        assert (near.is_explained, far.is_explained) == (True, False)
+        assert (near.is_within_uncertainty, far.is_within_uncertainty) == (True, False)
 
     def test_without_a_covariance_nobody_knows(self) -> None:
-        assert compare_balls_3d(ball_at(0, 0.0), ball_at(1, 0.0)).is_explained is None
+        assert compare_balls_3d(ball_at(0, 0.0), ball_at(1, 0.0)).is_within_uncertainty is None
 
 
 class TestCompareAnnotations:
@@ -112,7 +112,7 @@ class TestCompareAnnotations:
         assert found.views[0].ball.center_px == pytest.approx(40)
         said = find_disagreements(found, ("accepted", "rejected"), AgreementLimits())
         assert {item.kind for item in said} >= {"verdict", "ball_px"}
-        assert said[0].weight == max(item.weight for item in said)
+        assert said[0].severity == max(item.severity for item in said)
         assert said[0].view == view.key
 
     def test_the_camera_of_one_is_held_against_the_lines_of_the_other(self, group: Group) -> None:

@@ -278,7 +278,7 @@ class TestOrder:
         view = replace(line(50.0), ball=BallDistance("seen", "seen", 9.0), jac=(0.1, None))
         found = told(view, verdicts=("accepted", "rejected"))
         assert [one.kind for one in found] == ["line_px", "jac", "ball_px", "verdict"]
-        assert [one.weight for one in found] == pytest.approx([10.0, 7.0, 3.0, 2.0])
+        assert [one.severity for one in found] == pytest.approx([10.0, 7.0, 3.0, 2.0])
 
 
 class TestSpreads:

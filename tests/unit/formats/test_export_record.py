@@ -35,7 +35,7 @@ class TestExportRecord:
         self, soccer_group: Callable[..., Group], solved: Solved
     ) -> None:
         record = solved(soccer_group(replays=3))
-        assert [record.is_calibrated(view) for view in record.group.views] == [
+        assert [record.passes_camera_gates(view) for view in record.group.views] == [
             True, True, False, False,
         ]  # fmt: skip
         assert record.camera(record.group.views[2]) is not None
@@ -47,7 +47,7 @@ class TestExportRecord:
         view = record.group.views[0]
         assert record.camera(view) is None
         assert record.ball_fit(view, everything=True) is None
-        assert record.point is None
+        assert record.ball_point is None
 
     def test_a_reason_stands_beside_the_verdict(self, soccer_group: Callable[..., Group]) -> None:
         record = ExportRecord(soccer_group(), None, "rejected", "bad_field_lines")

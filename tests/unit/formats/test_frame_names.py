@@ -84,7 +84,11 @@ def view(soccer_group: Make) -> View:
 
 
 def called(names: ExportKeyAssigner, *groups: Group) -> list[str]:
-    return [names.of(group, {}).get(view.key, view.key) for group in groups for view in group.views]
+    return [
+        names.assign_keys(group, {}).get(view.key, view.key)
+        for group in groups
+        for view in group.views
+    ]
 
 
 def groups_of(view: View, *keys: tuple[str, str]) -> list[Group]:
@@ -120,11 +124,11 @@ class TestExportNames:
     def test_a_view_without_a_free_name_is_refused_by_its_names(self, view: View) -> None:
         names = ExportKeyAssigner(lambda group, view, split: {"always": (group.key, view.key)})
         first, second = groups_of(view, ("a", "north"), ("b", "north"))
-        assert names.of(first, {}) == {}
+        assert names.assign_keys(first, {}) == {}
         with pytest.raises(
             InputError, match="view north of group b and another view would have the same name"
         ):
-            names.of(second, {})
+            names.assign_keys(second, {})
 
 
 class TestFolded:

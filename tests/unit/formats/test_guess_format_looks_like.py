@@ -45,11 +45,11 @@ class TestLooksLike:
     ) -> None:
         look = guess_other_format(write(tmp_path, files), "none of them")
         assert look is not None
-        assert look.sentence.startswith("It looks like ")
-        assert name in look.sentence
+        assert look.advice_sentence.startswith("It looks like ")
+        assert name in look.advice_sentence
         formats = {"coco", "gamestate", "issia", "issia-3d", "cameras", "parquet"}
         if name in formats | {"sn-calibration", "soccernet-v3"}:
-            assert (look.format, "choose that format" in look.sentence) == (name, True)
+            assert (look.format, "choose that format" in look.advice_sentence) == (name, True)
         else:
             assert look.format is None
 

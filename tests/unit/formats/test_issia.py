@@ -115,7 +115,7 @@ def issia_folder(root: Path) -> Path:
 def people(folder: IssiaFolder) -> list[float]:
     (group,) = folder.groups()
     (view,) = [view for view in group.views if view.key == "cam2"]
-    (unassigned,) = [item for item in folder.persons() if item.camera == "cam2"]
+    (unassigned,) = [item for item in folder.persons_without_ball() if item.camera == "cam2"]
     return [box["points"]["x1"] for box in (*view.extras.boxes, *unassigned.boxes)]
 
 
@@ -132,7 +132,7 @@ class TestReading:
     def test_what_is_written_again_is_not_turned_once_more(self, tmp_path: Path):
         folder = open_issia(issia_folder(tmp_path / "issia"), IssiaOptions(), ReaderReport())
         (tmp_path / "out").mkdir()
-        write_issia(tmp_path / "out", folder.groups(), folder.persons())
+        write_issia(tmp_path / "out", folder.groups(), folder.persons_without_ball())
         for given in (True, False):
             if not given:
                 (tmp_path / "out" / "issia_calibration.json").unlink()

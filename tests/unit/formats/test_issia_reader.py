@@ -180,7 +180,7 @@ class TestGroups:
 
 class TestPersons:
     def test_people_that_no_view_holds(self, folder: Path, report: ReaderReport) -> None:
-        persons = list(open_issia(folder, IssiaOptions(), report).persons())
+        persons = list(open_issia(folder, IssiaOptions(), report).persons_without_ball())
         assert [(item.frame, item.camera, len(item.boxes)) for item in persons] == [
             (12, "cam3", 3), (11, "cam4", 1),
         ]  # fmt: skip
@@ -190,7 +190,7 @@ class TestPersons:
     ) -> None:
         found = open_issia(folder, IssiaOptions(), report)
         in_views = sum(len(view.extras.boxes) for group in found.groups() for view in group.views)
-        others = sum(len(item.boxes) for item in found.persons())
+        others = sum(len(item.boxes) for item in found.persons_without_ball())
         assert in_views + others == report.counts["persons"]
 
 

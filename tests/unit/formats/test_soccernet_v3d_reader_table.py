@@ -134,7 +134,7 @@ class TestReadSnv3dTable:
     def test_the_split_lists_come_before_the_column(self, read: Read, report: ReaderReport) -> None:
         folder = MATCH.split("/")[-1]
         table = read(HEAD + row(), test=f"{folder}/7\n{folder}/7_1\n\nnot a view\n")
-        assert table.split(MATCH, "7.png") == "test"
+        assert table.find_split_of_group(MATCH, "7.png") == "test"
         assert [item.record for item in report.problems] == ["line 4"]
 
     def test_a_view_in_both_lists_is_reported(self, read: Read, report: ReaderReport) -> None:

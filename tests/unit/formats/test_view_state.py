@@ -57,7 +57,7 @@ class TestStateReader:
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
         assert read(view_to_json(view)).read_view(view.size, Extras()) == view
         head = read(group_head_to_json(group)).read_group_head()
-        assert head.group(group.views) == group
+        assert head.make_group(group.views) == group
         assert head.views == 2
 
     @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ class TestStateReader:
 class TestExtras:
     def test_come_back_as_they_were(self) -> None:
         extras = Extras(({"class": None},), ({"points": [1]},), {"a": {"b": 1}})
-        assert extras_from_json(extras.values()) == extras
-        assert Extras().values() is None
+        assert extras_from_json(extras.to_plain_values()) == extras
+        assert Extras().to_plain_values() is None
         assert extras_from_json(None) == Extras()
 
     def test_values_that_are_no_extras_are_left_out(self) -> None:

@@ -39,8 +39,8 @@ class TestRays:
         rays = rays_of()
         kept = np.zeros(len(POINTS), bool)
         kept[[2, 7]] = True
-        some = rays.select_subset(kept)
-        assert some.points == 2
+        some = rays.select_rays_of_points(kept)
+        assert some.point_count == 2
         assert np.array_equal(some.pixels[some.point == 1], rays.pixels[rays.point == 7])
 
     def test_of_two_cameras_leaves_out_points_that_one_does_not_show(self):

@@ -252,7 +252,7 @@ def hand_in_taken_back(api: Any) -> Request:
     with store.write() as session:
         # Whoever asks a server without accounts is an annotator of this batch.
         update_person(session, find_person_by_name(session, "ann").id, name="local")
-    LeaseService(store).submit(made.id, 1, BatchMember("local"), actor="local")
+    LeaseService(store).submit_group(made.id, 1, BatchMember("local"), actor="local")
     return "DELETE", f"/batches/{made.id}/groups/1/submission", None, {}
 
 
@@ -260,5 +260,5 @@ def returned_group(api: Any) -> Request:
     store = store_of(api)
     invite(store, "ann", Role.ANNOTATOR, actor="local")
     made = make_batch(store, "broadcast", NewBatch("Once", annotators=["ann"]), actor="local")
-    LeaseService(store).submit(made.id, 1, BatchMember("ann"), actor="ann")
+    LeaseService(store).submit_group(made.id, 1, BatchMember("ann"), actor="ann")
     return "POST", f"/batches/{made.id}/groups/1/return", {"reason": "Look again."}, {}

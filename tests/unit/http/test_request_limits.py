@@ -148,12 +148,12 @@ class Service:
 
     def counts(self, request_class: RequestClass) -> tuple[int, int, int]:
         """How many are at work, wait, and were refused."""
-        (found,) = (one for one in self.limits.all if one.request_class is request_class)
+        (found,) = (one for one in self.limits.class_limiters if one.request_class is request_class)
         return found.busy, found.waiting, found.refused
 
     def is_quiet(self) -> bool:
         """Whether nobody is at work or waits."""
-        return all(one.busy == one.waiting == 0 for one in self.limits.all)
+        return all(one.busy == one.waiting == 0 for one in self.limits.class_limiters)
 
 
 def run(test: Callable[[Service], Awaitable[None]], *, team: bool = False) -> None:

@@ -74,7 +74,7 @@ class TestGoalLines:
 class TestGoalHeight:
     def test_a_goal_is_as_high_as_it_is(self) -> None:
         seen = measure_goal_height(picture(*RIGHT), CAMERA, PITCH)
-        assert seen is not None and seen.is_square
+        assert seen is not None and seen.has_expected_height
         assert seen.share == pytest.approx(1.0, abs=0.04)
 
     def test_beside_a_camera_that_foreshortens_too_much_it_looks_too_high(self) -> None:
@@ -84,7 +84,7 @@ class TestGoalHeight:
             shown = places.round().astype(np.int32)
             cv2.polylines(image, [shown], False, (220,) * 3, 3, cv2.LINE_AA)
         seen = measure_goal_height(image, CAMERA, PITCH)
-        assert seen is not None and not seen.is_square and seen.is_certain
+        assert seen is not None and not seen.has_expected_height and seen.is_certain
         assert seen.share == pytest.approx(1.4, abs=0.06)
 
     def test_a_crowd_has_no_goal(self) -> None:

@@ -147,13 +147,13 @@ class TestEnough:
         image, start = photographed(drawn(camera_of(960), names)), panned(camera_of(960), 1.0)
         found = snapped(image, start)
         assert found.reason == reason
-        assert found.points == len(found.evidence.pixels) > 100
+        assert found.point_count == len(found.evidence.pixels) > 100
         assert (found.evidence.painted_fraction < 0.2) == (reason == NO_PAINT)
 
     def test_eighty_places_in_a_corner_of_the_field_determine_a_camera(self, whole) -> None:
         x, y = np.meshgrid(np.arange(960), np.arange(540))
         found = snap_camera(whole, np.hypot(x - 720, y - 270) < 80, panned(camera_of(960), 1.0))
-        assert found.reason is None and found.points < 90
+        assert found.reason is None and found.point_count < 90
 
 
 class TestReach:

@@ -28,7 +28,7 @@ class TestPictureScale:
         assert HALF.to_annotation_point(0.0, 0.0) == (0.5, 0.5)
 
     def test_a_box_covers_the_same_part_of_the_picture(self) -> None:
-        box = HALF.box(Box(99.5, 199.5, 40.0, 20.0))
+        box = HALF.to_picture_box(Box(99.5, 199.5, 40.0, 20.0))
         assert (box.x, box.y, box.width, box.height) == (49.5, 99.5, 20.0, 10.0)
         assert HALF.to_annotation_point(box.x, box.y) == (99.5, 199.5)
 

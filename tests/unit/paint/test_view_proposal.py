@@ -52,7 +52,7 @@ def test_its_numbers_are_those_of_the_search_in_pixels_of_the_annotations() -> N
         search.agreement.supported,
         search.agreement.explained,
         search.runner_up,
-        search.snapped.points,
+        search.snapped.point_count,
     )
     assert search.snapped.error_px
     assert found.error_px == pytest.approx(2 * search.snapped.error_px)

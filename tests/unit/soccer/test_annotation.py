@@ -14,4 +14,4 @@ def test_people_lie_where_their_corners_say_and_what_has_none_is_left_out():
         {"class": "Player", "points": None},
         {"class": "Player"},
     )
-    assert Extras(boxes).places == (Box(10.5, 8.0, 20.0, 20.0),)
+    assert Extras(boxes).pixel_boxes == (Box(10.5, 8.0, 20.0, 20.0),)

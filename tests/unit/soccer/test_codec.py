@@ -115,7 +115,7 @@ class TestGroup:
         )
 
     def test_no_extras_are_nothing(self) -> None:
-        assert Extras().values() is None
+        assert Extras().to_plain_values() is None
         assert codec.extras_from_json(None) == Extras()
 
 

@@ -52,7 +52,7 @@ class TestReading:
     def test_every_digit_comes_back_and_so_does_the_digest(self):
         again = reading_from_json(reading_to_json(READING))
         assert (again, again.digest) == (READING, READING.digest)
-        again = reading_from_canonical_json(READING.text)
+        again = reading_from_canonical_json(READING.canonical_json)
         assert (again, again.digest) == (READING, READING.digest)
 
     @pytest.mark.parametrize(

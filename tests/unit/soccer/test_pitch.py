@@ -52,7 +52,7 @@ class TestConventions:
 class TestByTheLaws:
     """Outer edges make the pitch: the middle of each line lies half a line inside the plan."""
 
-    LAWS = Pitch(100.0, 64.0).with_goal("laws")
+    LAWS = Pitch(100.0, 64.0).with_goal_edge("laws")
 
     def test_every_line_moves_half_its_width_into_the_area_that_it_bounds(self):
         shapes = self.LAWS.shapes
@@ -73,7 +73,7 @@ class TestByTheLaws:
         assert post.start == pytest.approx((50.0, 3.72, -2.50))
 
     def test_nothing_else_moves_a_line(self):
-        middle = PITCH.with_goal("middle").shapes
+        middle = PITCH.with_goal_edge("middle").shapes
         assert {name for name in MARKINGS if middle[name] != PITCH.shapes[name]} == {
             name for name in MARKINGS if name.startswith("Goal")
         }

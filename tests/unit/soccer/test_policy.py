@@ -77,16 +77,16 @@ class TestHash:
     def test_the_paper_fits_the_inner_edges_of_goals_and_the_others_their_middle(self):
         goals = {name: policy.calibration.goal for name, policy in POLICIES.items()}
         assert goals == {"paper": "inner", "strict": "middle", "touchline": "middle"}
-        post = CLICKED.with_fitted_goal(Pitch(100.0, 64.0)).shapes["Goal left post left"]
+        post = CLICKED.pitch_for_fitted_lines(Pitch(100.0, 64.0)).shapes["Goal left post left"]
         assert isinstance(post, Segment) and post.start == pytest.approx((-50.0, 3.72, -2.5))
-        assert PAPER.calibration.with_fitted_goal(Pitch()) == Pitch()
+        assert PAPER.calibration.pitch_for_fitted_lines(Pitch()) == Pitch()
 
     def test_lines_by_the_laws_are_asked_for_by_no_shipped_policy(self):
         laws = replace(CLICKED, goal="laws")
-        assert laws.with_fitted_goal(Pitch()).shapes["Side line left"].start[0] == pytest.approx(
-            -52.44
-        )
-        assert CLICKED.with_fitted_goal(Pitch()).shapes["Side line left"].start[0] == -52.5
+        assert laws.pitch_for_fitted_lines(Pitch()).shapes["Side line left"].start[
+            0
+        ] == pytest.approx(-52.44)
+        assert CLICKED.pitch_for_fitted_lines(Pitch()).shapes["Side line left"].start[0] == -52.5
         keys = {replace(PAPER, calibration=one).hash for one in (CLICKED, laws, PAPER.calibration)}
         assert len(keys) == 3
 
@@ -141,7 +141,7 @@ class TestThresholds:
             value = threshold.value(policy)
             if value is None:
                 assert threshold.optional, threshold.name
-            elif threshold.is_word:
+            elif threshold.has_word_choices:
                 assert value in threshold.choices, threshold.name
             elif not isinstance(value, bool):
                 assert threshold.minimum <= value <= threshold.maximum, threshold.name

@@ -12,11 +12,15 @@ CAMERAS = ("cam1", "cam3")
 class TestSplit:
     @pytest.mark.parametrize("split", [Split(), Split("match", 7, 0.5), Split("camera")])
     def test_a_split_is_rebuilt_from_its_values(self, split: Split) -> None:
-        assert Split.of(split.values()).values() == split.values()
+        assert Split.of(split.to_plain_values()).to_plain_values() == split.to_plain_values()
 
     def test_its_values_hold_only_what_its_kind_uses(self) -> None:
-        assert Split("given", seed=3).values() == {"kind": "given"}
-        assert Split("match", seed=3).values() == {"kind": "match", "seed": 3, "test_share": 0.2}
+        assert Split("given", seed=3).to_plain_values() == {"kind": "given"}
+        assert Split("match", seed=3).to_plain_values() == {
+            "kind": "match",
+            "seed": 3,
+            "test_share": 0.2,
+        }
 
     @pytest.mark.parametrize(
         "split",
@@ -55,10 +59,10 @@ class TestSplitter:
     def test_cameras_split_views_and_a_group_of_both_sides_has_no_split(self) -> None:
         splitter = Splitter.of(Split("camera"), ["issia"])
         assert splitter.split_of_group("issia", "", CAMERAS) == ""
-        assert splitter.views(CAMERAS) == {"cam1": "test", "cam3": "train"}
+        assert splitter.splits_by_view(CAMERAS) == {"cam1": "test", "cam3": "train"}
 
     def test_a_group_of_one_side_goes_with_it(self) -> None:
         splitter = Splitter.of(Split("camera"), ["issia"])
         assert splitter.split_of_group("issia", "", ["cam1", "cam2"]) == "test"
         assert splitter.split_of_group("issia", "", ["cam3", "cam4"]) == "train"
-        assert splitter.views(["cam3", "cam4"]) is None
+        assert splitter.splits_by_view(["cam3", "cam4"]) is None

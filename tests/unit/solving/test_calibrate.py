@@ -241,7 +241,7 @@ class TestGoals:
 
     NEAR = looking((40.0, -30.0, -9.0), (50.0, 2.0, 0.0), 2200.0, bend=BEND)
     """So near that 6 cm of a goal are several pixels."""
-    LINES = click(NEAR, pitch=PITCH.with_goal("middle"))
+    LINES = click(NEAR, pitch=PITCH.with_goal_edge("middle"))
 
     def errors(self, policy):
         fits = calibrate(self.LINES, PITCH, SIZE, policy).markings
@@ -263,12 +263,12 @@ class TestGoals:
     def test_jac_is_that_of_the_evaluator_whatever_is_fitted(self, policy):
         found = calibrate(self.LINES, PITCH, SIZE, policy)
         gammas = tuple(gamma / 100 * SIZE.diagonal for gamma in (0.5, 1.0, 2.0))
-        for pitch in (PITCH, PITCH.with_goal("middle")):
+        for pitch in (PITCH, PITCH.with_goal_edge("middle")):
             assert found.jac == camera_jaccard(found.camera, self.LINES, pitch, SIZE, gammas)
 
     def test_lines_of_a_pitch_by_the_laws_are_fitted_where_the_policy_says_so(self):
         laws = replace(CLICKED, goal="laws")
-        lines = click(self.NEAR, pitch=PITCH.with_goal("laws"))
+        lines = click(self.NEAR, pitch=PITCH.with_goal_edge("laws"))
         found = calibrate(lines, PITCH, SIZE, laws)
         assert found.goal == "laws" and found.error_px < 0.05
         off = [
@@ -283,7 +283,7 @@ class TestGoals:
     def test_near_goals_do_not_fit_the_evaluator_though_they_fit_the_camera(self):
         # From here 6 cm of a goal are farther apart than the smallest gamma.
         closer = looking((45.0, -12.0, -4.0), (52.5, 0.0, -1.2), 3500.0)
-        lines = click(closer, pitch=PITCH.with_goal("middle"))
+        lines = click(closer, pitch=PITCH.with_goal_edge("middle"))
         found = calibrate_station(Station("a", SIZE, lines=lines, given=closer), PITCH, CLICKED)
         goals = [fit for fit in found.markings if fit.marking in GOAL_PARTS and fit.distances_px]
         assert "fp" in {fit.outcome for fit in goals}

@@ -110,5 +110,5 @@ class TestContradiction:
         assert chi_square is not None
         for moved_m, is_motion in ((TYPICAL_SPEED, True), (SPEEDS[1] + 1, False), (None, True)):
             found = Contradiction(chi_square, None, None, 0.3, moved_m)
-            assert found.is_motion == is_motion
-        assert not Contradiction(chi_square, None, None).is_motion
+            assert found.may_be_motion == is_motion
+        assert not Contradiction(chi_square, None, None).may_be_motion

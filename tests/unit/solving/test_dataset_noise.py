@@ -133,7 +133,7 @@ def factors(seen: Sequence[Seen], click: float = 1.2) -> SourceNoiseFactors:
 
 
 def estimated(*seen: Seen) -> dict[str, SourceNoise]:
-    return {one.source: one for one in factors(seen).of("person")}
+    return {one.source: one for one in factors(seen).noise_of_kind("person")}
 
 
 class TestEstimateSources:
@@ -221,7 +221,7 @@ class TestEstimateSources:
             by_view = (("left", 0.0, 0.0, 0.5), ("right", 0.0, 0.0, 0.5))
             of = {"left": [camera(str(a))], "right": [camera(str(b))]}
             seen.append((RayResidual(miss, 0.0, 0.0, 1.0, 0.0, by_view), of))
-        worst, *_ = estimate_source_noise(seen, 0.0, 0.0, 2.6).of("camera")
+        worst, *_ = estimate_source_noise(seen, 0.0, 0.0, 2.6).noise_of_kind("camera")
         assert worst.source == "3" and worst.low < 4.0 < worst.high
 
     def test_balls_that_nobody_placed_add_their_own(self) -> None:
@@ -247,18 +247,18 @@ class TestFactor:
     def test_both_together_are_known_where_nobody_knows_which(self) -> None:
         placed = {"a": ["ann", "cleo"], "b": ["bea"], "c": ["ann", "cleo"]}
         found = factors(filmed(2, placed, {"b": 3.0}), 1.0)
-        (bea, *_), (b, *_) = found.of("person"), found.of("camera")
+        (bea, *_), (b, *_) = found.noise_of_kind("person"), found.noise_of_kind("camera")
         assert (bea.source, b.source) == ("bea", "b")
         assert max(bea.ratio, b.ratio) < 2.2
         assert found.noise_factor([camera("b"), person("bea")]) == pytest.approx(3.0, rel=0.2)
 
     def test_who_may_be_like_the_dataset_and_who_is_unknown_counts_as_it(self) -> None:
         found = factors(drawn(0, dict.fromkeys(TRUE, 1.2)))
-        names = [one.source for one in found.of("person") if not one.differs]
+        names = [one.source for one in found.noise_of_kind("person") if not one.differs]
         assert names and {found.noise_factor([person(name)]) for name in (*names, "eve")} == {1.0}
 
     def test_it_is_used_where_the_interval_leaves_out_the_dataset(self) -> None:
         found = factors(drawn(0))
-        for one in found.of("person"):
+        for one in found.noise_of_kind("person"):
             used = found.noise_factor([person(one.source)])
             assert used == (round(one.ratio, 2) if one.differs else 1.0)

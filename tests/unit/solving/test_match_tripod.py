@@ -136,7 +136,7 @@ def test_paint_that_was_read_for_other_lines_takes_no_part():
 def test_it_is_kept_as_json_to_the_last_bit_and_anything_else_is_refused():
     _, groups = match()
     reading = solve_match_tripod(groups, POLICY)[1]
-    assert reading_from_canonical_json(reading.text) == reading
+    assert reading_from_canonical_json(reading.canonical_json) == reading
     value = reading_to_json(reading)
     assert "tripod" not in reading_to_json(groups[1].paint["a"])
     for wrong in ([[1.0], [2.0]], [[float("nan")] * 8, [0.0] * 64], "no"):

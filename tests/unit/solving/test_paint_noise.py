@@ -57,7 +57,7 @@ class TestSizeTerms:
     def test_which_line_of_a_goal_is_meant_changes_nothing(self):
         seen, _ = seen_by(MAIN)
         one, other = (
-            paint_derivatives_by_size(seen.marking, seen.jacobian, PITCH.with_goal(goal))
+            paint_derivatives_by_size(seen.marking, seen.jacobian, PITCH.with_goal_edge(goal))
             for goal in ("inner", "middle")
         )
         assert one.any() and (one == other).all()

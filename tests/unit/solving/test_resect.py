@@ -40,7 +40,10 @@ class TestResect:
         lines["Side line left"] = lines.pop("Side line right")
         observations = make_observations(make_lines(lines), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
-        assert PROBLEM.distances(fit.parameters, observations).max() > POOR_PX * PROBLEM.unit
+        assert (
+            PROBLEM.distances(fit.parameters, observations).max()
+            > POOR_PX * PROBLEM.pixels_per_reference_pixel
+        )
         assert fit.cost <= PROBLEM._search_all_stages(observations, THOROUGH).cost
 
 

@@ -167,7 +167,7 @@ class TestMeet:
         assert found.baseline_m == pytest.approx(np.hypot(10, 20))
         assert found.parallax_degrees == pytest.approx(90.0, abs=0.1)
         assert found.in_front
-        assert found.place == tuple(found.point)
+        assert found.point_as_tuple == tuple(found.point)
         assert found.point[:2] == pytest.approx([0.0, 0.0], abs=1e-3)
         assert 0.0 < found.point[2] < 0.02
         depth = 0.001 * np.array([20.0, 10.0])
@@ -215,7 +215,7 @@ class TestMeet:
             for couple in combinations(seen, 2)
             for found in triangulate_observation_pairs([couple])
         ]
-        assert [item.place for item in together] == [item.place for item in alone]
+        assert [item.point_as_tuple for item in together] == [item.point_as_tuple for item in alone]
         assert [item.errors_px for item in together] == [item.errors_px for item in alone]
 
     def test_one_camera_twice_meets_nowhere(self):

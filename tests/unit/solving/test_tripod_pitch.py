@@ -101,8 +101,8 @@ def test_a_shorter_pitch_with_a_crown_is_found_within_its_sigma():
     assert (np.abs(sizes) < WITHIN * found.size_sigmas).all() and found.size_sigmas.max() < 0.5
     for (value, sigma), truth in ((found.crown, 0.15), (found.inward_paint_shift, 0.06)):
         assert abs(value - truth) < WITHIN * sigma and sigma < 0.05
-    away = found.position - truths[0][X : Z + 1]
-    assert away @ np.linalg.solve(found.position_covariance, away) < WITHIN**2
+    away = found.tripod_position - truths[0][X : Z + 1]
+    assert away @ np.linalg.solve(found.tripod_position_covariance, away) < WITHIN**2
     other = found.clearly_different_pitch()
     assert other is not None and other.length == pytest.approx(101, abs=0.7)
     assert found.frames == len(frames) and found.are_sizes_known == (True, True)

@@ -67,7 +67,7 @@ class TestMapOfInstants:
         assert (made.pieces[0].last, made.pieces[1].first) == (4.0, 4.0)
         assert "change near 4.00 s" in (made.reason or "")
         asked = np.array([-1.0, 0.5, 3.9, 4.1, 7.0])
-        assert made.live(asked) == pytest.approx(slow(asked))
+        assert made.to_live_times(asked) == pytest.approx(slow(asked))
 
     def test_those_that_run_backwards_are_no_map(self) -> None:
         made = made_of([(3.0, 1.0), (2.0, 2.0)])

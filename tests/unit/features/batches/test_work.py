@@ -480,7 +480,7 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         for minutes, group in ((1, groups[0]), (4, groups[1]), (90, groups[2]), (96, groups[3])):
             at = clock.at + timedelta(minutes=minutes)
-            LeaseService(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
+            LeaseService(store, lambda at=at: at).submit_group(batch, group, ADA, actor="ada")
         (team,) = list_team_batches(store, dataset, at=clock.at + timedelta(hours=2))
         (pace,) = team.people
         assert (pace.name, pace.submitted, pace.minutes) == ("ada", 4, pytest.approx(9))

@@ -63,7 +63,7 @@ def place(store: Store, group: int, actor: str, ball: BallAnnotation = BALL) -> 
 
 
 def noise(store: Store, group: int) -> dict[str, float]:
-    return load_group_state(store, group).group.noise
+    return load_group_state(store, group).group.noise_factors_by_view
 
 
 @pytest.fixture
@@ -213,7 +213,7 @@ class TestWithNoise:
         give(store, *FACTORS)
         key = next(iter(noise(store, static)))
         group, _ = solve_edited_group(store, static, lambda _group: [make_set_ball_edit(key, BALL)])
-        assert group.noise[key] == 2.0
+        assert group.noise_factors_by_view[key] == 2.0
 
 
 class TestFactorOf:

@@ -85,7 +85,7 @@ def ready(apart: PreviewSolver, large: LargeGroupSolver, api) -> PreviewSolver:
     """It, once all its processes answer."""
     assert preview(api).status_code == 200
     end = time.monotonic() + SECONDS
-    while not all(worker.begin() for worker in (*apart.workers, *large.workers)):
+    while not all(worker.start_and_check_ready() for worker in (*apart.workers, *large.workers)):
         assert time.monotonic() < end, "there are no processes for previews"
         time.sleep(0.02)
     return apart

@@ -61,7 +61,7 @@ def ready(app: FastAPI) -> Iterator[LargeGroupSolver]:
     with closing(LargeGroupSolver(services.settings.model_copy(update={"team": True}))) as made:
         app.state.services = replace(services, large=made)
         end = time.monotonic() + SECONDS
-        while not made.workers[0].begin():
+        while not made.workers[0].start_and_check_ready():
             assert time.monotonic() < end, "there is no process for large edits"
             time.sleep(0.02)
         yield made

@@ -71,7 +71,7 @@ class TestSolutionDocument:
     def test_goals_are_drawn_where_they_were_fitted(self, group: Group) -> None:
         parts, drawn = set[str](), 0
         for policy in (PAPER, STRICT):
-            pitch = policy.calibration.with_fitted_goal(group.pitch)
+            pitch = policy.calibration.pitch_for_fitted_lines(group.pitch)
             solved = solve_group(group, policy)
             for view, document in zip(
                 group.views, SolutionDocument.of(solved, group).views, strict=True

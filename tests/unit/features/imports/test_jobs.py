@@ -91,7 +91,7 @@ class TestImportInWorker:
         here = import_source(
             store, "here", ImportSource("soccernet-v3", tree, name="data"), store.settings
         )
-        assert outcome == ImportOutcome(here.values(), True, None)
+        assert outcome == ImportOutcome(here.to_report_values(), True, None)
         assert done == [(1, None, "")]
         assert [(item.name, item.groups) for item in list_datasets(store)] == [
             ("apart", 1),

@@ -198,7 +198,7 @@ class TestImport:
         value = {"images": [image], "annotations": [], "categories": []}
         (tmp_path / "instances_default.json").write_text(json.dumps(value))
         imported = import_source(store, "demo", ImportSource("coco", tmp_path), store.settings)
-        (remark,) = imported.values()["remarks"]
+        (remark,) = imported.to_report_values()["remarks"]
         assert "72 x 128 declared, the picture is 128 x 72" in remark
 
     def test_its_group_has_a_finding_until_the_size_is_right(
@@ -217,7 +217,9 @@ class TestImport:
                 noticed = read_import_notices(session, [1])[1]
                 (row,) = session.execute(select(QueueModel.findings)).all()
             assert bool(row.findings.strip(",")) == bool(noticed)
-            return found.values()["findings"], [f"{one.kind} {one.sentence}" for one in noticed]
+            return found.to_report_values()["findings"], [
+                f"{one.kind} {one.sentence}" for one in noticed
+            ]
 
         assert brought(128, 72) == (0, [])
         assert brought(72, 128, dry_run=True) == (1, [])

@@ -225,10 +225,10 @@ class TestImportSource:
                 continue
             for path in (tmp_path, tmp_path / name):
                 imported = import_source(store, "demo", ImportSource(form, path), store.settings)
-                sentence, advice = imported.nothing_read_error()
+                sentence, advice = imported.explain_nothing_imported()
                 assert sentence == f"nothing could be imported: {path} {problem}", form
                 assert advice.startswith(hint)
-                (skipped,) = imported.values()["skipped"]
+                (skipped,) = imported.to_report_values()["skipped"]
                 assert skipped["problem"] == problem
         assert list_datasets(store) == []
 
@@ -271,7 +271,7 @@ class TestImportSource:
         (tmp_path / "00002.json").write_text(json.dumps(lines))
         source = ImportSource("sn-calibration", tmp_path, size=SIZE)
         imported = import_source(store, "demo", source, store.settings)
-        values = imported.values()
+        values = imported.to_report_values()
         assert (values["new"], values["outcome"]) == (1, "partial")
         assert [(item["record"], item["field"]) for item in values["skipped"]] == [
             ("00002", "view 00002, Middle line")
@@ -288,7 +288,7 @@ class TestDryRun:
         assert list_datasets(store) == []
         assert _log_size(store) == 0
         done = import_source(store, "demo", source, store.settings)
-        assert dry.values() == done.values()
+        assert dry.to_report_values() == done.to_report_values()
 
     def test_counts_changes_and_findings_as_the_import_does(
         self, store, make_group, tmp_path
@@ -310,7 +310,7 @@ class TestDryRun:
         assert (hashes(store, "demo"), _log_size(store)) == before
         assert (dry.result.changed, dry.result.findings, dry.result.unchanged) == (2, 1, 3)
         done = import_source(store, "demo", source, store.settings)
-        assert dry.values() == done.values()
+        assert dry.to_report_values() == done.to_report_values()
 
     def test_a_shared_station_that_changed_counts_once(
         self, store, make_static, tmp_path, monkeypatch, fill
@@ -341,9 +341,9 @@ class TestSource:
         (tmp_path / "Labels-v3.json").write_text("{")
         source = ImportSource("soccernet-v3", tmp_path, name="mine")
         imported = import_source(store, "demo", source, store.settings)
-        text = json.dumps(imported.values())
+        text = json.dumps(imported.to_report_values())
         assert str(tmp_path) not in text
-        assert imported.values()["skipped"][0]["file"] == "Labels-v3.json"
+        assert imported.to_report_values()["skipped"][0]["file"] == "Labels-v3.json"
 
 
 def _write_labels(store: Store, make_group: Make, root: Path) -> Path:
@@ -366,7 +366,7 @@ class TestRemarks:
         image = {"imageMetadata": {"width": 1280, "height": 720}, "bboxes": [box], "lines": []}
         (tmp_path / "Labels-v3.json").write_text(json.dumps({"actions": {"7.png": image}}))
         imported = import_source(store, "x", ImportSource("soccernet-v3", tmp_path), store.settings)
-        assert imported.values()["remarks"][0] == (
+        assert imported.to_report_values()["remarks"][0] == (
             'no ball was read from the 1 group; its boxes are of "Player team left" (1)'
         )
 
@@ -380,11 +380,14 @@ class TestRemarks:
         }
         (tmp_path / "x.json").write_text(json.dumps(value))
         plain = ImportSource("coco", tmp_path, name="up.zip")
-        dry = import_source(store, "x", plain, store.settings, dry_run=True).values()
+        dry = import_source(store, "x", plain, store.settings, dry_run=True).to_report_values()
         assert (dry["outcome"], dry["skipped"][0]["field"]) == ("partial", "categories")
         named = replace(plain, ball_category="Thing")
         imported = import_source(store, "x", named, store.settings)
-        assert 'x.json: category "thing" is the ball (1 annotation)' in imported.values()["remarks"]
+        assert (
+            'x.json: category "thing" is the ball (1 annotation)'
+            in imported.to_report_values()["remarks"]
+        )
         (group,) = groups_of(store, "x").values()
         assert len(group.views[0].balls) == 1
 
@@ -393,7 +396,7 @@ class TestRemarks:
     ) -> None:
         (tmp_path / "a.json").write_text(json.dumps({"shapes": [], "imagePath": "a.jpg"}))
         imported = import_source(store, "x", ImportSource("coco", tmp_path), store.settings)
-        assert imported.nothing_read_error()[1].startswith("It looks like LabelMe")
+        assert imported.explain_nothing_imported()[1].startswith("It looks like LabelMe")
 
     @pytest.mark.parametrize(
         ("value", "advice"),
@@ -413,7 +416,7 @@ class TestRemarks:
         imported = import_source(
             store, "x", ImportSource("sn-calibration", tmp_path), store.settings
         )
-        sentence, hint = imported.nothing_read_error()
+        sentence, hint = imported.explain_nothing_imported()
         assert (advice in sentence, "looks like" in hint) == (True, False)
 
 
@@ -437,16 +440,16 @@ class TestCheck:
     ) -> None:
         source = replace(ImportSource(form, Path("x")), **{name: value})  # type: ignore[arg-type]
         if form in USERS[name]:
-            source.check()
+            source.require_used_options()
             return
         with pytest.raises(InputError, match=f"^{form} does not use {typed}$") as caught:
-            source.check()
+            source.require_used_options()
         assert caught.value.pointer == f"/options/{name}"
 
     @pytest.mark.parametrize("form", ["cameras", "touchline"])
     def test_what_makes_no_dataset_takes_no_policy(self, form: str) -> None:
         with pytest.raises(InputError, match="does not use --policy"):
-            ImportSource(form, Path("x")).check(policy=True)
+            ImportSource(form, Path("x")).require_used_options(policy=True)
 
     def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
         text = Path("static/state/import_formats.js").read_text(encoding="utf-8")

@@ -89,7 +89,7 @@ class TestGoldInAFilm:
             )
             assert state.solution is not None and state.solution.ball is not None
             annotate(store, copy, 3.0, 4.0)
-            leases.submit(batch, copy, ANN, actor="ann")
+            leases.submit_group(batch, copy, ANN, actor="ann")
         assert (kinds.count("gold"), kinds.count("independent")) == (1, 3)
         assert len(shapes) == 1
         assert get_batch(store, batch).submitted == 3
@@ -113,6 +113,6 @@ class TestGoldInAFilm:
         assert [view.balls for view in views] == [()] * 6
         # Static cameras are everybody's: their lines are not those of this picture.
         assert all(view.station.lines for view in views)
-        LeaseService(store).submit(batch, copy, ANN, actor="ann")
+        LeaseService(store).submit_group(batch, copy, ANN, actor="ann")
         ((result,),) = [one.results for one in read_gold_report(store, "film").people]
         assert (result.error.ball_px, result.error.balls_missing) == (None, 6)

@@ -189,7 +189,7 @@ class TestRunningBatch:
         batch = make_batch(store, "demo", new, actor="lea")
         leases, ada = LeaseService(store), BatchMember("ada")
         first = leases.lease_next_group(batch.id, ada).group
-        leases.submit(batch.id, first, ada, actor="ada")
+        leases.submit_group(batch.id, first, ada, actor="ada")
         mark_groups_with_known_truth(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
         change_batch(store, batch.id, actor="lea", gold_every=1)
         copy = leases.lease_next_group(batch.id, ada).group

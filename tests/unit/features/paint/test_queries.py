@@ -69,7 +69,7 @@ class TestReadings:
             }
 
     def test_what_is_not_what_its_digest_says_is_damage(self, filled: Store) -> None:
-        body = zlib.compress(replace(READING, supported=0.25).text.encode())
+        body = zlib.compress(replace(READING, supported=0.25).canonical_json.encode())
         with filled.write() as session:
             session.execute(
                 text("INSERT INTO paint_evidence VALUES (:digest, 1, NULL, :body)"),

@@ -184,7 +184,7 @@ class TestReadPaint:
         for number in (1, 2):
             group = load_group_state(painted, number).group
             for view in group.views:
-                people = [box for box in view.extras.places if box.width * box.height < 2e4]
+                people = [box for box in view.extras.pixel_boxes if box.width * box.height < 2e4]
                 believed = group.paint[view.key].evidence.points
                 assert people and believed
                 for places in believed.values():

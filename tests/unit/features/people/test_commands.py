@@ -221,7 +221,7 @@ class TestUsers:
         assert run("users", "tokens", "--end", str(made.id)).exit_code == 0
         assert "bob" not in run("users", "tokens").stdout
         with pytest.raises(NotLoggedInError):
-            tokens.find(text)
+            tokens.find_login_of_token(text)
 
     @pytest.mark.parametrize("role", ["boss", ""])
     def test_a_role_that_is_none_is_wrong_usage(self, role: str) -> None:

@@ -15,26 +15,32 @@ class TestAttempts:
     def test_tries_of_all_processes_count_in_one_moving_window(self, store: Store) -> None:
         at = [1000.0]
         one, other = AttemptWindow(store, lambda: at[0]), AttemptWindow(store, lambda: at[0])
-        assert [one.count_attempt("ann", 3, 60.0), other.count_attempt("ann", 3, 60.0)] == [
+        assert [
+            one.count_attempt_or_get_wait("ann", 3, 60.0),
+            other.count_attempt_or_get_wait("ann", 3, 60.0),
+        ] == [
             None,
             None,
         ]
         at[0] = 1030.0
-        assert one.count_attempt("ann", 3, 60.0) is None
-        assert (one.count_attempt("ann", 3, 60.0), other.count_attempt("ann", 3, 60.0)) == (
+        assert one.count_attempt_or_get_wait("ann", 3, 60.0) is None
+        assert (
+            one.count_attempt_or_get_wait("ann", 3, 60.0),
+            other.count_attempt_or_get_wait("ann", 3, 60.0),
+        ) == (
             30.0,
             30.0,
         )
-        assert other.count_attempt("ben", 3, 60.0) is None
+        assert other.count_attempt_or_get_wait("ben", 3, 60.0) is None
         at[0] = 1061.0
-        assert other.count_attempt("ann", 3, 60.0) is None
+        assert other.count_attempt_or_get_wait("ann", 3, 60.0) is None
 
     def test_who_is_refused_waits_for_no_writer(self, store: Store) -> None:
         attempts = AttemptWindow(store)
-        attempts.count_attempt("ann", 1, 60.0)
+        attempts.count_attempt_or_get_wait("ann", 1, 60.0)
         with store.write():
             # A write of its own would wait for this one, and be refused itself.
-            assert attempts.count_attempt("ann", 1, 60.0) is not None
+            assert attempts.count_attempt_or_get_wait("ann", 1, 60.0) is not None
 
 
 class TestWritten:

@@ -63,14 +63,14 @@ class Desk:
         self, login: Login, device: Authenticator | None = None, name: str = "phone"
     ) -> list[str]:
         """Recovery codes of making a passkey."""
-        options = self.passkeys.begin(login, SECRET, SITE)
+        options = self.passkeys.begin_creation(login, SECRET, SITE)
         credential = (device or self.device).make(options)
         return self.passkeys.make(login, name, credential, SITE)[1]
 
     def enter(self, credential: dict[str, Any] | None = None, asker: str = BROWSER) -> str:
         """Who is logged in by what the device signs."""
         if credential is None:
-            credential = self.device.sign(self.passkeys.ask(asker, SITE))
+            credential = self.device.sign(self.passkeys.begin_login(asker, SITE))
         found = self.logins.find(self.passkeys.log_in(asker, credential, SITE))
         assert found is not None
         return found.name
@@ -90,7 +90,7 @@ class TestLogin:
     def test_takes_no_password_and_no_code(self, desk: Desk) -> None:
         desk.made(desk.login())
         assert desk.enter() == "anna"
-        assert desk.passkeys.of(1)[0].used is not None
+        assert desk.passkeys.list_of_person(1)[0].used is not None
 
     def test_a_device_without_a_signature_counter_is_accepted(self, desk: Desk) -> None:
         desk.made(desk.login())
@@ -101,17 +101,17 @@ class TestLogin:
     def test_an_answer_counts_once(self, desk: Desk) -> None:
         desk.made(desk.login())
         desk.device.count = -1
-        signed = desk.device.sign(desk.passkeys.ask(BROWSER, SITE))
+        signed = desk.device.sign(desk.passkeys.begin_login(BROWSER, SITE))
         desk.enter(signed)
         desk.refused(signed)
-        desk.passkeys.ask(BROWSER, SITE)
+        desk.passkeys.begin_login(BROWSER, SITE)
         desk.refused(signed)
 
     def test_an_answer_is_of_the_browser_that_was_asked_and_soon(self, desk: Desk) -> None:
         desk.made(desk.login())
-        desk.refused(desk.device.sign(desk.passkeys.ask(BROWSER, SITE)), "another browser")
-        desk.refused(desk.device.sign(desk.passkeys.ask("", SITE)), BROWSER)
-        signed = desk.device.sign(desk.passkeys.ask(BROWSER, SITE))
+        desk.refused(desk.device.sign(desk.passkeys.begin_login(BROWSER, SITE)), "another browser")
+        desk.refused(desk.device.sign(desk.passkeys.begin_login("", SITE)), BROWSER)
+        signed = desk.device.sign(desk.passkeys.begin_login(BROWSER, SITE))
         desk.at += LASTS
         desk.refused(signed)
 
@@ -150,7 +150,7 @@ class TestLogin:
     def test_it_ends_with_the_account_or_when_it_is_taken_away(self, desk: Desk, end: str) -> None:
         login = desk.login()
         desk.made(login)
-        signed = desk.device.sign(desk.passkeys.ask(BROWSER, SITE))
+        signed = desk.device.sign(desk.passkeys.begin_login(BROWSER, SITE))
         ends: dict[str, Callable[[], Any]] = {
             "disabled": lambda: change_person(desk.store, 1, actor="local", disabled=True),
             "removed": lambda: desk.passkeys.remove(login, 1, SECRET),
@@ -162,7 +162,7 @@ class TestLogin:
     @pytest.mark.parametrize("field", ["clientDataJSON", "authenticatorData", "signature"])
     def test_bytes_that_are_none_of_this_are_a_refusal(self, desk: Desk, field: str) -> None:
         desk.made(desk.login())
-        signed = desk.device.sign(desk.passkeys.ask(BROWSER, SITE))
+        signed = desk.device.sign(desk.passkeys.begin_login(BROWSER, SITE))
         signed["response"][field] = "A"
         desk.refused(signed)
 
@@ -171,30 +171,30 @@ class TestMaking:
     def test_it_takes_the_password_and_ends_other_sessions(self, desk: Desk) -> None:
         other, login = desk.logins.log_in("anna", SECRET), desk.login()
         with pytest.raises(InputError, match="the password is wrong"):
-            desk.passkeys.begin(login, "wrong wrong wrong", SITE)
+            desk.passkeys.begin_creation(login, "wrong wrong wrong", SITE)
         desk.made(login)
         assert desk.logins.find(other) is None
         assert [item.id for item in desk.logins.sessions(login)] == [login.id]
 
     def test_a_passkey_of_another_session_site_or_challenge_is_not_kept(self, desk: Desk) -> None:
         login = desk.login()
-        options = desk.passkeys.begin(login, SECRET, SITE)
+        options = desk.passkeys.begin_creation(login, SECRET, SITE)
         with pytest.raises(InputError, match="answered already"):
             desk.passkeys.make(desk.login(), "phone", desk.device.make(options), SITE)
         for wrong in ({"origin": "http://evil"}, {"site": "evil"}, {"flags": PRESENT}):
-            options = desk.passkeys.begin(login, SECRET, SITE)
+            options = desk.passkeys.begin_creation(login, SECRET, SITE)
             with pytest.raises(InputError, match="not accepted"):
                 desk.passkeys.make(login, "phone", Authenticator(**wrong).make(options), SITE)
         with pytest.raises(InputError, match="answered already"):
             desk.passkeys.make(login, "phone", desk.device.make(options), SITE)
-        desk.passkeys.begin(login, SECRET, SITE)
+        desk.passkeys.begin_creation(login, SECRET, SITE)
         with pytest.raises(InputError, match="not accepted"):
             desk.passkeys.make(login, "phone", desk.device.make(options), SITE)
-        garbage = desk.device.make(desk.passkeys.begin(login, SECRET, SITE))
+        garbage = desk.device.make(desk.passkeys.begin_creation(login, SECRET, SITE))
         garbage["response"]["attestationObject"] = b64(b"\xa1" * 300)
         with pytest.raises(InputError, match="not accepted"):
             desk.passkeys.make(login, "phone", garbage, SITE)
-        assert desk.passkeys.of(1) == []
+        assert desk.passkeys.list_of_person(1) == []
 
     def test_one_person_may_have_several_named_ones_and_none_has_two_owners(
         self, desk: Desk
@@ -205,7 +205,7 @@ class TestMaking:
         with pytest.raises(ConflictError, match="phone already"):
             desk.made(login, second)
         assert desk.made(login, second, "ring") == [], "the recovery codes stay"
-        assert [one.name for one in desk.passkeys.of(1)] == ["phone", "ring"]
+        assert [one.name for one in desk.passkeys.list_of_person(1)] == ["phone", "ring"]
         desk.join("berta")
         with pytest.raises(ConflictError, match="registered already"):
             desk.made(desk.login("berta"), second)
@@ -225,7 +225,7 @@ class TestSecondFactor:
         assert find_person(desk.store, "anna").second_factor
 
     def test_it_is_one_where_everybody_needs_one(self, desk: Desk) -> None:
-        desk.factors.require(True, actor="local")
+        desk.factors.set_required(True, actor="local")
         login = desk.login()
         assert login.must_enrol
         codes = desk.made(login)

@@ -140,11 +140,11 @@ class TestLogin:
         attempts = AttemptWindow(desk.store)
 
         def count() -> None:
-            assert attempts.count_attempt("code/anna", 1, 3600.0) is None
+            assert attempts.count_attempt_or_get_wait("code/anna", 1, 3600.0) is None
 
         code = desk.code()
         assert desk.logins.log_in("anna", SECRET, code=code, on_code=count)
-        assert attempts.count_attempt("code/anna", 1, 3600.0) is not None
+        assert attempts.count_attempt_or_get_wait("code/anna", 1, 3600.0) is not None
 
     def test_a_recovery_code_takes_its_place_once(self, desk: Desk) -> None:
         desk.enrol()
@@ -218,13 +218,13 @@ class TestEnrolling:
 
 class TestRequired:
     def test_who_has_none_must_make_one(self, desk: Desk) -> None:
-        desk.factors.require(True, actor="local")
+        desk.factors.set_required(True, actor="local")
         assert desk.login().must_enrol
         login = desk.enrol()
         found = desk.login(desk.code())
         assert not found.must_enrol
         with pytest.raises(ConflictError, match="requires a second factor"):
             desk.factors.remove(login, SECRET)
-        desk.factors.require(False, actor="local")
+        desk.factors.set_required(False, actor="local")
         desk.factors.remove(login, SECRET)
         assert not desk.login().must_enrol

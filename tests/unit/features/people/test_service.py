@@ -331,7 +331,7 @@ class TestDatasetRoles:
         assert DatasetRoles(Role.ADMIN, {1: Role.NONE}).find_role_in(1) is Role.ADMIN
 
     def test_rights_in_one_dataset_alone_are_none_elsewhere(self) -> None:
-        one = DatasetRoles(Role.ADMIN).only(1)
+        one = DatasetRoles(Role.ADMIN).restrict_to_dataset(1)
         assert (one.find_role_in(1), one.find_role_in(2), one.is_admin) == (
             Role.ADMIN,
             Role.NONE,

@@ -152,7 +152,7 @@ class TestGroupsWithoutMatch:
         (item,) = estimate_pitches(store, "demo").proposals
         assert item.proposed.length == pytest.approx(103.0, abs=0.3)
         assert item.proposed.width == pytest.approx(66.0, abs=0.3)
-        assert "for the groups without a match under Statistics" in item.sentence
+        assert "for the groups without a match under Statistics" in item.proposal_reason
         accept(store, match="", pitch=TRUE)
         assert {load_group_state(store, number).group.pitch for number in range(1, 7)} == {TRUE}
         assert read_pitches(store, "demo").proposals == ()
@@ -308,7 +308,7 @@ class TestReadPitches:
         assert small.proposed.length == pytest.approx(103.0, abs=0.3)
         assert right.proposed.length == pytest.approx(105.0, abs=0.3)
         assert (small.previous, right.previous) == (Pitch(), Pitch())
-        assert "solved with several sizes" in right.sentence
+        assert "solved with several sizes" in right.proposal_reason
 
     def test_a_minority_of_another_size_is_told(self, solved):
         accept(solved)

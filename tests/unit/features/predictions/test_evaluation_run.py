@@ -59,7 +59,7 @@ class TestCheck:
     @pytest.mark.parametrize("boxes", [None, Path("a-set")])
     def test_options_that_nothing_uses_are_refused(self, boxes, options, words: str) -> None:
         with pytest.raises(InputError, match=words):
-            PredictionFiles(boxes, **options).check()
+            PredictionFiles(boxes, **options).refuse_unused_options()
 
     def test_so_are_those_of_careful_boxes_by_their_own_name(self) -> None:
         careful = PredictionFiles(None, category=1)
@@ -67,7 +67,7 @@ class TestCheck:
             EvaluationRequest(), PredictionFiles(Path("a-set")), careful
         )
         with pytest.raises(InputError, match="--careful-category needs a file of boxes"):
-            request.check()
+            request.refuse_unused_options()
 
     def test_a_version_has_its_own_groups(self) -> None:
         nothing = PredictionFiles(None)
@@ -75,7 +75,7 @@ class TestCheck:
             EvaluationRequest(groups="all"), nothing, nothing, version="v1"
         )
         with pytest.raises(InputError, match='groups "all" cannot be combined with a version'):
-            request.check()
+            request.refuse_unused_options()
 
 
 class TestPredictionSet:

@@ -19,12 +19,12 @@ class TestStoredBox:
         assert ViewPrediction.of(SET, replace(BOX, width=-1.0)).box[2] == -1
 
     def test_of_a_dry_run_is_told_however_absurd(self) -> None:
-        assert AcceptOutcome.planned(PLAN).sample[0].box == (1.0, 2.0, 3e9, 4.0)
+        assert AcceptOutcome.of_plan(PLAN).sample[0].box == (1.0, 2.0, 3e9, 4.0)
 
 
 class TestAcceptedView:
     def test_says_which_view_of_which_group_and_how_sure_its_prediction_is(self) -> None:
-        (shown,) = AcceptOutcome.planned(PLAN).sample
+        (shown,) = AcceptOutcome.of_plan(PLAN).sample
         assert (shown.view, shown.key, shown.group, shown.group_key) == (31, "7.png", 5, "m/7.png")
         assert shown.score == 0.9
 

@@ -415,7 +415,7 @@ def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
         5: [own, tracker.truth[5]],
         6: [None, tracker.truth[6]],
     }
-    assert stations[6][0].lines and stored[groups[6]].is_edited("6.png")
+    assert stations[6][0].lines and stored[groups[6]].is_view_edited("6.png")
 
 
 def test_a_camera_that_somebody_gave_stays(

@@ -77,7 +77,7 @@ class TestVerify:
     def test_a_track_comes_out_bit_for_bit(self, store, accepted) -> None:
         version = frozen(store)
         report = verify_version(store, version.id)
-        assert report.ok, report.values()
+        assert report.ok, report.to_values()
 
     def test_a_track_of_an_earlier_solver_is_named_and_not_called_damaged(
         self, store, accepted, monkeypatch

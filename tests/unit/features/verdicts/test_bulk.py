@@ -265,7 +265,7 @@ class TestGiveVerdicts:
         self, store, ids, monkeypatch
     ) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 3)
-        save, calls = bulk.BatchRun.save, []
+        save, calls = bulk.BatchRun.save_chunk, []
 
         def killed(self, session, rows):
             calls.append(rows)

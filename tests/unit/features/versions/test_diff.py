@@ -111,11 +111,11 @@ class TestDiffVersions:
 
     def test_against_itself_nothing_changed(self, store, two) -> None:
         diff = diff_versions(store, two[0].id, two[0].id)
-        assert (diff.unchanged, diff.values()["same"]) == (3, True)
+        assert (diff.unchanged, diff.to_values()["same"]) == (3, True)
         assert not (diff.added or diff.dropped or diff.moved or diff.changed or diff.settings)
 
     def test_lists_are_cut_and_counts_are_not(self, store, two) -> None:
-        values = diff_versions(store, two[0].id, two[1].id).values(1)
+        values = diff_versions(store, two[0].id, two[1].id).to_values(1)
         assert (len(values["added"]), values["counts"]["added"]) == (1, 2)
 
     def test_two_datasets_cannot_be_compared(self, store, two, make_group) -> None:

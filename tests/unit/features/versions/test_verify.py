@@ -57,7 +57,7 @@ class TestVerify:
     def test_everything_comes_out_as_it_was_frozen(self, store, version) -> None:
         seen = []
         report = verify_version(store, version.id, progress=lambda *place: seen.append(place))
-        assert report.ok, report.values()
+        assert report.ok, report.to_values()
         assert (report.equal, report.groups, seen[-1]) == (4, 4, (4, 4))
 
     def test_workers_find_the_same(self, store, version) -> None:

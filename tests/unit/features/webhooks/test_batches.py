@@ -104,7 +104,7 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     assert made[1] == {"dataset": "demo", "actor": "lea", "batch": {**said, **counts}}
     assert handed_on["batch"]["annotators"] == ["bo"] and handed_on["batch"]["name"] == "Derby day"
 
-    LeaseService(allowed).submit(batch, groups[0], BatchMember("bo"), actor="bo")
+    LeaseService(allowed).submit_group(batch, groups[0], BatchMember("bo"), actor="bo")
     LeaseService(allowed).return_group(batch, groups[0], BatchMember("cy"), "no ball", actor="cy")
     ((kind, back),) = told.new()
     assert (kind, back["actor"], back["person"]) == (MessageKind.HANDED_BACK, "cy", "bo")

@@ -61,5 +61,5 @@ class TestReadTables:
         new = fill(make_group(9, split="test"), solved=False)[-1:]
         table, bare = read(store)
         assert (table.group_id.tolist(), bare.group_id.tolist()) == (solved, new)
-        assert sum(bare.count_places().values()) == 1
-        assert {split for _, split in bare.count_places()} == {"test"}
+        assert sum(bare.count_groups_by_match_and_split().values()) == 1
+        assert {split for _, split in bare.count_groups_by_match_and_split()} == {"test"}
