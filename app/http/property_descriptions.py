@@ -436,7 +436,7 @@ PROPERTIES: Mapping[str, str] = {
     "EvaluationDocument.version": "Id of the frozen version; null: the dataset as it was.",
     "EvaluationRow.version": "Id of the frozen version; null: the dataset as it was.",
     "view": "Key of the view; null where it concerns the whole group.",
-    "ViewAcceptDecision.view": "Id of the view.",
+    "AcceptedView.view": "Id of the view.",
     "GroupViewProposal.view": "Id of the view.",
     "views": "The views, in their order.",
     "GroupRow.views": "How many views the group has.",
