@@ -136,7 +136,7 @@ def quote_text(text: str, most: int = 40) -> str:
     """The beginning of somebody's text in a sentence, in quotes; what cannot be printed is spelt out.
 
     Example:
-        >>> quoted("Müller"), quoted("a\\nb"), quoted("abc", 2)
+        >>> quote_text("Müller"), quote_text("a\\nb"), quote_text("abc", 2)
         ('"Müller"', '"a\\\\nb"', '"ab"')
     """
     start = text[:most]

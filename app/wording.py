@@ -21,7 +21,7 @@ def format_named_count(count: int, name: str) -> str:
     """A count under the name that a report has for several.
 
     Example:
-        >>> counted(1, "images_missing"), counted(2, "balls")
+        >>> format_named_count(1, "images_missing"), format_named_count(2, "balls")
         ('1 image missing', '2 balls')
     """
     several = name.replace("_", " ")

@@ -28,7 +28,7 @@ def is_ball_name(name: str) -> bool:
     """Whether a name means the ball of a football match, whatever its case, separators and digits.
 
     Example:
-        >>> [is_ball(name) for name in ("Sports_Ball", "soccer-balls", "ball_1", "basketball")]
+        >>> [is_ball_name(name) for name in ("Sports_Ball", "soccer-balls", "ball_1", "basketball")]
         [True, True, True, False]
     """
     words = [

@@ -405,7 +405,7 @@ def find_camera_owner(group: Group, view: View) -> tuple[str, ...]:
 
 
 def map_camera_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
-    """The names of a view in an export, and whose each would be (``export_names``)."""
+    """The names of a view in an export, and whose each would be (``frame_names``)."""
     camera = {_make_camera_file_path(group, view): find_camera_owner(group, view)}
     return {**camera, **map_frame_names_to_owners(group, view, split)}
 

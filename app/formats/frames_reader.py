@@ -49,7 +49,7 @@ def parse_grouping_pattern(grouping: str) -> re.Pattern[str] | None:
     """What the names of pictures must look like to be grouped by them; None: they need not.
 
     Example:
-        >>> check_grouping("{instant}_{camera}.jpg").fullmatch("12_main.jpg")["instant"]
+        >>> parse_grouping_pattern("{instant}_{camera}.jpg").fullmatch("12_main.jpg")["instant"]
         '12'
 
     Raises:

@@ -58,7 +58,7 @@ def frame_file_name(group: Group, view: View) -> str:
 
 
 def map_sequence_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
-    """The name of a view in an export, and whose it is (``export_names``).
+    """The name of a view in an export, and whose it is (``frame_names``).
 
     Files of one sequence in several splits are one sequence to who reads them, and images are
     known by their name without its ending.

@@ -47,7 +47,7 @@ def parse_split_name(name: str) -> str:
     """The split that a name is; empty where it is none.
 
     Example:
-        >>> [split_of_word(name) for name in ("train2017", "Validation", "val", "cam1")]
+        >>> [parse_split_name(name) for name in ("train2017", "Validation", "val", "cam1")]
         ['train', 'valid', 'valid', '']
     """
     found = _SPLIT.fullmatch(name.strip().lower())
@@ -58,7 +58,7 @@ def find_split_in_word(name: str) -> str:
     """The split that one word of a name says; empty where none does, or two contradict.
 
     Example:
-        >>> split_within_word("instances_train2017"), split_within_word("train_or_test"), split_within_word("_annotations.coco")
+        >>> find_split_in_word("instances_train2017"), find_split_in_word("train_or_test"), find_split_in_word("_annotations.coco")
         ('train', '', '')
     """
     found = {split for word in _WORDS.split(name.lower()) if (split := parse_split_name(word))}

@@ -65,7 +65,7 @@ def make_split_folder_name(split: str, size: ImageSize) -> str:
     """Folder of the frames of one split and one size: the evaluator takes one size at a time.
 
     Example:
-        >>> split_folder_name("test", ImageSize(1280, 720))
+        >>> make_split_folder_name("test", ImageSize(1280, 720))
         'test-1280x720'
     """
     return f"{split or UNASSIGNED}-{size.width}x{size.height}"
@@ -99,7 +99,7 @@ def flat_frame_name(place: str, split: str) -> str:
 
 
 def map_line_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
-    """The names of a view in an export, and whose each would be (``export_names``).
+    """The names of a view in an export, and whose each would be (``frame_names``).
 
     The place of a frame is a name, too: what is read again has it for a key. A static camera has
     one file of lines for all its views.

@@ -300,7 +300,7 @@ class RecordFieldReader:
 
 
 def extras_from_json(value: Any) -> Extras:
-    """Back from ``Extras.values``; what is none of it is left out."""
+    """Back from ``Extras.to_plain_values``; what is none of it is left out."""
     if not isinstance(value, dict):
         return Extras()
     boxes, lines = (

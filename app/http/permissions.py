@@ -41,7 +41,7 @@ class RoleScope(StrEnum):
     NAMED = "named"
     """Nowhere else."""
     SOMEWHERE = "somewhere"
-    """Anywhere, where nothing is named; what is listed is left to ``Login.sight``."""
+    """Anywhere, where nothing is named; what is listed is left to ``Login.visibility``."""
     EVERYWHERE = "everywhere"
     """In all datasets: it is about what belongs to none."""
     OWN = "own"

@@ -86,7 +86,7 @@ def measure_agreement_with_clear_paint(
     Args:
         camera: In pixels of the picture.
         field: The field of play, shape (H, W).
-        strength: Of ``ridges.line_strength``, shape (H, W).
+        strength: Of ``ridges.measure_line_strength``, shape (H, W).
         pitch: The pitch.
         paint_strength: Of paint (``measure_strength_near_markings``); less than half of it is none.
     """

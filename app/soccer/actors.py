@@ -19,7 +19,7 @@ def make_token_actor(name: str, token: str) -> str:
     """The name under which a script acts that asks with a person's token.
 
     Example:
-        >>> with_token("anna", "deploy")
+        >>> make_token_actor("anna", "deploy")
         'anna (token deploy)'
     """
     return f"{name}{TOKEN}{token})"
@@ -29,7 +29,7 @@ def person_of_actor(actor: str) -> str:
     """The name of the person behind an actor; no name of a person has a bracket.
 
     Example:
-        >>> person_of("anna (token deploy)"), person_of("anna")
+        >>> person_of_actor("anna (token deploy)"), person_of_actor("anna")
         ('anna', 'anna')
     """
     return actor.partition(TOKEN)[0]

@@ -221,7 +221,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
 
 
 def extras_from_json(value: Mapping[str, Any] | None) -> Extras:
-    """Back from ``Extras.values``."""
+    """Back from ``Extras.to_plain_values``."""
     if value is None:
         return Extras()
     return Extras(tuple(value["boxes"]), tuple(value["lines"]), value["metadata"])

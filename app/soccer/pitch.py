@@ -145,7 +145,7 @@ class Pitch:
     """A pitch of the given size; everything else is fixed by the Laws of the Game.
 
     ``goal`` says which line of a goal's frame and of the paint its markings are. It is no property of a pitch, so
-    nothing of it is stored: ``CalibrationPolicy.fitted`` chooses it where lines are fitted.
+    nothing of it is stored: ``CalibrationPolicy.pitch_for_fitted_lines`` chooses it where lines are fitted.
     """
 
     length: float = 105.0

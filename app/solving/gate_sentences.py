@@ -309,7 +309,7 @@ def _format_percent_of_limit(share: float, limit: float) -> str:
     """A share of a limit as per cent, in as many digits as it takes to tell it from the limit.
 
     Example:
-        >>> _percent_of_limit(0.14, 1.0), _percent_of_limit(1.0002, 1.0)
+        >>> _format_percent_of_limit(0.14, 1.0), _format_percent_of_limit(1.0002, 1.0)
         ('0.14 %', '1.0002 %')
     """
     value = share * limit

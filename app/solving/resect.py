@@ -283,7 +283,7 @@ class ResectionProblem:
         return compute_point_weights(observations.marking, self.fit_share)
 
     def row_weights(self, observations: Observations, marking: IntArray) -> FloatArray:
-        """The same of rows as ``compute_noise_rows`` has them, by the marking of each, shape (M,)."""
+        """The same of rows as ``compute_line_noise_inputs`` has them, by the marking of each, shape (M,)."""
         points = np.where(marking < 0, -1 - marking, np.arange(len(marking)))
         return self.weights(observations)[points]
 
@@ -313,7 +313,7 @@ class ResectionProblem:
     def compute_line_noise_inputs(
         self, parameters: FloatArray, observations: Observations
     ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-        """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
+        """Residuals, Jacobian, marking and prior at a minimum as ``compute_line_noise`` takes them.
 
         Args:
             parameters: At the minimum, shape (8,).

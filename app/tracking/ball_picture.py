@@ -169,7 +169,7 @@ def fit_disc(
     """The ball at a place, fitted as a disc on an even background.
 
     Args:
-        grey: From ``BallColour.grey``, shape (H, W).
+        grey: From ``BallGreyConversion.to_grey``, shape (H, W).
         x, y: About where its centre is, pixels.
         diameter: About how large it is, pixels.
         smear, angle: As of ``make_ball_template``.
@@ -297,7 +297,7 @@ def find_similar_ball(grey: Grey, x: float, y: float, diameter: float) -> BallSp
     """The ball at a click by how it looks elsewhere: what looks like it there, else the click itself.
 
     Args:
-        grey: From ``BallColour.grey`` of a frame that shows it well, shape (H, W).
+        grey: From ``BallGreyConversion.to_grey`` of a frame that shows it well, shape (H, W).
         x, y: Where somebody clicked, pixels.
         diameter: About how large it is, pixels.
     """

@@ -13,6 +13,7 @@ import touchline
 
 ROOT = Path(__file__).parents[2]
 NAME = re.compile(r"``([a-z_]\w*(?:\.[a-z_]\w*)*)(?:\(\))?``")
+MEMBER = re.compile(r"``([A-Z]\w*)\.([a-z_]\w*)(?:\(\))?``")
 OF_OTHERS = {"camera_00012.json", "instances_Train.json"}
 """Names in docstrings that are not of the code: files of an example."""
 
@@ -45,6 +46,31 @@ def test_names_in_docstrings_are_names_of_the_code() -> None:
         for path, text in sources.items()
         for name in NAME.findall(text)
         if name not in OF_OTHERS and not known.issuperset(name.split("."))
+    ]
+    assert not gone, gone
+
+
+def test_members_in_docstrings_are_members_of_their_class() -> None:
+    members: dict[str, set[str]] = {}
+    bases: dict[str, set[str]] = {}
+    texts = {path: path.read_text("utf-8") for path in _files("app")}
+    for text in texts.values():
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ClassDef):
+                members.setdefault(node.name, set()).update(_names(node))
+                above = {name for base in node.bases for name in _names(base)}
+                bases.setdefault(node.name, set()).update(above)
+
+    def has(owner: str, name: str) -> bool:
+        if owner not in members or name in members[owner]:
+            return True
+        return any(has(base, name) for base in bases[owner] - {owner})
+
+    gone = [
+        f"{path.relative_to(ROOT)}: {owner}.{name}"
+        for path, text in texts.items()
+        for owner, name in MEMBER.findall(text)
+        if owner in members and not has(owner, name)
     ]
     assert not gone, gone
 

@@ -209,7 +209,7 @@ class PreviewSolver:
         Raises:
             NotFoundError: There is no such group.
             InputError: It has no such view, or the changes are too many.
-            SharedStationError: See ``submit.preview``.
+            SharedStationError: See ``submit.solve_edited_group``.
             OverloadedError: The process ended.
         """
         large = is_large_request(request.scope)

@@ -42,7 +42,7 @@ class Proposal:
         sentence: Why no lines are proposed, or which drawn lines contradict the proposal; else empty.
         lines: Points on the paint of markings that nobody drew, pixels of the annotated size; none
             unless proposed.
-        supported, explained, points, error_px, runner_up: As of ``paint.view_proposal``.
+        supported, explained, points, error_px, runner_up: As of ``ViewProposal``.
         frame: Digest of the picture's bytes; empty where there were none.
         sought_with: Digest of what else was known then.
         version: Of what read the picture.

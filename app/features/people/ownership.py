@@ -76,7 +76,7 @@ def find_role_by_ownership(found: Ownership, roles: DatasetRoles, name: str) -> 
     Args:
         found: Where it belongs.
         roles: Their rights.
-        name: Under which what they make is theirs (``Login.owner``).
+        name: Under which what they make is theirs (``Login.ownership_name``).
     """
     if roles.is_admin:
         return Role.ADMIN

@@ -226,7 +226,7 @@ def make_groups_in_worker(
     stop: Any,
     dry_run: bool = False,
 ) -> dict[str, Any]:
-    """``instants.take_instants`` in a worker process, within the limits of imports."""
+    """``instants.make_groups_of_instants`` in a worker process, within the limits of imports."""
     limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
     try:
         taken = run_in_worker(
