@@ -110,7 +110,7 @@ class IssiaNumberRegistry:
 
 def _make_not_issia_error(group: Group, view: str) -> InputError:
     return InputError(
-        f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",
+        f"group {group.key}, view {view} cannot be from ISSIA, whose groups are named by a frame number and whose views are cam1 to cam6",
         hint="Export it as soccernet-v3d or cameras instead.",
     )
 

@@ -226,7 +226,7 @@ def parse_literal(
     """
     if len(text) > MAX_LITERAL_CHARACTERS:
         raise DatasetFormatError(path, record, None, "is too long for a Python literal")
-    problem = "is neither JSON nor a Python literal of plain values"
+    problem = "is neither JSON nor a Python literal of strings, numbers, lists and dictionaries"
     try:
         if _nesting_depth(text.encode(), _LITERAL_STRING) > MAX_DEPTH:
             problem = f"is nested deeper than {MAX_DEPTH} levels"
@@ -279,7 +279,7 @@ def _require_plain_values(value: Any) -> None:
         elif isinstance(item, (list, tuple)):
             pending.extend(item)
         elif not isinstance(item, _PLAIN) or (isinstance(item, float) and not math.isfinite(item)):
-            raise ValueError("not a plain value")
+            raise ValueError("holds a value that JSON cannot hold")
 
 
 def _nesting_depth(content: bytes, strings: re.Pattern[bytes]) -> int:

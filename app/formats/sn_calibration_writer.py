@@ -181,7 +181,7 @@ class _FrameNameAssigner:
         if first != owner:
             whose = f"{', '.join(first)} and {', '.join(owner)}"
             raise InputError(
-                f"two frames ({whose}) would both be called {place}",
+                f"two frames ({whose}) have the same path {place}",
                 hint="Rename one of them in the source, and import it again.",
             )
         if place in self.of_place:

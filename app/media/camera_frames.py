@@ -26,8 +26,9 @@ from app.soccer.group import Media
 
 LONGEST_GAP = 250
 """Frames between two views beyond which those between are not looked for."""
-BEHIND, KEPT = 16, 40
-"""How many frames of a video are decoded together where it goes backwards, and how many are kept: 1080p takes 6 MB."""
+BEHIND, KEPT, KEPT_BYTES = 16, 40, 256 * 2**20
+"""How many frames of a video are decoded together where it goes backwards, how many are kept, and how large all may be:
+1080p takes 6 MB a frame."""
 Image = npt.NDArray[np.uint8]
 
 
@@ -94,6 +95,8 @@ class CameraFrames:
     ):
         self._media, self._flipped, self._size, self._settings = media, flipped, size, settings
         self._kept: OrderedDict[int, Image] = OrderedDict()
+        self._most = min(KEPT, max(KEPT_BYTES // (3 * size.width * size.height), 2))
+        self._unreadable: set[int] = set()
         self._readers: dict[str, tuple[FrameReader, int]] = {}
 
     def read(self, number: int) -> Image:
@@ -108,15 +111,24 @@ class CameraFrames:
         if number not in self._kept:
             # Backwards: those before it are on the way to it.
             back = number + 1 in self._kept and self._media[number].frame is not None
-            for each in range(number - BEHIND + 1 if back else number, number):
+            behind = min(BEHIND, self._most)
+            for each in range(number - behind + 1 if back else number, number):
                 if each in self._media:
                     self._decode_and_cache(each)
             self._cache_frame(number, self._decode_by_number(number))
         return self._kept[number]
 
     def read_or_none(self, number: int) -> Image | None:
-        """The same; None where it cannot be read."""
-        return self._call_or_none(self.read, number)
+        """The same; None where there is none, and where it cannot be read, which ``unreadable`` names."""
+        picture = self._call_or_none(self.read, number)
+        if picture is None and number in self._media:
+            self._unreadable.add(number)
+        return picture
+
+    @property
+    def unreadable(self) -> tuple[int, ...]:
+        """Numbers of the frames that ``read_or_none`` could not read although there are some."""
+        return tuple(sorted(self._unreadable))
 
     def close(self) -> None:
         """Close the videos."""
@@ -137,7 +149,7 @@ class CameraFrames:
 
     def _cache_frame(self, number: int, picture: Image) -> None:
         self._kept[number] = picture
-        while len(self._kept) > KEPT:
+        while len(self._kept) > self._most:
             self._kept.popitem(last=False)
 
     def _decode_by_number(self, number: int) -> Image:

@@ -10,6 +10,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.soccer.frames import Box
 
 State = Literal["followed", "uncertain"]
 End = Literal["lost", "left", "limit"]
@@ -101,6 +102,12 @@ class FollowedBall:
     sigma_px: float
     confidence: float
     state: State
+
+    @property
+    def box(self) -> Box:
+        """Its box, pixels, to a thousandth."""
+        half, side = self.diameter / 2, round(self.diameter, 3)
+        return Box(round(self.x - half, 3), round(self.y - half, 3), side, side)
 
     def is_same_ball(self, other: FollowedBall) -> bool:
         """Whether another place of the same frame is the same ball."""

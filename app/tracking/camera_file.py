@@ -63,8 +63,12 @@ def frame_cameras_from_bytes(content: bytes) -> list[FrameCamera]:
     """
     try:
         return _decode_frames(content)
+    except InputError:
+        raise
     except Exception as error:
-        raise InputError("the file of cameras is empty or damaged; track the shot again") from error
+        raise InputError(
+            "the file of cameras is empty or damaged", hint="Track the shot again."
+        ) from error
 
 
 def _decode_frames(content: bytes) -> list[FrameCamera]:
@@ -72,7 +76,9 @@ def _decode_frames(content: bytes) -> list[FrameCamera]:
         head = json.loads(arrays["head"].tobytes())
         kept = {name: arrays[name] for name in arrays.files if name != "head"}
     if head["version"] != _VERSION:
-        raise ValueError("the camera file was written in another version of its format")
+        raise InputError(
+            "the file of cameras is of another version of Touchline", hint="Track the shot again."
+        )
     size, reasons = ImageSize(*head["size"]), head["reasons"]
     known = [
         tuple(None if np.isnan(value) else value for value in row)

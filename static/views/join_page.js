@@ -70,7 +70,7 @@ export function JoinPage() {
 		});
 	}, []);
 	return html`
-		<${EntryPage} title="Choose a password" heading=${meant ? titleOf(meant) : 'Choose a password'}>
+		<${EntryPage} title="Choose a password" heading=${meant ? titleOf(meant) : 'Your link'}>
 			${meant ? html`<${Ways} meant=${meant} token=${token} />` : null}
 			${error ? html`<${FormError} error=${error} /><p><a class="button" href="/groups">Log in</a></p>` : null}
 		<//>

@@ -60,7 +60,7 @@ export function QueueEmpty({ q }) {
 	if (dataset.value.hides_groups && !q) {
 		return html`
 			<section class="card empty">
-				<h2>All groups are hidden from you</h2>
+				<h2>No groups to show: they are hidden from you</h2>
 				<p>${HIDDEN_WHY}</p>
 				<p><a class="button button--primary" href="/work">My work</a></p>
 			</section>

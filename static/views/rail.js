@@ -31,7 +31,7 @@ const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCar
  */
 export function Rail({ group, solution, pictures, live }) {
 	return html`
-		<aside class="rail" aria-label="Numbers and verdict">
+		<aside class="rail" aria-label="About this group">
 			<div class="rail__scroll" tabindex="0" role="group" aria-label="Numbers">
 				${isPractice(group.dataset.name) ? html`<${LessonCard} group=${group} />` : null}
 				<${VerdictCard} group=${group} solution=${solution} live=${live} />

@@ -110,7 +110,7 @@ function VersionsOf({ one }) {
 	const close = () => setAsked(null);
 	return html`
 		<div class="page__title">
-			<p>A version never changes: its hash identifies the content, and it can be recomputed at any time.</p>
+			<p>A version never changes, and its hash identifies its content. Verify computes every group again and compares it with what was frozen.</p>
 			<button data-needs="lead" class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
 		</div>
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}

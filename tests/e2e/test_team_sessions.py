@@ -198,7 +198,7 @@ class TestSessions:
             "/groups": "Log in",
             "/login?error=access_denied&state=x": "You are not logged in",
             f"/join#{invited.token}": "Welcome, nils",
-            "/join#used-up": "Choose a password",
+            "/join#used-up": "Your link",
         }.items():
             page.goto("about:blank")
             page.goto(f"{team}{path}")

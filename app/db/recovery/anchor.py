@@ -87,7 +87,7 @@ def _read_anchor_file(database: Path) -> DatabaseAnchor | None:
     except (ValueError, TypeError) as error:
         raise DamagedError(
             f"{path} is damaged: it does not contain the recorded state of the database",
-            hint=f"Run touchline restore BACKUP, or touchline restore {database}.",
+            hint=RESTORE.format(file=database),
         ) from error
 
 

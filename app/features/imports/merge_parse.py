@@ -271,7 +271,7 @@ def _validate_station(station: Station) -> Station:
     )
     for marking in station.lines_with_not_visible:
         if canonical_marking(marking) != marking:
-            raise InputError(f"has {marking}, which is not a pitch marking")
+            raise InputError(f"has spaces around the name of the marking {quote_text(marking)}")
     if (count := count_points(station.lines)) > MAX_POINTS:
         raise InputError(
             f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"

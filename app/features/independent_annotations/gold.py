@@ -159,7 +159,10 @@ def mark_gold_group(store: Store, group_id: int, start: str, *, actor: str) -> G
         )
     with store.write() as session:
         if is_copy_dataset(session, state.dataset_id):
-            raise ConflictError("a person's own annotation cannot be a gold group")
+            raise ConflictError(
+                "an independent annotation cannot be a gold group",
+                hint="Mark the group that it was made from.",
+            )
         insert_gold(session, group_id, state.dataset_id, start, _truth_to_json(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}

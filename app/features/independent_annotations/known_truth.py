@@ -100,7 +100,10 @@ def mark_groups_with_known_truth(
     version = _find_version_of_choice(store, dataset, choice)
     with store.read() as session:
         if is_copy_dataset(session, number):
-            raise ConflictError("a person's own annotation cannot be a gold group")
+            raise ConflictError(
+                "an independent annotation cannot be a gold group",
+                hint="Mark the group that it was made from.",
+            )
         ids = GroupListing(session, number, query.conditions).ids(query.order)
         found = _iterate_sample_truths(session, ids)
         if version is not None:

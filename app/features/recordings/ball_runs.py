@@ -32,7 +32,7 @@ from app.features.recordings.service import Recording, get_recording, require_re
 from app.features.recordings.shots import get_shots
 from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImagePoint
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
 _BATCH = 100
@@ -295,8 +295,7 @@ def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequen
 
 
 def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
-    half = ball.diameter / 2
-    box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
+    box = Box.square(ImagePoint(ball.x, ball.y), ball.diameter)
     return BallAnnotation(box=box, predicted_by=run.ball_source_name)
 
 

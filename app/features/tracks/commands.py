@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import Annotated, Any
 
@@ -94,13 +95,21 @@ def follow(
     unsure = sum(item["state"] == "uncertain" for item in items)
     values = {
         "first": found.first, "last": found.last, "before": found.before, "after": found.after,
+        "unreadable": list(found.unreadable),
         "placed": None if placed is None else placed.changed, "refused": refused, "items": items,
     }  # fmt: skip
     told = f"Frames {found.first} to {found.last}: {plural(len(items), 'view')} without a ball, {unsure} of them uncertain. "
     told += f"It stops at frame {found.first} because {ENDS[found.before]}, and at frame {found.last} because {ENDS[found.after]}."
+    if found.unreadable:
+        told += f" {_format_unreadable_frames(found.unreadable)}"
     if placed is not None:
         told += f" {plural(placed.changed, 'ball')} placed.{_format_unchanged_groups(refused)}"
     _print_result(values, json_, told)
+
+
+def _format_unreadable_frames(numbers: Sequence[int]) -> str:
+    named = ", ".join(map(str, numbers[:5])) + (", …" if len(numbers) > 5 else "")
+    return f"{plural(len(numbers), 'frame')} cannot be read, and the ball was followed without them: {named}."
 
 
 def _format_unchanged_groups(groups: int) -> str:

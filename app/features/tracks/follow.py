@@ -5,7 +5,7 @@ Nothing is stored. What comes of it is a proposal; a person accepts it as an edi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -27,7 +27,7 @@ from app.geometry.camera import Camera
 from app.media.camera_frames import CameraFrames, Image, ViewFrame, map_frames_by_number
 from app.media.frames import make_picture_error
 from app.soccer.annotation import BallAnnotation, make_followed_source
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Media
 from app.soccer.solution import ViewSolution
 from app.tracking.ball_expected import make_expected_place, project_ray_segment
@@ -40,6 +40,8 @@ EACH_WAY, MOST_EACH_WAY = 100, 250
 """Frames that a ball is followed to either side, unless somebody asks for others; and at most."""
 MOST_GROUPS = 100
 """Groups to either side: what is accepted is one request."""
+MOST_STEP = 5
+"""Frames from one to the next: within more of them a ball goes farther than it is looked for."""
 UNSEEN = 24
 """Frames in a row that nobody has, beyond which there is no way on."""
 FollowEnd = Literal["lost", "left", "known", "end", "limit"]
@@ -120,6 +122,7 @@ class FollowedViews:
         before, after: Why no further: it is ``lost``, it ``left`` the picture, a ball is ``known`` there, the
             sequence is at its ``end``, or no more was asked for (``limit``).
         sized: Whether the camera is known, and with it how large the ball is.
+        unreadable: Frames that are there and could not be read: the ball was followed without them.
         items: By frame.
     """
 
@@ -132,16 +135,21 @@ class FollowedViews:
     before: FollowEnd
     after: FollowEnd
     sized: bool
+    unreadable: tuple[int, ...]
     items: tuple[FollowedView, ...]
 
 
 @dataclass(frozen=True)
 class FollowedSequence:
-    """A run through a sequence, and why it ends; None: nothing near the click looks like a ball."""
+    """A run through a sequence, and why it ends; None: nothing near the click looks like a ball.
+
+    ``unreadable`` are the frames that are there and could not be read.
+    """
 
     run: BallRun | None
     before: FollowEnd = "lost"
     after: FollowEnd = "lost"
+    unreadable: tuple[int, ...] = ()
 
 
 def plan_ball_following(
@@ -381,6 +389,7 @@ def build_followed_views(question: FollowTask, found: FollowedSequence) -> Follo
         found.before,
         found.after,
         question.sequence.camera is not None,
+        found.unreadable,
         tuple(items),
     )
 
@@ -423,9 +432,7 @@ def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> 
     source = make_followed_source(found.group)
 
     def make_view_edits(one: FollowedView) -> ViewEdits:
-        ball, half = one.ball, one.ball.diameter / 2
-        box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
-        annotation = BallAnnotation(box=box, predicted_by=source)
+        annotation = BallAnnotation(box=one.ball.box, predicted_by=source)
         return ViewEdits(
             one.view, None, one.etag, lambda key: [make_set_ball_edit(key, annotation)]
         )
@@ -479,7 +486,9 @@ def follow_ball_in_sequence(
     """The work of the process."""
     media = map_frames_by_number(asked.views, settings)
     frames = CameraFrames(media, flipped, asked.size, settings)
-    click, numbers = asked.click, _fill_frame_gaps(sorted(media))
+    click = asked.click
+    _require_near_frame(media, click.frame)
+    numbers = _fill_frame_gaps(sorted(media))
     before = [number for number in reversed(numbers) if number < click.frame]
     after = [number for number in numbers if number > click.frame]
     ways = before[: asked.each_way], after[: asked.each_way]
@@ -512,7 +521,23 @@ def follow_ball_in_sequence(
         run,
         find_end_reason(run.before, ways[0], before, ends[0]),
         find_end_reason(run.after, ways[1], after, ends[1]),
+        frames.unreadable,
     )
+
+
+def _require_near_frame(frames: Iterable[int], clicked: int) -> None:
+    """Refuse frames so far apart that a ball in one says nothing of where it is in the next.
+
+    Raises:
+        InputError: All others are too far from the clicked one.
+    """
+    nearest = min((abs(number - clicked) for number in frames if number != clicked), default=0)
+    if nearest > MOST_STEP:
+        raise InputError(
+            f"the nearest other frame of this camera is {nearest} frames away; a ball is followed"
+            f" through frames that are at most {MOST_STEP} apart",
+            hint="Put the files of the frames between beside those of the groups, or place each ball by hand.",
+        )
 
 
 def _fill_frame_gaps(numbers: Sequence[int]) -> list[int]:

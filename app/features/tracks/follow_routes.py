@@ -66,9 +66,7 @@ class FollowedViewDocument(Document):
     @staticmethod
     def of(found: FollowedView) -> FollowedViewDocument:
         """The document of a view."""
-        ball, half = found.ball, found.ball.diameter / 2
-        corner = round(ball.x - half, 3), round(ball.y - half, 3)
-        side = round(ball.diameter, 3)
+        ball, box = found.ball, found.ball.box
         return FollowedViewDocument(
             group=found.group,
             key=found.key,
@@ -76,7 +74,7 @@ class FollowedViewDocument(Document):
             view=found.view,
             frame=found.frame,
             etag=found.etag,
-            box=(*corner, side, side),
+            box=(box.x, box.y, box.width, box.height),
             sigma_px=round(ball.sigma_px, 3),
             confidence=round(ball.confidence, 3),
             state=ball.state,
@@ -100,6 +98,9 @@ class FollowedBallDocument(Document):
     )
     after: FollowEnd = Field(description="Why it ends there.")
     sized: bool = Field(description="Whether a camera says how large the ball is.")
+    unreadable: list[int] = Field(
+        description="Numbers of frames that are there and cannot be read; the ball was followed without them."
+    )
     items: list[FollowedViewDocument] = Field(
         description="Views that have no ball yet, by frame; those that have one keep it."
     )
@@ -113,7 +114,18 @@ class FollowedBallDocument(Document):
         )
 
 
-_SAME = ("view", "group", "camera", "frame", "first", "last", "before", "after", "sized")
+_SAME = (
+    "view",
+    "group",
+    "camera",
+    "frame",
+    "first",
+    "last",
+    "before",
+    "after",
+    "sized",
+    "unreadable",
+)
 
 
 @router.post(

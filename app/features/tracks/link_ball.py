@@ -138,7 +138,10 @@ def run_link_by_ball_job(store: Store, progress: JobProgress) -> Json:
                 stop=progress.check,
             )
         except WorkerEnded as error:
-            raise TooLargeError(f"the search for the time map {error}") from error
+            raise TooLargeError(
+                f"the search for the offset and speed of the replay {error}",
+                hint="Link two frames by hand, or try it again.",
+            ) from error
     return asdict(found)
 
 

@@ -50,7 +50,7 @@ export function MarkingCard({ picture }) {
 	const none = chosen ? null : 'Choose a marking first';
 	const absent = there ? null : chosen ? 'This marking has no points yet' : 'Choose a marking first';
 	return html`
-		<section class="card marking-card" aria-label="Selected marking">
+		<section class="card marking-card" aria-label="Chosen marking">
 			<h2>${chosen?.marking ?? 'No marking chosen'}</h2>
 			<div class="marking-card__actions">
 				<${Action} label=${mode.value === 'draw' ? 'Done' : 'Draw'} keys="N" run=${toggleDrawing} off=${none} pressed=${mode.value === 'draw'} />

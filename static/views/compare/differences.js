@@ -59,7 +59,7 @@ export function NumberCard({ names, limits, letter }) {
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-numbers">
 			<h2 id="compare-numbers">In numbers<span class="card__aside">view <${Letter} letter=${letter} /></span></h2>
-			<div class="compare__scroll" tabindex="0" role="group" aria-label="Numbers of the view">
+			<div class="compare__scroll" tabindex="0" role="group" aria-label="How far the two annotations are apart">
 				<table class="numbers compare__numbers"><tbody>
 					<${BallRows} view=${view} names=${names} limits=${limits} />
 					<${Row} label=${`JaC, camera of ${names[0]} on lines of ${names[1]}`} value=${fixed(view.jac[0], 2)} grade=${gradeOf(view.jac[0], limits.jac, true)} />

@@ -63,7 +63,7 @@ function Toggles() {
 	return html`
 		<div class="buttons compare__toggles" role="group" aria-label="What the pictures show">
 			<${Toggle} label="The other’s" letter="O" on=${others.value} flip=${() => { others.value = !others.value; }} />
-			<${Toggle} label="Projected" letter="P" on=${projections.value} flip=${() => { projections.value = !projections.value; }} />
+			<${Toggle} label="Projected lines" letter="P" on=${projections.value} flip=${() => { projections.value = !projections.value; }} />
 			<${Toggle} label="Boxes" letter="B" on=${boxes.value} flip=${() => { boxes.value = !boxes.value; }} />
 			<${Toggle} label="Ball" letter="Z" on=${false} flip=${zoomIn} />
 		</div>

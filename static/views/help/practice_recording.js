@@ -45,7 +45,7 @@ export function RecordingPracticePart({ onLeave }) {
 				${lessons.length === 0 ? html`<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(false)}>Make the recording</button>`
 					: html`
 						${next ? html`<a class="button" href=${place(next.frame)} onClick=${onLeave}>Go to: ${NAMES[next.name].toLowerCase()}</a>` : null}
-						<button class="button" type="button" onClick=${reload}>Compare again</button>
+						<button class="button" type="button" onClick=${reload}>Check again</button>
 						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Restart the practice</button>`}
 			</p>
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}

@@ -46,6 +46,6 @@ export function keysOfRecording(one, shots, doing) {
 		{ keys: ['a'], label: 'Keep the shot', group: edit, needs: 'annotate', run: () => set({ kept: true }, 'The shot is kept.') },
 		{ keys: ['x'], label: 'Drop the shot', group: edit, needs: 'annotate', run: () => set({ kept: false }, 'The shot is dropped.') },
 		{ keys: ['Ctrl+z'], label: 'Undo the last change of the shots', group: edit, needs: 'annotate', run: () => doing.current.undo() },
-		{ keys: ['i'], label: 'Choose this frame as an instant, or clear it', group: edit, run: () => doing.current.turn(wanted.value) },
+		{ keys: ['i'], label: 'Choose this frame as an instant; again: do not', group: edit, run: () => doing.current.turn(wanted.value) },
 	];
 }

@@ -155,5 +155,5 @@ class TestWriteIssia3d:
     def test_groups_of_other_datasets_are_refused(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:
-        with pytest.raises(InputError, match="is not from ISSIA"):
+        with pytest.raises(InputError, match="cannot be from ISSIA"):
             write_issia_3d(tmp_path, [solved(soccer_group())])

@@ -21,7 +21,7 @@ def test_frames_come_back_exactly_and_the_same_frames_are_the_same_bytes():
 
 @pytest.mark.parametrize("content", [b"", b"no file", b"PK\x03\x04"])
 def test_what_is_no_such_file_is_refused(content: bytes):
-    with pytest.raises(InputError, match="track the shot again"):
+    with pytest.raises(InputError, match="empty or damaged"):
         frame_cameras_from_bytes(content)
     whole = frame_cameras_to_bytes([frame(0, "tracked")])
     with pytest.raises(InputError):

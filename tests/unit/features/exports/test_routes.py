@@ -128,7 +128,7 @@ class TestMakeExport:
             ({"images": "copy"}, 400, "/images", "no image file of"),
             ({"version": "v1"}, 400, "/all", "its own groups"),
             ({"format": "touchline", "version": 1}, 400, "/version", "whole dataset"),
-            ({"format": "issia-3d"}, 400, None, "is not from ISSIA"),
+            ({"format": "issia-3d"}, 400, None, "cannot be from ISSIA"),
             ({"all": False, "version": "v9"}, 404, None, "no version"),
         ],
     )

@@ -381,7 +381,7 @@ class TestPossibleFormats:
         answers = {one.format: one for one in list_format_availability(store, "demo")}
         refused = [name for name, one in answers.items() if one.reason is not None]
         assert refused == ["issia-3d", "issia", *TRACKS]
-        assert "is not from ISSIA" in answers["issia"].reason
+        assert "cannot be from ISSIA" in answers["issia"].reason
         assert tuple(answers) == FORMATS
 
     def test_of_static_cameras_it_is_the_other_way_round(self, store, fill, make_static) -> None:
@@ -393,7 +393,7 @@ class TestPossibleFormats:
         assert not {"issia", "issia-3d"} & refused
 
     def test_an_export_that_is_refused_names_the_formats_that_fit(self, store, three) -> None:
-        with pytest.raises(InputError, match="is not from ISSIA") as caught:
+        with pytest.raises(InputError, match="cannot be from ISSIA") as caught:
             require_exportable(store, "demo", "issia", everything=True)
         assert caught.value.hint is not None
         named = caught.value.hint.removesuffix(".").partition(": ")[2].split(", ")

@@ -92,6 +92,18 @@ class TestFollowView:
         assert [item.frame - FIRST for item in found.items] == [0, 5, 15, 20]
         assert max(off(found).values()) < 1.0
 
+    def test_frames_that_cannot_be_read_are_passed_and_named(
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
+        for number in (FIRST + 7, FIRST + 12):
+            (folder / CAMERA / f"{number:06d}.jpg").write_bytes(b"no picture")
+        found = follow_ball_from_view(store, frames, view_of(store, ids[10]))
+        assert found.unreadable == (FIRST + 7, FIRST + 12)
+        states = {item.frame - FIRST: item.ball.state for item in found.items}
+        assert states[7] == states[12] == "uncertain"
+        assert (found.first, found.last) == (FIRST, FIRST + COUNT - 1)
+
     def test_it_ends_at_balls_that_are_there_and_leaves_them(
         self, store: Store, fill: Fill, frames: BallFollower, folder: Path
     ) -> None:
@@ -254,6 +266,20 @@ class TestRefusals:
     ) -> None:
         group = filmed_groups(folder, 1, CAMERA, said=[FIRST])[0]
         assert "no other group" in self.refused(store, frames, fill(group)[0])
+
+    def test_of_groups_too_far_apart(
+        self, store: Store, fill: Fill, frames: BallFollower, folder: Path
+    ) -> None:
+        every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
+        kept = [group for group in every if int(group.key) in (FIRST, CLICKED, FIRST + 20)]
+        for path in (folder / CAMERA).iterdir():
+            if path.stem not in {f"{int(group.key):06d}" for group in kept}:
+                path.unlink()
+        ids = fill(*kept)
+        with pytest.raises(
+            InputError, match="nearest other frame of this camera is 10 frames away"
+        ):
+            follow_ball_from_view(store, frames, view_of(store, ids[1]))
 
     def test_without_a_frame(
         self, store: Store, fill: Fill, frames: BallFollower, folder: Path
