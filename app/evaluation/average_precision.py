@@ -20,8 +20,8 @@ from app.evaluation.frame import JudgedFrame, iou
 from app.evaluation.result import (
     Axis,
     Cell,
+    Chart,
     Column,
-    Figure,
     FrameRange,
     FrameResult,
     Panel,
@@ -256,7 +256,7 @@ def make_average_precision_table(judged: Sequence[JudgedFrame], resamples: Match
     return Table("detection", "Detection", COLUMNS, (row,), note)
 
 
-def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Figure:
+def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Chart:
     """Precision against recall at IoU 0.5 and 0.75."""
     hits = match_detections_to_balls(judged)
     balls = int(hits.balls.sum())
@@ -270,7 +270,7 @@ def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Figure:
         series,
     )
     note = f"{balls} balls in {len(judged)} frames, {len(hits.scores)} detections."
-    return Figure("precision_recall", "Precision against recall", (panel,), note)
+    return Chart("precision_recall", "Precision against recall", (panel,), note)
 
 
 def _make_curve_series(hits: SortedDetections, index: int, words: str) -> Series:
@@ -338,7 +338,7 @@ SIZE = ErrorBins(
 MAX_NAMED = 500
 
 
-def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
+def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Chart:
     """Median error of hits in each bin, with the quarters around it, and the frames themselves."""
     kept = [frame for frame in frames if frame.error_m is not None]
     inside: dict[int, list[float]] = {}
@@ -366,7 +366,7 @@ def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
         (_make_scatter_series(kept, bins.field), middle),
     )
     note = f"{plural(len(kept), 'frame')} with a detection of IoU > 0, oracle cameras."
-    return Figure(bins.figure, bins.title, (panel,), note)
+    return Chart(bins.figure, bins.title, (panel,), note)
 
 
 def make_detection_table_by_bin(

@@ -15,8 +15,8 @@ from app.evaluation.frame import Frame
 from app.evaluation.result import (
     Axis,
     Cell,
+    Chart,
     Column,
-    Figure,
     FrameRange,
     Panel,
     ReferenceLine,
@@ -228,14 +228,14 @@ def make_cameras_table(
     return Table("calibration", "Calibration against annotated lines", COLUMNS, made, note)
 
 
-def make_jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
+def make_jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Chart:
     """Share of frames whose JaC is above a threshold, for each gamma."""
     panels = tuple(_make_jac_panel(name, label, scores, min_jac) for name, label, scores in rows)
     note = (
         f"{len(rows[0][2]) if rows else 0} frames with annotated lines. Points of the predicted "
         f"cameras at γ = {GAMMAS_PERCENT[0]:g} % open their frames."
     )
-    return Figure("jac", "Frames above a JaC", panels, note)
+    return Chart("jac", "Frames above a JaC", panels, note)
 
 
 def _make_score_row(

@@ -35,9 +35,9 @@ from app.evaluation.localization import (
 )
 from app.evaluation.result import (
     Axis,
+    Chart,
     Column,
     Evaluation,
-    Figure,
     FrameRange,
     FrameResult,
     Panel,
@@ -107,7 +107,7 @@ def make_boxes_table(
 
 def make_boxes_figure(
     frames: Sequence[Frame], careful: Mapping[int, Box], distances: Mapping[int, float]
-) -> Figure:
+) -> Chart:
     """IoU and size error of each box of each frame, over the distance of the ball.
 
     Args:
@@ -134,7 +134,7 @@ def make_boxes_figure(
         )
         for title, axis, measure in measures
     )
-    return Figure("box_overlap", "Boxes against reference boxes", panels, note)
+    return Chart("box_overlap", "Boxes against reference boxes", panels, note)
 
 
 def _make_scatter_series(
@@ -255,7 +255,7 @@ def evaluate(
     say(2, 4, "Average precision")
     tables, figures = [], []
     if inputs.detections is not None:
-        tables += list(_make_detection_tables(judged, results, inputs, resamples))
+        tables += list(_make_detection_and_localization_tables(judged, results, inputs, resamples))
         figures += list(_make_detection_figures(judged, results, inputs))
     if inputs.careful is not None:
         tables.append(
@@ -337,7 +337,7 @@ def _find_frame_jac(scores: Scores, frame: int) -> float | None:
     return 0.0 if score is None else score.jac[0]
 
 
-def _make_detection_tables(
+def _make_detection_and_localization_tables(
     judged: Sequence[JudgedFrame],
     results: Sequence[FrameResult],
     inputs: EvaluationInputs,
@@ -351,7 +351,7 @@ def _make_detection_tables(
 
 def _make_detection_figures(
     judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: EvaluationInputs
-) -> Iterator[Figure]:
+) -> Iterator[Chart]:
     yield make_precision_recall_figure(judged)
     yield make_precision_distance_figure(results, predicted=inputs.cameras is not None)
     for bins in (DISTANCE, PARALLAX, SIZE):
@@ -360,7 +360,7 @@ def _make_detection_figures(
 
 def _measure_sensitivity(
     frames: Sequence[Frame], options: EvaluationOptions
-) -> tuple[Table, Figure]:
+) -> tuple[Table, Chart]:
     able = len(sensitivity.choose_frames(frames, options.seed, len(frames)))
     chosen = sensitivity.choose_frames(frames, options.seed)
     samples = [

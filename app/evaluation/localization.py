@@ -13,8 +13,8 @@ from app.evaluation.frame import Detection, Frame, JudgedFrame, iou
 from app.evaluation.result import (
     Axis,
     Cell,
+    Chart,
     Column,
-    Figure,
     FrameRange,
     FrameResult,
     Panel,
@@ -163,7 +163,7 @@ def make_localization_table(
     return Table("localization", "3D from one view", COLUMNS, tuple(rows), note)
 
 
-def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: bool) -> Figure:
+def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: bool) -> Chart:
     """Share of frames within a distance, against the distance."""
     balls = [frame for frame in frames if frame.ball and frame.distance_m is not None]
     places = (np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
@@ -186,7 +186,7 @@ def make_precision_distance_figure(frames: Sequence[FrameResult], *, predicted: 
         (ReferenceLine("x", NEAR_M, "2 m"),),
     )
     note = f"Solid: {OVERLAPPING}. Dashed: {EVERYWHERE} ({len(balls)})."
-    return Figure("precision_distance", "Precision against distance", (panel,), note)
+    return Chart("precision_distance", "Precision against distance", (panel,), note)
 
 
 def _make_hits_row(

@@ -175,7 +175,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Chart:
     """Panels side by side; ``note`` says over what it was computed."""
 
     name: str
@@ -184,7 +184,7 @@ class Figure:
     note: str = ""
 
 
-def figure_to_csv(figure: Figure) -> str:
+def figure_to_csv(figure: Chart) -> str:
     """The curves of a figure; the header says what the axes show, with their units."""
     x, y = (
         _join_axis_labels([panel.x for panel in figure.panels]),
@@ -311,7 +311,7 @@ class Evaluation:
 
     counts: Mapping[str, int]
     tables: tuple[Table, ...]
-    figures: tuple[Figure, ...]
+    figures: tuple[Chart, ...]
     frames: tuple[FrameResult, ...]
 
     def table(self, name: str) -> Table | None:
@@ -339,7 +339,7 @@ MAX_LEGEND = 6
 _STYLED = Lock()
 
 
-def figure_to_png(figure: Figure) -> bytes:
+def figure_to_png(figure: Chart) -> bytes:
     """The bytes of a PNG, panels side by side, title above and note below.
 
     Raises:

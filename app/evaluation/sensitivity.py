@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.evaluation.frame import Frame
-from app.evaluation.result import Axis, Cell, Column, Figure, Panel, Row, Series, Table
+from app.evaluation.result import Axis, Cell, Chart, Column, Panel, Row, Series, Table
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import position_from_diameter
@@ -137,7 +137,7 @@ def _error_slopes_of_wide_lens(
     return away / diameter, float(np.linalg.norm(locate_ball(0.5) - locate_ball(-0.5)))
 
 
-def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Figure:
+def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Chart:
     """Both panels, a curve per ball coloured by its distance, the derivative dashed beside it."""
     color = Axis("Distance to the camera", "m")
     size = Panel(
@@ -167,7 +167,7 @@ def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Figure:
         color=color,
     )
     note = f"{len(samples)} balls, from their optimised boxes; dashed: the analytic derivative."
-    return Figure("sensitivity", "Sensitivity of the ball from one view", (size, shift), note)
+    return Chart("sensitivity", "Sensitivity of the ball from one view", (size, shift), note)
 
 
 def make_sensitivity_table(samples: Sequence[BallSensitivity], able: int) -> Table:

@@ -15,9 +15,9 @@ from app.evaluation.prediction_table import KINDS
 from app.evaluation.result import (
     Axis,
     Cell,
+    Chart,
     Column,
     Evaluation,
-    Figure,
     Panel,
     ReferenceLine,
     Row,
@@ -322,7 +322,7 @@ def _count_matched_events(true: Sequence[float], said: Sequence[float], slack: f
     return hits
 
 
-def _make_share_within_distance_figure(error: FloatArray) -> Figure:
+def _make_share_within_distance_figure(error: FloatArray) -> Chart:
     """Share of frames within a distance, against the distance."""
     places = (np.arange(round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     below = np.searchsorted(np.sort(error[np.isfinite(error)]), places, side="left")
@@ -346,7 +346,7 @@ def _make_share_within_distance_figure(error: FloatArray) -> Figure:
         (ReferenceLine("x", NEAR_M, "2 m"),),
     )
     note = "Solid: frames with a predicted ball. Dashed: all frames with a true one."
-    return Figure("track_distance", "Precision of tracks against distance", (panel,), note)
+    return Chart("track_distance", "Precision of tracks against distance", (panel,), note)
 
 
 def _describe_counts(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import InputError
-from app.formats.viper_reader import ViperTrack
+from app.formats.viper_reader import ViperVideo
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
@@ -126,7 +126,7 @@ _WRITTEN_HERE = re.compile(r"cam\d{1,3}", re.ASCII)
 
 
 def find_cameras_with_mirrored_people(
-    tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], widths: Mapping[int, int]
+    tracks: Mapping[int, ViperVideo], given: Mapping[int, Camera], widths: Mapping[int, int]
 ) -> list[int]:
     """Numbers of the cameras whose people are to be turned.
 
@@ -155,7 +155,7 @@ def find_cameras_with_mirrored_people(
     return found
 
 
-def mirror_people(track: ViperTrack, width: int) -> ViperTrack:
+def mirror_people(track: ViperVideo, width: int) -> ViperVideo:
     """The track with its people turned left to right.
 
     A box covers the columns from x to x + width - 1, as ViPER counts them: of a picture of W columns
@@ -171,7 +171,7 @@ def mirror_people(track: ViperTrack, width: int) -> ViperTrack:
 
 
 def _measure_person_distances(
-    number: int, tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], width: int
+    number: int, tracks: Mapping[int, ViperVideo], given: Mapping[int, Camera], width: int
 ) -> FloatArray:
     """How far the same person lies from where another camera puts it, as written and turned, metres,
     shape (N, 2)."""
@@ -190,7 +190,7 @@ def _measure_person_distances(
     return np.array(rows).reshape(-1, 2)
 
 
-def locate_people_on_grass(camera: Camera, track: ViperTrack, frame: int) -> dict[str, FloatArray]:
+def locate_people_on_grass(camera: Camera, track: ViperVideo, frame: int) -> dict[str, FloatArray]:
     """Where the people of a frame stand, metres from the centre mark, shape (2,) each, by id.
 
     That is where the camera sees the middle of the lower edge of their box on the grass; whose it

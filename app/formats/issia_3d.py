@@ -36,7 +36,7 @@ from app.formats.issia_reader import (
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree_context
 from app.formats.view_files import SortedSpill, open_spill
-from app.formats.viper_reader import ViperTrack
+from app.formats.viper_reader import ViperVideo
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.soccer.frames import ImagePoint
@@ -135,7 +135,7 @@ def _read_ball_centers(
             report.add_problem_at(place.path, place.record, f"cam{axis[1]}", f"{error}; left out")
             continue
         if point is not None:
-            track = found.tracks.setdefault(int(axis[1]), ViperTrack())
+            track = found.tracks.setdefault(int(axis[1]), ViperVideo())
             track.balls.setdefault(frame, []).append(point)
 
 

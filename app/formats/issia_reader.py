@@ -24,7 +24,7 @@ from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
 from app.formats.trees import FolderTree, open_tree_context
-from app.formats.viper_reader import ViperTrack, is_viper, read_viper
+from app.formats.viper_reader import ViperVideo, is_viper, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
@@ -65,7 +65,7 @@ class IssiaOptions:
     calibration: str | None = None
     size: ImageSize | None = None
 
-    def get_image_size(self, track: ViperTrack) -> ImageSize:
+    def get_image_size(self, track: ViperVideo) -> ImageSize:
         """Size of the images of a camera."""
         return self.size or track.size or DEFAULT_SIZE
 
@@ -80,7 +80,7 @@ class IssiaOptions:
 class IssiaFolder:
     """A folder as read: one track and one station per camera, by camera number."""
 
-    tracks: dict[int, ViperTrack] = field(default_factory=dict)
+    tracks: dict[int, ViperVideo] = field(default_factory=dict)
     stations: dict[int, Station] = field(default_factory=dict)
     videos: dict[int, str] = field(default_factory=dict)
     frames: dict[tuple[int, int], Media] = field(default_factory=dict)
@@ -124,7 +124,7 @@ class IssiaFolder:
         return View(f"cam{camera}", self.stations[camera], balls, media, extras=extras)
 
 
-def _make_person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...]:
+def _make_person_boxes(track: ViperVideo, frame: int) -> tuple[Mapping[str, Any], ...]:
     """Boxes in the shape of SoccerNet's, so that all datasets show them alike; by id."""
     persons = sorted(track.persons.get(frame, ()), key=lambda item: (item[0].zfill(12), item[1:]))
     return tuple(
@@ -268,8 +268,8 @@ def _read_tracks(
 
 
 def _assign_tracks_to_cameras(
-    stem: str, tracks: list[ViperTrack], shown: str, report: ReaderReport
-) -> Iterator[tuple[int | None, ViperTrack]]:
+    stem: str, tracks: list[ViperVideo], shown: str, report: ReaderReport
+) -> Iterator[tuple[int | None, ViperVideo]]:
     """Each source of a file with the number of its camera.
 
     One source is that of the file. Of several each must name its own camera; where they do not,
@@ -295,7 +295,7 @@ def _assign_tracks_to_cameras(
 
 
 def _report_size_difference(
-    camera: int, track: ViperTrack, shown: str, options: IssiaOptions, report: ReaderReport
+    camera: int, track: ViperVideo, shown: str, options: IssiaOptions, report: ReaderReport
 ) -> None:
     """Say which size counts where file and options differ."""
     size = options.get_image_size(track)
@@ -306,8 +306,8 @@ def _report_size_difference(
         )
 
 
-def _shift_frames(track: ViperTrack, offset: int) -> ViperTrack:
-    return ViperTrack(
+def _shift_frames(track: ViperVideo, offset: int) -> ViperVideo:
+    return ViperVideo(
         {frame - offset: points for frame, points in track.balls.items()},
         {frame - offset: boxes for frame, boxes in track.persons.items()},
         {frame - offset: notes for frame, notes in track.ball_notes.items()},

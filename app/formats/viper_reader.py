@@ -49,7 +49,7 @@ _BROKEN = (EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, OSError)
 
 
 @dataclass
-class ViperTrack:
+class ViperVideo:
     """What one source (video) of an XGTF file says, by its own frame numbers.
 
     Attributes:
@@ -90,7 +90,7 @@ def is_viper(tree: FileTree, name: str) -> bool:
 
 def read_viper(
     tree: FileTree, name: str, report: ReaderReport, limits: ImportLimits = DEFAULT_LIMITS
-) -> list[ViperTrack]:
+) -> list[ViperVideo]:
     """The annotations of one XGTF file, plain or ``.gz``: one track for each source, at least one.
 
     A DTD, and with it every entity, is refused. A damaged file keeps what was read before the
@@ -149,7 +149,7 @@ class _ViperFileReader:
     """One file on its way to tracks."""
 
     def __init__(self, shown: str, report: ReaderReport):
-        self.tracks = [ViperTrack()]
+        self.tracks = [ViperVideo()]
         self._shown, self._report = shown, report
         self._sources = self._entries = self._frames = 0
         self._left_out: Counter[tuple[str, str]] = Counter()
@@ -178,7 +178,7 @@ class _ViperFileReader:
                 # What was read is let go, or a long file would stay in memory.
                 del open_elements[-1][:]
 
-    def finish_tracks(self) -> list[ViperTrack]:
+    def finish_tracks(self) -> list[ViperVideo]:
         """The tracks; reports what was not read, a line for each kind of object and shape."""
         for (name, what), count in self._left_out.items():
             entries = plural(count, "entry is", "entries are")
@@ -194,7 +194,7 @@ class _ViperFileReader:
     def _begin_source(self, name: str) -> None:
         self._sources += 1
         if self._sources > 1:
-            self.tracks.append(ViperTrack())
+            self.tracks.append(ViperVideo())
         self.tracks[-1].source = name
 
     def _read_entry(self, item: Element, attribute: Element, owner: Element) -> None:

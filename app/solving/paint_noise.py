@@ -152,10 +152,10 @@ def estimate_paint_noise(
 CROWN, INWARD, LINES = 0, 1, slice(2, 2 + len(MARKINGS))
 SIZES = slice(2 + len(MARKINGS), 4 + len(MARKINGS))
 TERMS = 4 + len(MARKINGS)
-"""Columns of ``paint_derivatives_by_pitch_and_marking``: crown, inward, each marking, length and width."""
+"""Columns of ``paint_derivatives_by_all_terms``: crown, inward, each marking, length and width."""
 
 
-def paint_derivatives_by_pitch_and_marking(
+def paint_derivatives_by_all_terms(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:
     """``paint_derivatives_by_pitch`` with a column for each marking, seen or not, shape (N, TERMS)."""
@@ -173,7 +173,7 @@ def compute_paint_shift(
     Args:
         places: Of the paint, pitch frame, metres, shape (N, 2).
         marking: Index into ``MARKINGS``, shape (N,).
-        values: Of the columns of ``paint_derivatives_by_pitch_and_marking``, in their standard deviations, shape (TERMS,).
+        values: Of the columns of ``paint_derivatives_by_all_terms``, in their standard deviations, shape (TERMS,).
         pitch: The pitch, of the size that it has.
     """
     inside = INWARD_SIGMA_M * values[INWARD] * (marking != _MIDDLE)

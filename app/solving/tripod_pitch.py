@@ -47,7 +47,7 @@ from app.solving.paint_noise import (
     PaintOffsets,
     cautious_point_weights_by_marking,
     compute_paint_shift,
-    paint_derivatives_by_pitch_and_marking,
+    paint_derivatives_by_all_terms,
     shift_offsets,
 )
 from app.solving.pitch_size import CERTAIN_SIGMAS, LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
@@ -339,7 +339,7 @@ class _TripodProblem:
         level = MAIN_SIGMA[0] ** -2.0
         for at in range(count):
             seen = self.measure_frame_offsets(at)
-            terms = paint_derivatives_by_pitch_and_marking(
+            terms = paint_derivatives_by_all_terms(
                 self._grass[at], seen.marking, seen.jacobian, self._plan
             )
             robust = self._problem.robust_weights(seen.offsets, seen.sigmas)

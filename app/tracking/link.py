@@ -130,13 +130,13 @@ def _split_into_pieces(
             maps.append(one)
     left = [
         rows
-        for rows in _split_by_best_map(fit, [best], none=True)
+        for rows in _find_stretches_by_map(fit, [best], none=True)
         if fit.has_enough_pairs(best, rows)
     ]
     for rows in left:
         near = LinkFit(live, replay.part(rows), fit.hints[:0])
         maps += [one for one in map(near.refine_map, near.find_candidate_maps()) if one is not None]
-    parts = [replay.part(rows) for rows in _split_by_best_map(fit, maps)]
+    parts = [replay.part(rows) for rows in _find_stretches_by_map(fit, maps)]
     pieces: list[TimeMap] = []
     for part in parts if len(parts) > 1 else ():
         piece = fit_time_map(live, part, fit.hints[:0], whole=False)
@@ -156,7 +156,7 @@ def _split_into_pieces(
     return made
 
 
-def _split_by_best_map(
+def _find_stretches_by_map(
     fit: LinkFit, maps: Sequence[LinearTimeMap], none: bool = False
 ) -> list[IntArray]:
     """Rays of the replay that follow each other and fit one map best; or with ``none`` no map."""

@@ -47,7 +47,7 @@ from app.solving.paint_noise import (
     TERMS,
     PaintOffsets,
     cautious_point_weights_by_marking,
-    paint_derivatives_by_pitch_and_marking,
+    paint_derivatives_by_all_terms,
     point_weights_by_marking,
     shift_offsets,
 )
@@ -383,9 +383,7 @@ class _ShotProblem:
             seen = self._measure_all_offsets()[place]
             assert seen is not None
             grass = project_paint_to_grass(frame, self._size)
-            own = paint_derivatives_by_pitch_and_marking(
-                grass, seen.marking, seen.jacobian, self._pitch
-            )
+            own = paint_derivatives_by_all_terms(grass, seen.marking, seen.jacobian, self._pitch)
             weighted = seen.jacobian * self._compute_paint_weights(seen)[:, None]
             terms[place] = weighted.T @ own
         return equations.covariances(terms)

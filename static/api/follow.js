@@ -28,6 +28,7 @@ import { idempotencyKey, request } from './client.js';
  * @property {FollowEnd} before why it begins there
  * @property {FollowEnd} after why it ends there
  * @property {boolean} sized whether a camera says how large it is
+ * @property {number[]} unreadable numbers of frames that are there and cannot be read
  * @property {FollowedItem[]} items
  */
 /** @typedef {{view: number, etag: string, ball: {box: number[], followed_from: string} | null}} BallItem */

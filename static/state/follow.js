@@ -6,6 +6,7 @@
 
 import { computed, signal } from '@preact/signals';
 
+import { getGroup } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { editBalls, followBall } from '../api/follow.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
@@ -111,7 +112,7 @@ export async function acceptFollowed(items) {
 	/** @type {FollowDone} */
 	const action = {
 		kind: 'follow', dataset: at.dataset, from, text: `${plural(items.length, 'ball')} followed from group ${from}`,
-		items: items.map(({ view, etag, box }) => ({ view, etag, box })),
+		items: items.map(({ group: id, view, etag, box }) => ({ group: id, view, etag, box })),
 	};
 	const asked = new Set(items.map(({ view }) => view));
 	const left = at.found.items.filter(({ view }) => !asked.has(view));
@@ -141,7 +142,7 @@ export function nextUnsure() {
 	if (next) navigate(reviewAddress(next.group));
 }
 
-/** Take accepted balls away again; what was edited since stays. @param {FollowDone} action */
+/** Take accepted balls away again; a ball that was edited since stays. @param {FollowDone} action */
 export async function undoFollow(action) {
 	const done = await send(action, false);
 	if (!done) return;
@@ -165,19 +166,48 @@ export async function redoFollow(action) {
  */
 async function send(action, placed) {
 	try {
-		const { changed, refused, items } = await editBalls(action.dataset, action.items.map(({ view, etag, box }) => (
-			{ view, etag, ball: placed ? { box, followed_from: action.from } : null }
-		)));
-		const kept = action.items.flatMap((item, i) => (items[i]?.outcome === 'changed' ? [{ ...item, etag: items[i].etag ?? item.etag }] : []));
+		const first = await edit(action, placed, action.items);
+		// A group that was judged or edited elsewhere since is no reason to keep a ball that is to go.
+		const again = placed ? [] : await stillPlaced(first.left);
+		const second = again.length ? await edit(action, placed, again) : { kept: [], left: [] };
+		const kept = [...first.kept, ...second.kept];
 		if (groupDocument.value) open(groupDocument.value.id);
 		loadDatasets();
-		return { action: { ...action, items: kept }, changed, refused };
+		return { action: { ...action, items: kept }, changed: kept.length, refused: action.items.length - kept.length };
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`Not done: ${error.message}`);
 		// What the server cannot do it cannot do the next time either.
 		return GONE.has(error.status) ? { action: { ...action, items: [] }, changed: 0, refused: action.items.length } : null;
 	}
+}
+
+/**
+ * @param {FollowDone} action @param {boolean} placed @param {FollowDone['items']} items
+ * @returns {Promise<{kept: FollowDone['items'], left: FollowDone['items']}>} what was changed, as it is now, and what was not
+ */
+async function edit({ dataset, from }, placed, items) {
+	const done = await editBalls(dataset, items.map(({ view, etag, box }) => ({ view, etag, ball: placed ? { box, followed_from: from } : null })));
+	const isDone = (/** @type {number} */ i) => done.items[i]?.outcome === 'changed';
+	return {
+		kept: items.flatMap((item, i) => (isDone(i) ? [{ ...item, etag: done.items[i].etag ?? item.etag }] : [])),
+		left: items.filter((_, i) => !isDone(i)),
+	};
+}
+
+/** Those of some balls that are still where they were placed, with their groups as they are now. @param {FollowDone['items']} items @returns {Promise<FollowDone['items']>} */
+async function stillPlaced(items) {
+	const found = await Promise.all(items.map(async (item) => {
+		try {
+			const { views, etag } = await getGroup(item.group);
+			const balls = views.find(({ id }) => id === item.view)?.balls ?? [];
+			return balls.length === 1 && String(balls[0].box) === String(item.box) ? [{ ...item, etag }] : [];
+		} catch (error) {
+			if (error instanceof ApiError) return [];
+			throw error;
+		}
+	}));
+	return found.flat();
 }
 
 /** Views that stay as they are, as a sentence; '' for none. @param {number} views */

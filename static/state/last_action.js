@@ -9,7 +9,7 @@ import { stored } from '../lib/storage.js';
 /** @typedef {{kind: 'batch', dataset: string, batch: number, text: string}} BatchDone */
 /** @typedef {{kind: string, view: string | null, marking: string | null, suggested: string | null, number: number | null}} FindingName */
 /** @typedef {{kind: 'dismissal', dataset: string, group: number, number: number, finding: FindingName, dismissed: boolean}} DismissalDone */
-/** @typedef {{kind: 'follow', dataset: string, from: string, text: string, items: {view: number, etag: string, box: number[]}[]}} FollowDone   balls that were followed from a group; `etag`: of their groups as this left them */
+/** @typedef {{kind: 'follow', dataset: string, from: string, text: string, items: {group: number, view: number, etag: string, box: number[]}[]}} FollowDone   balls that were followed from a group; `etag`: of their groups as this left them */
 /** @typedef {EditDone | VerdictDone | BatchDone | DismissalDone | FollowDone} Action */
 
 const KEPT = 100;

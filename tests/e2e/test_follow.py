@@ -13,7 +13,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
-from tests.e2e.screen import Screen, until
+from tests.e2e.screen import Screen, judge, until
 from tests.e2e.service import serving
 from tests.e2e.test_access import serious_in_both
 from tests.filmed_rigs import filmed_groups
@@ -93,6 +93,9 @@ def test_a_ball_is_followed_looked_at_accepted_and_taken_back(
     wanted = [said] * COUNT
     wanted[CLICKED], wanted[HIDDEN] = None, ""
     assert sources(page) == wanted
+
+    # A group that was judged since gives its ball back all the same.
+    judge(page, ids[CLICKED + 1], "deferred")
 
     # The uncertain one is this person's to say.
     page.keyboard.press("y")

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import app
-from app.evaluation.result import Axis, Figure, Panel, Series, figure_to_csv
+from app.evaluation.result import Axis, Chart, Panel, Series, figure_to_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.jobs.queries import _to_json_column as job_text
@@ -257,7 +257,7 @@ class TestFiles:
     def test_a_figure_is_finite_as_csv(self, bad: float) -> None:
         series = Series("all", "All", x=(1.0, 2.0), y=(bad, 3.0))
         panel = Panel("p", Axis("x"), Axis("y"), (series,))
-        figure = Figure("f", "t", (panel,))
+        figure = Chart("f", "t", (panel,))
         rows = list(csv.reader(io.StringIO(figure_to_csv(figure))))
         assert not NOT_A_NUMBER.search(str(rows))
 

@@ -32,7 +32,7 @@ from app.features.agreement.queries import (
     save_adjudication,
 )
 from app.features.batches.completion_queries import complete_group_in_batch
-from app.features.batches.own_annotations import adopt_submitted_annotations
+from app.features.batches.own_annotations import adopt_if_sole_annotator
 from app.features.batches.service import get_batch
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
@@ -207,9 +207,7 @@ def compare_or_adopt_submission(
         return None
     try:
         if annotation.batch_id is not None:
-            adopt_submitted_annotations(
-                store, get_batch(store, annotation.batch_id), annotation.person
-            )
+            adopt_if_sole_annotator(store, get_batch(store, annotation.batch_id), annotation.person)
         return compare_submitted_annotations(store, annotation.group_id, annotation.batch_id, paint)
     except ReviewError as error:
         # It is tried again with the person's next group, and when the server starts.

@@ -54,7 +54,7 @@ def begin_next_own_annotation(
 
     Where one annotation a group is asked for, what they have submitted is taken over first.
     """
-    adopt_submitted_annotations(store, batch, person)
+    adopt_if_sole_annotator(store, batch, person)
     with store.read() as session:
         groups = _list_waiting_groups(session, batch)
     terms = BatchAnnotationTerms(
@@ -108,10 +108,10 @@ def hide_others_progress(session: Session, batch: Batch) -> Batch:
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
         return batch
-    return replace(replace_with_own_counts(session, batch, reader.person), query="")
+    return replace(with_own_counts(session, batch, reader.person), query="")
 
 
-def replace_with_own_counts(session: Session, batch: Batch, person: str) -> Batch:
+def with_own_counts(session: Session, batch: Batch, person: str) -> Batch:
     """A batch with the counts of somebody's own annotations: what they submitted is done."""
     annotations = list_annotations_of_batch(session, batch.id, batch.dataset_id)
     name = person_of_actor(person)
@@ -169,7 +169,7 @@ def count_own_groups(session: Session, batch: Batch, person: str) -> int | None:
     )
 
 
-def adopt_submitted_annotations(store: Store, batch: Batch, person: str) -> None:
+def adopt_if_sole_annotator(store: Store, batch: Batch, person: str) -> None:
     """Take over what somebody submitted, where nobody else annotates the same groups.
 
     What an annotator has not judged waits for a reviewer then, as if they had submitted the group.

@@ -17,7 +17,7 @@ from app.features.batches.own_annotations import (
     count_own_groups_left,
     hide_others_progress,
     makes_own_annotations,
-    replace_with_own_counts,
+    with_own_counts,
 )
 from app.features.batches.queries import (
     NumberedBatchGroup,
@@ -202,7 +202,7 @@ def list_own_batches(
                     else _count_groups_left(batch, parts)
                 )
                 back = _list_returned_groups(session, batch, worker.name)
-                seen = replace_with_own_counts(session, batch, worker.name) if own else batch
+                seen = with_own_counts(session, batch, worker.name) if own else batch
                 found.append(
                     MyBatch(hide_others_progress(session, seen), sorted(parts), left, back)
                 )

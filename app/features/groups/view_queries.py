@@ -240,7 +240,7 @@ def station_from_row(row: Any) -> StoredStation:
         flipped=row.flipped,
         given_covariance=None if row.given is None else _covariance_from_text(row.given),
         picture=None if row.picture is None else _picture_from_text(row.picture),
-        proposed=() if row.proposed is None else _proposed_from_text(row.proposed),
+        proposed=() if row.proposed is None else _proposed_markings_from_text(row.proposed),
         not_visible=_not_visible_from_text(row.lines),
     )
     return StoredStation(
@@ -304,7 +304,7 @@ def _covariance_from_text(text: str) -> tuple[float, ...] | None:
 
 
 @lru_cache(maxsize=256)
-def _proposed_from_text(text: str) -> tuple[str, ...]:
+def _proposed_markings_from_text(text: str) -> tuple[str, ...]:
     with translate_shape_errors_to_damage():
         return tuple(map(str, parse_json_column(text)))
 

@@ -272,7 +272,7 @@ def _merge_tree(
     done = 0
     while batch := list(islice(groups, BATCH)):
         with open_import_session(run.store, keep=run.keep) as session:
-            _merge_batch(session, run, batch, stations)
+            _merge_group_chunk(session, run, batch, stations)
         done += len(batch)
         if progress is not None:
             progress(done)
@@ -304,7 +304,7 @@ def _report_policy_difference(session: Session, run: _MergeRun) -> None:
         )
 
 
-def _merge_batch(
+def _merge_group_chunk(
     session: Session,
     run: _MergeRun,
     batch: Sequence[MergeGroup],

@@ -19,7 +19,7 @@ from app.features.verdicts.service import STATES
 from app.formats.file_tree import BROKEN, FileTree
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
-from app.json_text import json_text
+from app.json_text import json_text, quote_text
 from app.soccer.annotation import Extras
 from app.soccer.codec import extras_from_json, policy_from_json, station_from_json
 from app.soccer.finding import FINDING_KINDS

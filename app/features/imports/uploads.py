@@ -300,11 +300,11 @@ def begin_upload_in_parts(
             if upload is None or upload.bytes < size:
                 _require_disk_space(settings, upload or begun)
             if upload is None:
-                _make_upload_folder(folder, begun)
+                _begin_upload_on_disk(folder, begun)
     return upload or begun
 
 
-def _make_upload_folder(folder: Path, upload: Upload) -> None:
+def _begin_upload_on_disk(folder: Path, upload: Upload) -> None:
     ensure_folder_of_all_uploads(folder.parent)
     (folder / CONTENT).mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)

@@ -56,7 +56,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     Frames are named, not copied; lines, balls, given cameras, what is known of the match and what
     was read of the paint are the copy's own from then on.
     """
-    dataset_id = _get_or_make_copy_dataset(session, order)
+    dataset_id = _ensure_copy_dataset(session, order)
     # Static cameras that a copy is there of already are as their person left them.
     own = {item.station.key: item.station for item in list_shared_stations(session, dataset_id)}
     group = replace(start, views=tuple(_replace_view_station(view, own) for view in start.views))
@@ -181,7 +181,7 @@ def _rename_views(group: Group, names: Mapping[str, str]) -> Group:
     )
 
 
-def _get_or_make_copy_dataset(session: Session, order: CopyRequest) -> int:
+def _ensure_copy_dataset(session: Session, order: CopyRequest) -> int:
     """Id of the dataset of somebody's copies, which the first of them makes."""
     stored = order.original
     copies = CopyDatasetKey(stored.dataset_id, order.batch_id or 0, order.person)

@@ -260,7 +260,7 @@ def positions(
     """
     from app.features.datasets.service import filter_by_match
     from app.features.match_estimates.positions import (
-        get_positions,
+        get_main_camera_positions,
         share_positions,
         undo_position_sharing,
     )
@@ -285,7 +285,7 @@ def positions(
             if undo:
                 with store.write() as session:
                     undo_position_sharing(session, dataset, match, actor=get_current_actor())
-            found = get_positions(store, dataset)
+            found = get_main_camera_positions(store, dataset)
     print_sentences(filter_by_match(found.items, match), json_)
 
 

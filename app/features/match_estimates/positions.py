@@ -107,7 +107,7 @@ class _PositionTask:
     policy: CalibrationPolicy
 
 
-def get_positions(store: Store, dataset: str | int) -> DatasetPositions:
+def get_main_camera_positions(store: Store, dataset: str | int) -> DatasetPositions:
     """What the matches of a dataset share.
 
     Raises:
@@ -161,7 +161,7 @@ def share_positions(
             _save_position_edits(session, found.id, edits, actor, body)
         if progress is not None:
             progress(done, len(chosen))
-    return get_positions(store, found.id)
+    return get_main_camera_positions(store, found.id)
 
 
 def require_shareable_positions(

@@ -13,7 +13,7 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, undo_rig_adjustment
 from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
-from app.features.match_estimates.positions import PositionState, get_positions
+from app.features.match_estimates.positions import PositionState, get_main_camera_positions
 from app.features.match_estimates.queries import MatchPictures
 from app.features.policies import noise as noises
 from app.features.policies.noise import ThresholdAdvice
@@ -170,7 +170,7 @@ class NoiseDocument(Document):
 @paged()
 def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
-    return SharedPositionsDocument.model_validate(get_positions(store, dataset))
+    return SharedPositionsDocument.model_validate(get_main_camera_positions(store, dataset))
 
 
 @positions_router.post(

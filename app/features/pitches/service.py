@@ -106,7 +106,7 @@ class DatasetPitches:
 
 
 @dataclass(frozen=True)
-class _PitchTask:
+class _PitchEstimateInputs:
     match: str
     inputs: str
     frames: tuple[PitchSizeFrameLines, ...]
@@ -353,13 +353,15 @@ def _inputs_digest(lines: str, policy: CalibrationPolicy) -> str:
 
 def _make_task(
     store: Store, dataset_id: int, match: str, inputs: str, policy: CalibrationPolicy
-) -> _PitchTask:
+) -> _PitchEstimateInputs:
     with store.read() as session:
         lines = read_lines_of_match(session, dataset_id, match)
-    return _PitchTask(match, inputs, tuple(PitchSizeFrameLines(*item) for item in lines), policy)
+    return _PitchEstimateInputs(
+        match, inputs, tuple(PitchSizeFrameLines(*item) for item in lines), policy
+    )
 
 
-def _run_pitch_task(task: _PitchTask) -> tuple[str, dict[str, Any]]:
+def _run_pitch_task(task: _PitchEstimateInputs) -> tuple[str, dict[str, Any]]:
     """Values of the estimate's row; runs in a worker."""
     nothing = PitchEstimate(None, None, None, None, 0)
     problem = None

@@ -66,7 +66,7 @@ def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> Pol
     return policy
 
 
-def _make_policy_job_response(judged: PolicyStateAndJob) -> Response:
+def _make_policy_change_response(judged: PolicyStateAndJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
     return make_document_response(
@@ -82,7 +82,7 @@ def _make_policy_job_response(judged: PolicyStateAndJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@respond_with(_make_policy_job_response)
+@respond_with(_make_policy_change_response)
 def put_policy(
     dataset: DatasetPath,
     change: PolicyChange,

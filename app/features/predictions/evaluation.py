@@ -22,8 +22,8 @@ from app.evaluation.comparison import (
 )
 from app.evaluation.result import (
     NUMBERS,
+    Chart,
     Evaluation,
-    Figure,
     FrameResult,
     Table,
     figure_to_csv,
@@ -151,7 +151,7 @@ def parse_tables(values: Iterable[Json]) -> list[Table]:
     return [from_json(Table, value) for value in values]
 
 
-def get_figure(store: Store, evaluation_id: int, name: str) -> Figure:
+def get_figure(store: Store, evaluation_id: int, name: str) -> Chart:
     """One figure of a run.
 
     Raises:
@@ -165,7 +165,7 @@ def get_figure(store: Store, evaluation_id: int, name: str) -> Figure:
             f'evaluation {evaluation_id} has no figure "{name}"',
             hint=f"It has {', '.join(known)}.",
         )
-    return from_json(Figure, value)
+    return from_json(Chart, value)
 
 
 def list_frames(
@@ -314,7 +314,7 @@ def write_evaluation_parts(
         raise InputError(f"the evaluation cannot be written to {out} ({error.strerror})") from error
 
 
-def _render_figure(figure: Figure, ending: str) -> bytes:
+def _render_figure(figure: Chart, ending: str) -> bytes:
     """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
     if ending == "png":
         return figure_to_png(figure)

@@ -16,7 +16,7 @@ from app.evaluation.result import (
     NUMBERS,
     TABLES,
     Cell,
-    Figure,
+    Chart,
     FrameResult,
     Table,
     figure_to_csv,
@@ -224,7 +224,7 @@ def _make_file_responses(description: str, document: type[object], *others: str)
 
 
 FIGURE_FILES = _make_file_responses(
-    "The figure: its values as JSON or CSV, or drawn as PNG.", Figure, CSV_FILE, PNG_FILE
+    "The figure: its values as JSON or CSV, or drawn as PNG.", Chart, CSV_FILE, PNG_FILE
 )
 TABLE_FILES = _make_file_responses(
     "The table: as JSON, or as CSV with intervals and denominators.", Table, CSV_FILE

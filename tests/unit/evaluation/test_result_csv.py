@@ -7,8 +7,8 @@ from dataclasses import replace
 from app.evaluation.result import (
     Axis,
     Cell,
+    Chart,
     Column,
-    Figure,
     Panel,
     Row,
     Series,
@@ -27,7 +27,7 @@ class TestFigureCsv:
         one = Series("a", "A", (0.1 + 0.2, 1.0), (2.0, 3.0), low=(1.0, 2.0), high=(3.0, 4.0))
         two = Series("=b", "B", (5.0,), (6.0,), count=(7,), group_id=12)
         panel = Panel("P", Axis("x"), Axis("y"), (one, two))
-        found = rows(figure_to_csv(Figure("f", "F", (panel,))))
+        found = rows(figure_to_csv(Chart("f", "F", (panel,))))
         assert [row["x"] for row in found] == ["0.30000000000000004", "1.0", "5.0"]
         assert (found[0]["low"], found[0]["count"], found[2]["low"]) == ("1.0", "", "")
         assert (found[2]["count"], found[2]["group_id"]) == ("7", "12")
@@ -37,7 +37,7 @@ class TestFigureCsv:
     def test_the_header_says_what_the_axes_show(self) -> None:
         one = Panel("P", Axis("Change", "%"), Axis("Moves by", "m"), (), color=Axis("Far", "m"))
         two = replace(one, x=Axis("Shift", "px"))
-        header = figure_to_csv(Figure("f", "F", (one, two))).splitlines()[0]
+        header = figure_to_csv(Chart("f", "F", (one, two))).splitlines()[0]
         assert header == (
             "panel,series,kind,Change (%) / Shift (px),Moves by (m),low,high,count,Far (m),group_id"
         )

@@ -12,7 +12,7 @@ from app.evaluation.result import (
     PALETTE,
     WIDTH,
     Axis,
-    Figure,
+    Chart,
     Panel,
     ReferenceLine,
     Series,
@@ -22,13 +22,13 @@ from app.evaluation.result import (
 LINE = Series("a", "A line", (0.0, 1.0), (0.0, 1.0))
 
 
-def drawn(figure: Figure) -> np.ndarray:
+def drawn(figure: Chart) -> np.ndarray:
     return cv2.imdecode(np.frombuffer(figure_to_png(figure), np.uint8), cv2.IMREAD_COLOR)
 
 
-def figure(*series: Series, **more) -> Figure:
+def figure(*series: Series, **more) -> Chart:
     panel = Panel("P", Axis("x", "m"), Axis("y"), series, **more)
-    return Figure("f", "Title", (panel,), "A note that says over what it was computed.")
+    return Chart("f", "Title", (panel,), "A note that says over what it was computed.")
 
 
 def like(picture: np.ndarray, color: str) -> np.ndarray:
@@ -43,7 +43,7 @@ def count(picture: np.ndarray, color: str) -> int:
 
 class TestFigurePng:
     def test_has_a_place_for_each_panel(self) -> None:
-        two = Figure("f", "T", figure(LINE).panels * 2)
+        two = Chart("f", "T", figure(LINE).panels * 2)
         assert drawn(figure(LINE)).shape == (HEIGHT, WIDTH, 3)
         assert drawn(two).shape == (HEIGHT, 2 * WIDTH, 3)
 

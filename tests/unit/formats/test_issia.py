@@ -13,7 +13,7 @@ from app.formats.issia import MIRRORED, find_cameras_with_mirrored_people, mirro
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
 from app.formats.report import ReaderReport
-from app.formats.viper_reader import ViperTrack
+from app.formats.viper_reader import ViperVideo
 from app.geometry.camera import Camera
 from tests.cameras import looking
 
@@ -31,13 +31,13 @@ def boxes(camera: Camera) -> list[tuple[str, float, float, float, float]]:
     return [(str(n), x - 10.0, y - 50.0, 20.0, 50.0) for n, (x, y) in enumerate(feet.tolist())]
 
 
-def seen(number: int, *, mirrored: bool, source: str = "file://C:/a.mpg") -> ViperTrack:
+def seen(number: int, *, mirrored: bool, source: str = "file://C:/a.mpg") -> ViperVideo:
     """What a camera shows of the people in two frames."""
-    track = ViperTrack(persons={f: boxes(CAMERAS[number]) for f in (20, 21)}, source=source)
+    track = ViperVideo(persons={f: boxes(CAMERAS[number]) for f in (20, 21)}, source=source)
     return mirror_people(track, WIDTH) if mirrored else track
 
 
-def asked(number: int, track: ViperTrack, given: dict[int, Camera]) -> list[int]:
+def asked(number: int, track: ViperVideo, given: dict[int, Camera]) -> list[int]:
     tracks = {1: seen(1, mirrored=False), number: track}
     return find_cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH))
 
@@ -45,7 +45,7 @@ def asked(number: int, track: ViperTrack, given: dict[int, Camera]) -> list[int]
 class TestTurned:
     def test_columns_become_those_that_they_are_in_the_mirror(self):
         """A box covers columns x to x + width - 1; those of a mirror are W - 1 - x."""
-        (box,) = mirror_people(ViperTrack(persons={0: [("7", 0.0, 3.0, 10.0, 20.0)]}), 100).persons[
+        (box,) = mirror_people(ViperVideo(persons={0: [("7", 0.0, 3.0, 10.0, 20.0)]}), 100).persons[
             0
         ]
         assert box == ("7", 90.0, 3.0, 10.0, 20.0)
@@ -80,7 +80,7 @@ class TestMirroredPeople:
         assert {2, 6} == MIRRORED
 
 
-def xgtf(track: ViperTrack) -> str:
+def xgtf(track: ViperVideo) -> str:
     people = "".join(
         f'<object name="Person" id="{name}"><attribute name="LOCATION">'
         + "".join(

@@ -11,7 +11,7 @@ from app.formats import viper_reader
 from app.formats.file_tree import ImportLimits
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
-from app.formats.viper_reader import ViperTrack, is_viper, read_viper
+from app.formats.viper_reader import ViperVideo, is_viper, read_viper
 from app.soccer.frames import Box, ImagePoint, ImageSize
 
 HEAD = (
@@ -41,7 +41,7 @@ BOX = 'x="1" y="2" width="30" height="40"'
 
 def _read(
     tmp_path: Path, content: str | bytes, report: ReaderReport, name: str = "1.xgtf"
-) -> ViperTrack:
+) -> ViperVideo:
     content = content.encode() if isinstance(content, str) else content
     (tmp_path / name).write_bytes(content)
     tree = open_tree(tmp_path, report)

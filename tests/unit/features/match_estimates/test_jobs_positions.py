@@ -12,7 +12,7 @@ from app.features.imports.ingest import import_groups
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates.jobs import POSITIONS
-from app.features.match_estimates.positions import get_positions
+from app.features.match_estimates.positions import get_main_camera_positions
 from app.features.policies.service import change_policy
 from tests.unit.features.jobs.steps import Held
 from tests.unit.features.match_estimates.test_positions import SHARING, match
@@ -73,5 +73,5 @@ def test_a_share_that_is_taken_back_while_it_runs_gives_nothing_more(
     POSITIONS.undo_last_job(jobs, two, "demo", match, actor="ann")
     estimated.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
-    assert [item.current for item in get_positions(two, "demo").items] == shared
+    assert [item.current for item in get_main_camera_positions(two, "demo").items] == shared
     jobs.close()

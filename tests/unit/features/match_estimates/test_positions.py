@@ -17,7 +17,7 @@ from app.features.imports.ingest import import_groups
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates import queries as positions_in_store
 from app.features.match_estimates.positions import (
-    get_positions,
+    get_main_camera_positions,
     share_positions,
     undo_position_sharing,
 )
@@ -74,7 +74,7 @@ def shared(store, once):
 
 
 def state(store):
-    (item,) = get_positions(store, "demo").items
+    (item,) = get_main_camera_positions(store, "demo").items
     return item
 
 
@@ -226,7 +226,9 @@ class TestSharePositions:
     def test_a_group_that_comes_from_another_match_brings_nothing_said_there(self, shared):
         first, *_ = match()
         import_groups(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
-        assert {item.match: item.current for item in get_positions(shared, "demo").items} == {
+        assert {
+            item.match: item.current for item in get_main_camera_positions(shared, "demo").items
+        } == {
             MATCH: False,
             "b": None,
         }
@@ -238,7 +240,9 @@ class TestSharePositions:
         draw(shared, 1)
         share_positions(shared, "demo", [MATCH], actor="ann")
         import_groups(shared, "demo", (replace(sixth, match="b"),), source="files", actor="ann")
-        (other,) = [item for item in get_positions(shared, "demo").items if item.match == "b"]
+        (other,) = [
+            item for item in get_main_camera_positions(shared, "demo").items if item.match == "b"
+        ]
         assert other.current is False
 
     def test_a_group_that_leaves_while_it_is_estimated_gets_nothing(self, shared, monkeypatch):
