@@ -22,6 +22,7 @@ from app.features.groups.bulk_edits import (
 )
 from app.features.groups.edit import Edit, SetLines, make_set_ball_edit
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
+from app.features.groups.submit import require_followed_groups
 from app.features.solutions.service import solve_and_encode
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
 from app.http.documents import (
@@ -222,6 +223,15 @@ def edit_many_views(
     """
     _require_etags(edit)
     store, found = services.store, dataset_id(services.store, dataset)
+    require_followed_groups(
+        store,
+        lambda _session: found,
+        {
+            f"/items/{index}/ball/followed_from": item.ball.followed_from
+            for index, item in enumerate(edit.items)
+            if item.ball is not None
+        },
+    )
     if dry_run:
         plan = plan_edits(store, found, edit.edits(), actor=actor)
         return make_document_response(BulkEditDocument.of(plan))

@@ -10,7 +10,7 @@ from app.db.json_columns import Json
 from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import NotFoundError, SharedStationError
+from app.errors import InputError, NotFoundError, SharedStationError
 from app.features.groups import view_queries as views
 from app.features.groups.edit import (
     STATION_EDITS,
@@ -42,6 +42,7 @@ from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
 from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
 from app.features.solutions.service import Solve, read_known_calibrations, solve_and_encode
+from app.json_text import quote_text
 from app.soccer.group import Group, Media
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
@@ -290,6 +291,33 @@ def ensure_group_solution(
         insert_solutions(session, [(record.solution_key, encoded)])
         refresh_queue(session, [group_id])
     return record, solution
+
+
+def require_followed_groups(
+    store: Store, find_dataset: Callable[[Session], int | None], groups: Mapping[str, str | None]
+) -> None:
+    """Refuse balls that are said to be followed from a group that their dataset does not have.
+
+    Args:
+        store: The database.
+        find_dataset: Finds the id of the dataset.
+        groups: Keys of groups, or None, by the JSON pointer that names each.
+
+    Raises:
+        InputError: There is no such group.
+    """
+    keys = {key for key in groups.values() if key is not None}
+    if not keys:
+        return
+    with store.read() as session:
+        known = views.find_group_and_view_ids(session, find_dataset(session) or 0, keys)
+    for pointer, key in groups.items():
+        if key is not None and key not in known:
+            raise InputError(
+                f"a ball cannot be followed from group {quote_text(key)}, which this dataset does not have",
+                hint="Send the `group` of the answer that followed the ball. Nothing was changed.",
+                pointer=pointer,
+            )
 
 
 def refuse_edit_of_shared_station(stored: StoredGroup, edit: Edit) -> None:

@@ -173,6 +173,15 @@ def find_dataset_of_group(session: Session, group_id: int) -> int | None:
     return session.scalar(select(GroupModel.dataset_id).where(GroupModel.id == group_id))
 
 
+def find_dataset_of_view(session: Session, view_id: int) -> int | None:
+    """Id of the dataset of a view's group."""
+    return session.scalar(
+        select(GroupModel.dataset_id)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .where(ViewModel.id == view_id)
+    )
+
+
 def find_group_and_view_ids(
     session: Session, dataset_id: int, keys: Collection[str]
 ) -> dict[str, tuple[int, dict[str, int]]]:

@@ -31,8 +31,14 @@ from app.features.groups.schemas import (
     make_group_response,
 )
 from app.features.groups.state import GroupState
-from app.features.groups.submit import ViewLocation, find_view_location, submit_view_edit
+from app.features.groups.submit import (
+    ViewLocation,
+    find_view_location,
+    require_followed_groups,
+    submit_view_edit,
+)
 from app.features.groups.view_paint import NO_FRAME_HINT
+from app.features.groups.view_queries import find_dataset_of_view
 from app.features.solutions.service import Solve, solve_and_encode
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, Services, is_not_modified
@@ -112,6 +118,12 @@ def patch_ball(
 ) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     value = None if ball is None else ball.ball()
+    if ball is not None and ball.followed_from is not None:
+        require_followed_groups(
+            services.store,
+            lambda session: find_dataset_of_view(session, view),
+            {"/followed_from": ball.followed_from},
+        )
     return _submit_view_edit(
         services, view, lambda key: make_set_ball_edit(key, value), if_match, actor
     )

@@ -103,6 +103,21 @@ class TestRoute:
         answer = api.patch(f"{API}/views/{one['id']}/ball", json=body, headers=head)
         assert answer.status_code == 422
 
+    def test_a_ball_is_followed_from_a_group_that_its_dataset_has(
+        self, api: Any, services: Services
+    ) -> None:
+        one = views(api)[0]
+        ball = {"box": [10.0, 10.0, 8.0, 8.0], "followed_from": "of another dataset"}
+        head = {"If-Match": one["etag"]}
+        alone = api.patch(f"{API}/views/{one['id']}/ball", json=ball, headers=head)
+        item = {"view": one["id"], "etag": one["etag"], "ball": ball}
+        many = api.post(f"{API}/datasets/rolling/edits", json={"items": [item]})
+        for answer, pointer in ((alone, ""), (many, "/items/0/ball")):
+            assert answer.status_code == 400, answer.text
+            assert answer.json()["pointer"] == f"{pointer}/followed_from"
+            assert "which this dataset does not have" in answer.json()["detail"]
+        assert views(api)[0]["balls"] == []
+
 
 class TestCommand:
     @pytest.fixture
