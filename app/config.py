@@ -56,7 +56,7 @@ def find_memory_limit(
     return min(found)
 
 
-class StoreSettings(BaseModel):
+class ObjectStoreSettings(BaseModel):
     """One object store (S3 or what speaks like it), as the operator describes it.
 
     Attributes:
@@ -92,7 +92,7 @@ class StoreSettings(BaseModel):
     seconds: float = Field(default=10.0, gt=0, le=600)
 
     @model_validator(mode="after")
-    def _require_one_login_method(self) -> StoreSettings:
+    def _require_one_login_method(self) -> ObjectStoreSettings:
         given = (self.key is not None and self.secret is not None, self.key_file is not None)
         if sum((*given, self.anonymous)) != 1:
             raise ValueError("needs exactly one of these: key and secret, key_file, or anonymous")
@@ -227,7 +227,7 @@ class Settings(BaseSettings):
     """Days after which a derived image is made again."""
     import_folders: Annotated[list[Path], NoDecode] = []
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
-    stores: dict[StoreName, StoreSettings] = {}
+    stores: dict[StoreName, ObjectStoreSettings] = {}
     """Object stores by the name that people use for them (``s3://NAME/...``), as JSON: ``url`` with
     ``key`` and ``secret``, ``key_file`` or ``anonymous``; ``endpoint``, ``exports`` and more: [operations.md](operations.md)."""
     store_cache_bytes: int = Field(default=4 * 1024**3, ge=2**26)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 
-from app.config import Settings, StoreSettings
+from app.config import ObjectStoreSettings, Settings
 from app.object_store.store import ObjectStore, open_store
 from tests.waiting import SECONDS
 
@@ -86,7 +86,7 @@ def moto_server(*more: str) -> Iterator[StoreProxy]:
         process.wait()
 
 
-def store_settings(proxy: StoreProxy, **more: object) -> StoreSettings:
+def store_settings(proxy: StoreProxy, **more: object) -> ObjectStoreSettings:
     """The store ``soccer-data/frames`` behind a proxy, that gives up within seconds."""
     values: dict[str, object] = {
         "url": "s3://soccer-data/frames",
@@ -96,7 +96,7 @@ def store_settings(proxy: StoreProxy, **more: object) -> StoreSettings:
         "exports": True,
         "seconds": 1.0,
     }
-    return StoreSettings.model_validate({**values, **more})
+    return ObjectStoreSettings.model_validate({**values, **more})
 
 
 def stored_settings(home: Path, proxy: StoreProxy, **more: object) -> Settings:

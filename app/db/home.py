@@ -181,7 +181,7 @@ KEYS = SECOND_FACTOR, WEBHOOKS, BEGUN, DEVICES
 _BYTES = 32
 
 
-def get_installation_key(settings: Settings, name: str) -> bytes:
+def get_or_make_secret_key(settings: Settings, name: str) -> bytes:
     """A random key of a home, made when it is asked for the first time; ``name`` is its file's.
 
     Raises:

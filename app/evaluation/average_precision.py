@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from app.evaluation.bootstrap import MatchResamples
-from app.evaluation.frame import JudgedFrame, iou
+from app.evaluation.frame import FrameWithDetections, iou
 from app.evaluation.result import (
     Axis,
     Cell,
     Chart,
     Column,
-    FrameRange,
+    FrameFieldRange,
     FrameResult,
     Panel,
     Row,
@@ -39,7 +39,7 @@ RECALLS = np.linspace(0.0, 1.0, 101)
 
 
 @dataclass(frozen=True)
-class SortedDetections:
+class MatchedDetections:
     """All detections of all frames, the surest first.
 
     Attributes:
@@ -64,7 +64,7 @@ class PrecisionRecallCurve:
     score: FloatArray
 
 
-def match_detections_to_balls(judged: Sequence[JudgedFrame]) -> SortedDetections:
+def match_detections_to_balls(judged: Sequence[FrameWithDetections]) -> MatchedDetections:
     """Match detections to balls as COCO does: the surest that overlaps enough gets the ball."""
     scores, frames, found = [], [], []
     for index, item in enumerate(judged):
@@ -77,7 +77,7 @@ def match_detections_to_balls(judged: Sequence[JudgedFrame]) -> SortedDetections
             frames.append(index)
             found.append(hit)
     order = np.argsort(-np.array(scores), kind="stable")
-    return SortedDetections(
+    return MatchedDetections(
         np.array(scores)[order],
         np.array(frames, dtype=np.int64)[order],
         np.array(found, dtype=bool).reshape(-1, len(IOUS))[order],
@@ -85,7 +85,9 @@ def match_detections_to_balls(judged: Sequence[JudgedFrame]) -> SortedDetections
     )
 
 
-def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None, float | None]:
+def coco_average_precision(
+    judged: Sequence[FrameWithDetections],
+) -> tuple[float | None, float | None]:
     """AP at IoU 0.5, and its mean over 0.5 to 0.95, by faster-coco-eval; None without a ball."""
     if not any(item.truth is not None for item in judged):
         return None, None
@@ -103,7 +105,7 @@ def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None,
 
 
 def precision_recall_curve(
-    hits: SortedDetections, threshold: int = 0, weights: FloatArray | None = None
+    hits: MatchedDetections, threshold: int = 0, weights: FloatArray | None = None
 ) -> PrecisionRecallCurve:
     """Precision against recall.
 
@@ -134,7 +136,7 @@ def area_under_curve(found: PrecisionRecallCurve) -> float:
 
 
 def mean_average_precision_over_ious(
-    hits: SortedDetections, weights: FloatArray | None = None
+    hits: MatchedDetections, weights: FloatArray | None = None
 ) -> float:
     """COCO's AP averaged over ``IOUS``: the same as `interpolated` of each, in one go."""
     weights = np.ones(len(hits.balls)) if weights is None else weights
@@ -165,7 +167,7 @@ def _precision_envelope(precision: FloatArray) -> FloatArray:
     return best
 
 
-def _build_coco_ground_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]:
+def _build_coco_ground_truth(judged: Sequence[FrameWithDetections]) -> dict[str, object]:
     balls = [(image, item.truth) for image, item in enumerate(judged, 1) if item.truth is not None]
     return {
         "images": [
@@ -188,7 +190,7 @@ def _build_coco_ground_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]
     }
 
 
-def _build_coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
+def _build_coco_results(judged: Sequence[FrameWithDetections]) -> list[dict[str, object]]:
     return [
         {
             "image_id": image,
@@ -217,7 +219,9 @@ COLUMNS = (
 )
 
 
-def make_average_precision_table(judged: Sequence[JudgedFrame], resamples: MatchResamples) -> Table:
+def make_average_precision_table(
+    judged: Sequence[FrameWithDetections], resamples: MatchResamples
+) -> Table:
     """AP with intervals by match."""
     hits = match_detections_to_balls(judged)
     place = resamples.find_match_columns([item.frame.match for item in judged])
@@ -227,13 +231,13 @@ def make_average_precision_table(judged: Sequence[JudgedFrame], resamples: Match
     def make_cell(value: float | None, low: float | None, high: float | None) -> Cell:
         return Cell(value, low, high, balls, len(judged))
 
-    def compute_weighted_precision(weights: FloatArray) -> float:
+    def compute_weighted_average_precision(weights: FloatArray) -> float:
         return interpolated_average_precision(precision_recall_curve(hits, 0, weights[place]))
 
     once = precision_recall_curve(hits)
     recall = float(once.recall[-1]) if balls and len(once.recall) else (0.0 if balls else None)
     cells = (
-        make_cell(ap_50, *resamples.compute_interval(compute_weighted_precision)),
+        make_cell(ap_50, *resamples.compute_interval(compute_weighted_average_precision)),
         make_cell(
             ap,
             *resamples.compute_interval(
@@ -252,11 +256,11 @@ def make_average_precision_table(judged: Sequence[JudgedFrame], resamples: Match
         f"{plural(len(judged), 'frame')}: {balls} with a ball, {len(judged) - balls} without; "
         f"{plural(len(hits.scores), 'detection')}."
     )
-    row = Row("all", "All frames", cells, FrameRange("detections"))
+    row = Row("all", "All frames", cells, FrameFieldRange("detections"))
     return Table("detection", "Detection", COLUMNS, (row,), note)
 
 
-def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Chart:
+def make_precision_recall_figure(judged: Sequence[FrameWithDetections]) -> Chart:
     """Precision against recall at IoU 0.5 and 0.75."""
     hits = match_detections_to_balls(judged)
     balls = int(hits.balls.sum())
@@ -273,7 +277,7 @@ def make_precision_recall_figure(judged: Sequence[JudgedFrame]) -> Chart:
     return Chart("precision_recall", "Precision against recall", (panel,), note)
 
 
-def _make_curve_series(hits: SortedDetections, index: int, words: str) -> Series:
+def _make_curve_series(hits: MatchedDetections, index: int, words: str) -> Series:
     found = precision_recall_curve(hits, index)
     chosen = np.unique(np.linspace(0, max(len(found.recall) - 1, 0), MAX_PLACES).astype(int))
     if not len(found.recall):
@@ -284,11 +288,11 @@ def _make_curve_series(hits: SortedDetections, index: int, words: str) -> Series
         tuple(found.recall[chosen].tolist()),
         tuple(found.precision[chosen].tolist()),
         count=tuple((chosen + 1).tolist()),
-        frames=tuple(FrameRange("score", low=score) for score in hits.scores[chosen].tolist()),
+        frames=tuple(FrameFieldRange("score", low=score) for score in hits.scores[chosen].tolist()),
     )
 
 
-def _highest_recall(hits: SortedDetections, weights: FloatArray) -> float:
+def _highest_recall(hits: MatchedDetections, weights: FloatArray) -> float:
     found = precision_recall_curve(hits, 0, weights)
     return float(found.recall[-1]) if len(found.recall) else 0.0
 
@@ -357,7 +361,7 @@ def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Chart:
         low=tuple(quarters[:, 0].tolist()),
         high=tuple(quarters[:, 2].tolist()),
         count=tuple(len(inside[place]) for place in places),
-        frames=tuple(FrameRange(bins.field, *bins.bounds(place)) for place in places),
+        frames=tuple(FrameFieldRange(bins.field, *bins.bounds(place)) for place in places),
     )
     panel = Panel(
         bins.title,
@@ -370,7 +374,7 @@ def make_error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Chart:
 
 
 def make_detection_table_by_bin(
-    judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: ErrorBins
+    judged: Sequence[FrameWithDetections], frames: Sequence[FrameResult], bins: ErrorBins
 ) -> Table:
     """AP over the frames of each bin, with how many of their balls were found.
 
@@ -396,7 +400,12 @@ def make_detection_table_by_bin(
         )
         low, high = bins.bounds(place)
         rows.append(
-            Row(f"{low:g}", bins.format_bin_name(place), cells, FrameRange(bins.field, low, high))
+            Row(
+                f"{low:g}",
+                bins.format_bin_name(place),
+                cells,
+                FrameFieldRange(bins.field, low, high),
+            )
         )
     columns = (
         Column("ap_50", "AP@0.5", "", "higher"),
@@ -424,5 +433,5 @@ def _make_scatter_series(frames: Sequence[FrameResult], field: str) -> Series:
     series = Series("frames", "Frames", (), (), "points")
     x, y = zip(*pairs[::step], strict=True) if pairs else ((), ())
     # No number lies between a value and the next one: a point opens its own frame.
-    only = tuple(FrameRange(field, value, math.nextafter(value, math.inf)) for value in x)
+    only = tuple(FrameFieldRange(field, value, math.nextafter(value, math.inf)) for value in x)
     return replace(series, x=tuple(x), y=tuple(y), frames=only)

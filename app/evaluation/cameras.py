@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.evaluation.bootstrap import MatchResamples
-from app.evaluation.frame import Frame
+from app.evaluation.frame import GroundTruthFrame
 from app.evaluation.result import (
     Axis,
     Cell,
     Chart,
     Column,
-    FrameRange,
+    FrameFieldRange,
     Panel,
     ReferenceLine,
     Row,
@@ -65,7 +65,7 @@ class FrameScore:
 
 
 @dataclass(frozen=True)
-class CameraScore:
+class OverallCameraScore:
     """Many frames together; a frame without a camera counts as 0 everywhere."""
 
     frames: int
@@ -97,7 +97,7 @@ def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> 
     return FrameScore(jac, challenge, distances)
 
 
-def score_frames(frames: Iterable[FrameScore | None]) -> CameraScore:
+def combine_frame_scores(frames: Iterable[FrameScore | None]) -> OverallCameraScore:
     """Many frames together; None stands for a frame without a camera."""
     every = list(frames)
     found = [frame for frame in every if frame is not None]
@@ -105,7 +105,7 @@ def score_frames(frames: Iterable[FrameScore | None]) -> CameraScore:
     jac = np.array([frame.jac for frame in found]).reshape(-1, len(GAMMAS_PERCENT))
     distances = np.array([distance for frame in found for distance in frame.distances_px])
     median, p95 = np.percentile(distances, [50, 95]).tolist() if len(distances) else (None, None)
-    return CameraScore(
+    return OverallCameraScore(
         frames=len(every),
         calibrated=len(found),
         jac=tuple((jac.sum(axis=0) / count).tolist()),
@@ -174,7 +174,9 @@ Scores = dict[int, FrameScore | None]
 
 
 def score_cameras(
-    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: ReportProgress | None = None
+    frames: Sequence[GroundTruthFrame],
+    cameras: Mapping[int, Camera],
+    progress: ReportProgress | None = None,
 ) -> Scores:
     """Every frame with lines against its camera; a static camera's same lines are measured once."""
     scores: Scores = {}
@@ -197,7 +199,7 @@ def score_cameras(
 
 def make_cameras_table(
     rows: Sequence[tuple[str, str, Scores]],
-    frames: Sequence[Frame],
+    frames: Sequence[GroundTruthFrame],
     resamples: MatchResamples,
     judged: Collection[int],
 ) -> Table:
@@ -241,7 +243,7 @@ def make_jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> 
 def _make_score_row(
     name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: MatchResamples
 ) -> Row:
-    total, count = score_frames(scores.values()), len(scores)
+    total, count = combine_frame_scores(scores.values()), len(scores)
     matches = [match[frame] for frame in scores]
     found = list(scores.values())
 
@@ -260,7 +262,7 @@ def _make_score_row(
         Cell(total.error_median_px, count=total.calibrated, of=count),
         Cell(total.error_p95_px, count=total.calibrated, of=count),
     )
-    return Row(name, label, cells, FrameRange("predicted_jac"))
+    return Row(name, label, cells, FrameFieldRange("predicted_jac"))
 
 
 def _make_jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
@@ -292,7 +294,7 @@ def _make_jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Pa
     )
 
 
-def _make_ranges_above_jac_limits() -> tuple[FrameRange, ...]:
+def _make_ranges_above_jac_limits() -> tuple[FrameFieldRange, ...]:
     """The frames above each threshold itself, which a lower bound alone would take in."""
     bounds = (math.nextafter(threshold, math.inf) for threshold in JAC_LIMITS.tolist())
-    return tuple(FrameRange("predicted_jac", low=bound) for bound in bounds)
+    return tuple(FrameFieldRange("predicted_jac", low=bound) for bound in bounds)

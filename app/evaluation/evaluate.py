@@ -22,10 +22,10 @@ from app.evaluation.bootstrap import RESAMPLES, SEED, MatchResamples
 from app.evaluation.cameras import Scores, make_cameras_table, make_jac_figure, score_cameras
 from app.evaluation.frame import (
     Detection,
-    Frame,
-    JudgedFrame,
+    FrameWithDetections,
+    GroundTruthFrame,
     iou,
-    judge_detections,
+    pair_truth_with_detections,
     size_error_percent,
 )
 from app.evaluation.localization import (
@@ -38,7 +38,7 @@ from app.evaluation.result import (
     Chart,
     Column,
     Evaluation,
-    FrameRange,
+    FrameFieldRange,
     FrameResult,
     Panel,
     Row,
@@ -62,7 +62,7 @@ ROWS = (
 
 
 def make_boxes_table(
-    frames: Sequence[Frame],
+    frames: Sequence[GroundTruthFrame],
     careful: Mapping[int, Box],
     detections: Mapping[int, Sequence[Detection]],
     resamples: MatchResamples,
@@ -84,7 +84,7 @@ def make_boxes_table(
     compared = _select_comparable_boxes(frames, careful)
     rows = [
         _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
-             len(careful), FrameRange("box_iou") if kind == truth else None)
+             len(careful), FrameFieldRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
     if detections:
@@ -106,7 +106,7 @@ def make_boxes_table(
 
 
 def make_boxes_figure(
-    frames: Sequence[Frame], careful: Mapping[int, Box], distances: Mapping[int, float]
+    frames: Sequence[GroundTruthFrame], careful: Mapping[int, Box], distances: Mapping[int, float]
 ) -> Chart:
     """IoU and size error of each box of each frame, over the distance of the ball.
 
@@ -140,7 +140,7 @@ def make_boxes_figure(
 def _make_scatter_series(
     kind: str,
     label: str,
-    compared: Sequence[tuple[float, int, Frame, Box]],
+    compared: Sequence[tuple[float, int, GroundTruthFrame, Box]],
     measure: Callable[[Box, Box], float],
 ) -> Series:
     places = tuple(distance for distance, _, _, _ in compared)
@@ -150,13 +150,15 @@ def _make_scatter_series(
         places,
         tuple(measure(frame.boxes[kind], box) for _, _, frame, box in compared),
         kind="points",
-        frames=tuple(FrameRange("distance_m", at, math.nextafter(at, math.inf)) for at in places),
+        frames=tuple(
+            FrameFieldRange("distance_m", at, math.nextafter(at, math.inf)) for at in places
+        ),
     )
 
 
 def _select_comparable_boxes(
-    frames: Sequence[Frame], careful: Mapping[int, Box]
-) -> list[tuple[Frame, Box]]:
+    frames: Sequence[GroundTruthFrame], careful: Mapping[int, Box]
+) -> list[tuple[GroundTruthFrame, Box]]:
     return [
         (frame, careful[frame.id])
         for frame in frames
@@ -164,7 +166,7 @@ def _select_comparable_boxes(
     ]
 
 
-def has_every_box(frame: Frame) -> bool:
+def has_every_box(frame: GroundTruthFrame) -> bool:
     """Whether it has every kind of box, so that all rows are over the same frames."""
     return all(kind in frame.boxes for kind, _ in ROWS)
 
@@ -172,10 +174,10 @@ def has_every_box(frame: Frame) -> bool:
 def _make_box_row(
     kind: str,
     label: str,
-    compared: Sequence[tuple[Frame, Box, Box]],
+    compared: Sequence[tuple[GroundTruthFrame, Box, Box]],
     resamples: MatchResamples,
     whole: int,
-    behind: FrameRange | None = None,
+    behind: FrameFieldRange | None = None,
 ) -> Row:
     matches = [frame.match for frame, _, _ in compared]
     overlaps = [iou(box, careful) for _, box, careful in compared]
@@ -188,7 +190,7 @@ def _make_box_row(
 
 
 def _find_overlapping_detection(
-    detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box
+    detections: Mapping[int, Sequence[Detection]], frame: GroundTruthFrame, careful: Box
 ) -> Box | None:
     found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
     return next((item.box for item in found if iou(item.box, careful) > 0), None)
@@ -231,7 +233,7 @@ class EvaluationInputs:
 
 
 def evaluate(
-    frames: Sequence[Frame],
+    frames: Sequence[GroundTruthFrame],
     inputs: EvaluationInputs,
     options: EvaluationOptions,
     progress: ReportProgress | None = None,
@@ -249,7 +251,7 @@ def evaluate(
         [item.match for item in frames], options.resamples, options.seed
     )
     scores = _score_all_cameras(frames, inputs, say)
-    judged = judge_detections(frames, inputs.detections or {}, options.boxes)
+    judged = pair_truth_with_detections(frames, inputs.detections or {}, options.boxes)
     say(1, 4, "Placing balls")
     results = _measure_frames(judged, inputs, scores, options)
     say(2, 4, "Average precision")
@@ -288,7 +290,7 @@ def evaluate(
 
 
 def _score_all_cameras(
-    frames: Sequence[Frame], inputs: EvaluationInputs, say: ReportProgress
+    frames: Sequence[GroundTruthFrame], inputs: EvaluationInputs, say: ReportProgress
 ) -> tuple[Scores, Scores] | None:
     """Predicted cameras and the dataset's own against the lines."""
     if inputs.cameras is None:
@@ -304,7 +306,7 @@ def _score_all_cameras(
 
 
 def _measure_frames(
-    judged: Sequence[JudgedFrame],
+    judged: Sequence[FrameWithDetections],
     inputs: EvaluationInputs,
     scores: tuple[Scores, Scores] | None,
     options: EvaluationOptions,
@@ -338,7 +340,7 @@ def _find_frame_jac(scores: Scores, frame: int) -> float | None:
 
 
 def _make_detection_and_localization_tables(
-    judged: Sequence[JudgedFrame],
+    judged: Sequence[FrameWithDetections],
     results: Sequence[FrameResult],
     inputs: EvaluationInputs,
     resamples: MatchResamples,
@@ -350,7 +352,7 @@ def _make_detection_and_localization_tables(
 
 
 def _make_detection_figures(
-    judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: EvaluationInputs
+    judged: Sequence[FrameWithDetections], results: Sequence[FrameResult], inputs: EvaluationInputs
 ) -> Iterator[Chart]:
     yield make_precision_recall_figure(judged)
     yield make_precision_distance_figure(results, predicted=inputs.cameras is not None)
@@ -359,7 +361,7 @@ def _make_detection_figures(
 
 
 def _measure_sensitivity(
-    frames: Sequence[Frame], options: EvaluationOptions
+    frames: Sequence[GroundTruthFrame], options: EvaluationOptions
 ) -> tuple[Table, Chart]:
     able = len(sensitivity.choose_frames(frames, options.seed, len(frames)))
     chosen = sensitivity.choose_frames(frames, options.seed)
@@ -372,7 +374,9 @@ def _measure_sensitivity(
 
 
 def _count_denominators(
-    frames: Sequence[Frame], judged: Sequence[JudgedFrame], inputs: EvaluationInputs
+    frames: Sequence[GroundTruthFrame],
+    judged: Sequence[FrameWithDetections],
+    inputs: EvaluationInputs,
 ) -> dict[str, int]:
     """Every denominator, by name."""
     detections = inputs.detections or {}

@@ -47,7 +47,7 @@ def size_error_percent(box: Box, careful: Box) -> float:
 
 
 @dataclass(frozen=True)
-class Frame:
+class GroundTruthFrame:
     """One view of one group: the truth that a prediction is measured with.
 
     Attributes:
@@ -89,20 +89,20 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class JudgedFrame:
+class FrameWithDetections:
     """A frame whose truth about the ball is known, with its detections, the surest first.
 
     ``truth`` is None where the ball is out of view.
     """
 
-    frame: Frame
+    frame: GroundTruthFrame
     truth: Box | None
     detections: tuple[Detection, ...]
 
 
-def judge_detections(
-    frames: Sequence[Frame], detections: Mapping[int, Sequence[Detection]], boxes: str
-) -> list[JudgedFrame]:
+def pair_truth_with_detections(
+    frames: Sequence[GroundTruthFrame], detections: Mapping[int, Sequence[Detection]], boxes: str
+) -> list[FrameWithDetections]:
     """The frames that have the box to compare with, or no ball at all.
 
     Detections of other frames cannot be judged and take no part.
@@ -119,7 +119,7 @@ def judge_detections(
             continue
         # The sort is stable: of equal scores, the one that stands first in the file comes first.
         found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
-        judged.append(JudgedFrame(frame, None if frame.absent else truth, tuple(found)))
+        judged.append(FrameWithDetections(frame, None if frame.absent else truth, tuple(found)))
     return judged
 
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.evaluation.bootstrap import MatchResamples
-from app.evaluation.frame import Detection, Frame, JudgedFrame, iou
+from app.evaluation.frame import Detection, FrameWithDetections, GroundTruthFrame, iou
 from app.evaluation.result import (
     Axis,
     Cell,
     Chart,
     Column,
-    FrameRange,
+    FrameFieldRange,
     FrameResult,
     Panel,
     ReferenceLine,
@@ -29,7 +29,10 @@ from app.wording import plural
 
 
 def make_frame_result(
-    item: JudgedFrame, diameter_m: float, predicted: Camera | None = None, min_score: float = 0.0
+    item: FrameWithDetections,
+    diameter_m: float,
+    predicted: Camera | None = None,
+    min_score: float = 0.0,
 ) -> FrameResult:
     """Everything that is known about one frame.
 
@@ -74,7 +77,7 @@ def make_frame_result(
 
 
 def measure_position_error(
-    frame: Frame, camera: Camera | None, found: Detection | None, diameter_m: float
+    frame: GroundTruthFrame, camera: Camera | None, found: Detection | None, diameter_m: float
 ) -> float | None:
     """Metres between where one view puts a detection and the triangulated ball.
 
@@ -92,7 +95,7 @@ def measure_position_error(
 
 
 def _measure_hit_and_best_errors(
-    frame: Frame,
+    frame: GroundTruthFrame,
     camera: Camera | None,
     best: Detection | None,
     hit: Detection | None,
@@ -103,7 +106,7 @@ def _measure_hit_and_best_errors(
     return error, error if best is hit else measure_position_error(frame, camera, best, diameter_m)
 
 
-def _distance_from_camera(frame: Frame) -> float | None:
+def _distance_from_camera(frame: GroundTruthFrame) -> float | None:
     if frame.camera is None or frame.point is None:
         return None
     return float(np.linalg.norm(frame.camera.position - frame.point))
@@ -207,7 +210,7 @@ def _make_hits_row(
         resamples.mean_with_interval(near, matches, len(balls)),
         _make_median_cell(values, len(balls)),
     )
-    return Row(name, f"{label}, IoU > 0", cells, FrameRange(error))
+    return Row(name, f"{label}, IoU > 0", cells, FrameFieldRange(error))
 
 
 def _make_all_frames_row(
@@ -227,7 +230,7 @@ def _make_all_frames_row(
         resamples.mean_with_interval(near, [frame.match for frame in balls]),
         _make_median_cell(values, len(balls)),
     )
-    return Row(f"{name}_all", f"{label}, all frames", cells, FrameRange("distance_m"))
+    return Row(f"{name}_all", f"{label}, all frames", cells, FrameFieldRange("distance_m"))
 
 
 def _is_error_within_limit(error: float | None) -> bool:
@@ -255,5 +258,5 @@ def _make_share_within_distance_series(
         tuple(places.tolist()),
         tuple(share.tolist()),
         count=tuple(below.tolist()),
-        frames=tuple(FrameRange(field, high=place) for place in places.tolist()),
+        frames=tuple(FrameFieldRange(field, high=place) for place in places.tolist()),
     )

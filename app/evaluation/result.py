@@ -62,7 +62,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class FrameRange:
+class FrameFieldRange:
     """The frames behind a row: those whose ``field`` lies in [low, high), a missing bound open.
 
     Fields are those of ``result.FrameResult``.
@@ -80,7 +80,7 @@ class Row:
     name: str
     label: str
     cells: tuple[Cell, ...]
-    frames: FrameRange | None = None
+    frames: FrameFieldRange | None = None
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class Series:
     count: tuple[int, ...] = ()
     color: float | None = None
     group_id: int | None = None
-    frames: tuple[FrameRange, ...] = ()
+    frames: tuple[FrameFieldRange, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.evaluation.frame import Frame
+from app.evaluation.frame import GroundTruthFrame
 from app.evaluation.result import Axis, Cell, Chart, Column, Panel, Row, Series, Table
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
@@ -37,7 +37,7 @@ class BallSensitivity:
         shift_slope: Metres per per cent of the diagonal.
     """
 
-    frame: Frame
+    frame: GroundTruthFrame
     distance_m: float
     by_size: FloatArray
     by_shift: FloatArray
@@ -55,7 +55,9 @@ def make_centre_shifts() -> FloatArray:
     return np.linspace(-SHIFT_PERCENT, SHIFT_PERCENT, STEPS)
 
 
-def choose_frames(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> list[Frame]:
+def choose_frames(
+    frames: Sequence[GroundTruthFrame], seed: int, size: int = SAMPLE
+) -> list[GroundTruthFrame]:
     """A seeded sample of the frames that have a camera, an optimised box and a 3D ball."""
     able = [
         frame
@@ -69,7 +71,7 @@ def choose_frames(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> lis
     return [able[index] for index in sorted(chosen.tolist())]
 
 
-def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSensitivity:
+def measure_frame_sensitivity(frame: GroundTruthFrame, diameter_m: float) -> BallSensitivity:
     """The curves of one ball; the frame is one of ``choose_frames``."""
     camera, box = frame.camera, frame.boxes["optimized"]
     assert camera is not None

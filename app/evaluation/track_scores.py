@@ -91,7 +91,7 @@ class GroundTruthTrack:
 
 
 @dataclass
-class _TrackComparison:
+class _AllTracksComparison:
     """True frames with a ball, one after the other, beside what was predicted for them.
 
     Attributes:
@@ -129,9 +129,9 @@ def evaluate_tracks(
         InputError: Nothing that is predicted is of an instant with a true ball.
     """
     own, unknown = _match_tracks(truth, predicted)
-    found = _TrackComparison()
+    found = _AllTracksComparison()
     for track in truth:
-        _compare_track(found, track, own.get(track.key))
+        _add_track_to_comparison(found, track, own.get(track.key))
     error = np.array(found.error)
     if not np.isfinite(error).any():
         raise InputError(
@@ -177,8 +177,8 @@ def _match_tracks(
     return found, unknown
 
 
-def _compare_track(
-    found: _TrackComparison, track: GroundTruthTrack, predicted: PredictedTrack | None
+def _add_track_to_comparison(
+    found: _AllTracksComparison, track: GroundTruthTrack, predicted: PredictedTrack | None
 ) -> None:
     there = track.has_ball
     rows = np.full(len(track.frames), -1)
@@ -236,7 +236,7 @@ def _collect_track_events(
     return list(track.events), said, EVENT_FRAMES * step + step / 2
 
 
-def _make_positions_table(found: _TrackComparison, note: str) -> Table:
+def _make_positions_table(found: _AllTracksComparison, note: str) -> Table:
     resamples = MatchResamples.draw(found.stretch, RESAMPLES, SEED)
     state, mode = np.array(found.state), np.array(found.mode)
     parts = [("all", "All frames", np.ones(len(state), dtype=bool))]
@@ -250,7 +250,7 @@ def _make_positions_table(found: _TrackComparison, note: str) -> Table:
 
 
 def _make_position_row(
-    found: _TrackComparison, resamples: MatchResamples, name: str, label: str, part: BoolArray
+    found: _AllTracksComparison, resamples: MatchResamples, name: str, label: str, part: BoolArray
 ) -> Row:
     chosen = np.flatnonzero(part).tolist()
     of = len(chosen)
@@ -278,7 +278,7 @@ def _make_position_row(
     )
 
 
-def _make_events_table(found: _TrackComparison) -> Table:
+def _make_events_table(found: _AllTracksComparison) -> Table:
     rows = [_make_event_row("any", "Events of any kind", found, None)]
     rows += [
         _make_event_row(kind, f"{kind.capitalize()}s" if kind != "out" else "Out", found, kind)
@@ -291,7 +291,7 @@ def _make_events_table(found: _TrackComparison) -> Table:
     return Table("track_events", "Events of the ball", EVENT_COLUMNS, tuple(rows), note)
 
 
-def _make_event_row(name: str, label: str, found: _TrackComparison, kind: str | None) -> Row:
+def _make_event_row(name: str, label: str, found: _AllTracksComparison, kind: str | None) -> Row:
     true = said = hits = 0
     for real, predicted, slack in found.events:
         times = [

@@ -44,7 +44,7 @@ from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc_image_record
 from app.formats.trees import open_tree_context
-from app.formats.view_state import GroupAssembler, PlacedView, RecordFieldReader
+from app.formats.view_state import GroupAssembler, RecordFieldReader, ViewWithGroupHead
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, box_from_corner_origin
@@ -185,7 +185,7 @@ class _CocoFileReader:
     def _report_problem(self, record: str, field: str | None, problem: str) -> None:
         self._report.add_problem_at(self.path, record, field, problem)
 
-    def read_views_and_frames(self) -> Iterator[PlacedView]:
+    def read_views_and_frames(self) -> Iterator[ViewWithGroupHead]:
         """Images of ours as views; those of others become ``frames``.
 
         What is wrong with one is reported and leaves it out.
@@ -196,7 +196,7 @@ class _CocoFileReader:
             try:
                 image = RecordFieldReader(item, self.path, record)
                 if STATE in image.value:
-                    yield self._read_own_image(image, index)
+                    yield self._read_image_of_our_export(image, index)
                 else:
                     self.frames.frames.append(self._read_foreign_image(image, index))
             except DatasetFormatError as error:
@@ -212,13 +212,13 @@ class _CocoFileReader:
         problem = f"{error.problem}; left out with {plural(count, 'annotation')}"
         return DatasetFormatError(error.path, error.record, error.field, problem)
 
-    def _read_own_image(self, image: RecordFieldReader, index: int) -> PlacedView:
+    def _read_image_of_our_export(self, image: RecordFieldReader, index: int) -> ViewWithGroupHead:
         state = RecordFieldReader(image.value[STATE], self.path, image.record)
         view = state.read_view(image.read_size(), Extras())
         changed = self._apply_box_changes(index, view, state.value.get(ORIGIN) == CORNER)
-        media = self._find_own_media(image.read_short_text("file_name", ""))
+        media = self._find_media_of_our_export(image.read_short_text("file_name", ""))
         view = replace(view, balls=changed, media=media)
-        return PlacedView(state.read_group_head(), state.read_count("position"), view)
+        return ViewWithGroupHead(state.read_group_head(), state.read_count("position"), view)
 
     def _apply_box_changes(
         self, index: int, view: View, from_corner: bool
@@ -283,7 +283,7 @@ class _CocoFileReader:
             self._report_problem(record, "bbox", f"{error}; left out")
             return None
 
-    def _find_own_media(self, name: str) -> Media | None:
+    def _find_media_of_our_export(self, name: str) -> Media | None:
         """The frame of an image of ours, where it lies in the tree."""
         place = self._finder.find_picture(split_picture_name(name), self._home).place
         return None if place is None else self._tree.media(place)

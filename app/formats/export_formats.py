@@ -27,7 +27,7 @@ from app.formats.issia_3d import write_issia_3d
 from app.formats.issia_writer import write_issia
 from app.formats.manifest import SOFTWARE, read_software_version
 from app.formats.parquet import write_parquet
-from app.formats.sn_calibration import line_frame_path, map_line_names_to_owners
+from app.formats.sn_calibration import line_frame_path, map_line_file_names_to_owners
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import (
     labels_frame_path,
@@ -73,7 +73,7 @@ LAYOUTS: Mapping[str, FrameName] = {
 CLAIMS: Mapping[str, Claims] = {
     "cameras": map_camera_names_to_owners,
     "gamestate": map_sequence_names_to_owners,
-    "sn-calibration": map_line_names_to_owners,
+    "sn-calibration": map_line_file_names_to_owners,
 }
 """The names that a format makes of a view, unless that of its frame alone."""
 PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")

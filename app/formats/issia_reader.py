@@ -157,7 +157,7 @@ def open_issia(
         if tree is None:
             return found
         names = tree.names()
-        _read_tracks(tree, names, options, found, report, limits)
+        _read_viper_videos(tree, names, options, found, report, limits)
         add_stations_and_media(found, tree, names, options, report, limits)
     report_annotation_counts(found, report)
     return found
@@ -173,7 +173,7 @@ def add_stations_and_media(
 ) -> None:
     """Give each camera that has a track its station and its media."""
     given = _read_given_cameras(tree, names, report)
-    _add_media_to_folder(tree, names, found)
+    _index_camera_media(tree, names, found)
     sizes = {camera: options.get_image_size(track) for camera, track in found.tracks.items()}
     lines: dict[int, LineFile] = {}
     drawn = set[int]()
@@ -228,7 +228,7 @@ def parse_camera_number(name: str, *, strict: bool = False) -> int | None:
     return None
 
 
-def _read_tracks(
+def _read_viper_videos(
     tree: FileTree,
     names: list[str],
     options: IssiaOptions,
@@ -248,7 +248,7 @@ def _read_tracks(
         report.add_problem_at(str(tree.path), None, None, "holds no XGTF file")
     for name in files:
         shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
-        for camera, track in _assign_tracks_to_cameras(
+        for camera, track in _assign_videos_to_cameras(
             stem, read_viper(tree, name, report, limits), shown, report
         ):
             if camera is None:
@@ -267,7 +267,7 @@ def _read_tracks(
                     report.add_remark(f"{shown} brings no ball for camera {camera}.")
 
 
-def _assign_tracks_to_cameras(
+def _assign_videos_to_cameras(
     stem: str, tracks: list[ViperVideo], shown: str, report: ReaderReport
 ) -> Iterator[tuple[int | None, ViperVideo]]:
     """Each source of a file with the number of its camera.
@@ -393,7 +393,7 @@ def _make_station(
     )
 
 
-def _add_media_to_folder(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
+def _index_camera_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
     """Videos ``cam3.mp4`` and frames ``cam3/000123.jpg``, where they lie in the folder.
 
     Their numbers count as the groups' keys do.

@@ -65,7 +65,7 @@ def _describe_list(value: list[Any]) -> str:
         return f"holds COCO results, boxes that a detector predicted: evaluate them ({EVALUATE})"
     if is_camera(first):
         return "holds cameras: import it as cameras"
-    return f"is a list of objects with {_list_keys(first)}"
+    return f"is a list of objects with {_format_first_keys(first)}"
 
 
 def _describe_object(value: dict[str, Any]) -> str:
@@ -86,10 +86,10 @@ def _describe_object(value: dict[str, Any]) -> str:
         return "holds cameras: import it as cameras"
     if any(map(find_marking_like, value)):
         return "holds field lines: import it as sn-calibration"
-    return f"is an object with {_list_keys(value)}" if value else "is an empty object"
+    return f"is an object with {_format_first_keys(value)}" if value else "is an empty object"
 
 
-def _list_keys(value: dict[str, Any]) -> str:
+def _format_first_keys(value: dict[str, Any]) -> str:
     names = ", ".join(quote_text(name, 30) for name in list(value)[:_KEYS])
     return f"{names} and {len(value) - _KEYS} more" if len(value) > _KEYS else names
 

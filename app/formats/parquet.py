@@ -22,8 +22,8 @@ from app.formats.report import ReaderReport
 from app.formats.trees import FolderTree, open_tree_context
 from app.formats.view_state import (
     GroupAssembler,
-    PlacedView,
     RecordFieldReader,
+    ViewWithGroupHead,
     extras_from_json,
     view_to_json,
 )
@@ -163,20 +163,20 @@ def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
     return lambda row: None if row.view_solution is None else get(row.view_solution)
 
 
-def _make_ball_coordinate_getter(number: int) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> float | None:
+def _make_ball_3d_coordinate_getter(number: int) -> Getter:
+    def get_jac(row: ViewRow) -> float | None:
         point = row.record.ball_point
         return None if point is None or row.view_ball_fit is None else float(point[number])
 
-    return get_center_coordinate
+    return get_jac
 
 
-def _make_ball_getter(name: str) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> Any:
+def _make_ball_3d_getter(name: str) -> Getter:
+    def get_jac(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.view_ball_fit is None else getattr(ball, name)
 
-    return get_center_coordinate
+    return get_jac
 
 
 def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
@@ -185,7 +185,9 @@ def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
     def get_solution_value(row: ViewRow) -> Any:
         solution = row.record.solution
         return (
-            None if solution is None or _make_ball_getter("point")(row) is None else get(solution)
+            None
+            if solution is None or _make_ball_3d_getter("point")(row) is None
+            else get(solution)
         )
 
     return get_solution_value
@@ -200,11 +202,11 @@ def _get_p_value_of_solution(solution: Solution) -> float | None:
 
 
 def _make_box_getter(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> float | None:
+    def get_jac(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
 
-    return get_center_coordinate
+    return get_jac
 
 
 def _get_annotated_box(row: ViewRow) -> Box | None:
@@ -216,19 +218,19 @@ def _choose_exported_box(row: ViewRow) -> Box | None:
 
 
 def _make_center_coordinate_getter(axis: int) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> float | None:
+    def get_jac(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
 
-    return get_center_coordinate
+    return get_jac
 
 
 def _make_jac_getter(index: int) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> float | None:
+    def get_jac(row: ViewRow) -> float | None:
         jac = row.view_solution.calibration.jac if row.view_solution else None
         return None if jac is None else float(jac[index])
 
-    return get_center_coordinate
+    return get_jac
 
 
 def _find_first_failing_gate(row: ViewRow) -> str | None:
@@ -245,7 +247,7 @@ def _make_annotated_value_getter(name: str) -> Getter:
     return lambda row: row.annotated_values[name]
 
 
-def _make_left_out_getter(name: str) -> Getter:
+def _make_view_exclusion_getter(name: str) -> Getter:
     return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
 
 
@@ -253,7 +255,7 @@ def _make_annotated_json_getter(name: str) -> Getter:
     return lambda row: json_text(row.annotated_values[name])
 
 
-def _make_optional_annotated_getter(name: str) -> Getter:
+def _make_optional_annotated_json_getter(name: str) -> Getter:
     return lambda row: (
         json_text(row.annotated_values[name]) if name in row.annotated_values else None
     )
@@ -279,8 +281,8 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
     ("included", FLAG, _make_annotated_value_getter("included")),
-    ("left_out_reason", TEXT, _make_left_out_getter("reason")),
-    ("left_out_note", TEXT, _make_left_out_getter("note")),
+    ("left_out_reason", TEXT, _make_view_exclusion_getter("reason")),
+    ("left_out_note", TEXT, _make_view_exclusion_getter("note")),
     ("station", TEXT, _make_annotated_value_getter("station")),
     ("shared", FLAG, _make_annotated_value_getter("shared")),
     ("flipped", FLAG, _make_annotated_value_getter("flipped")),
@@ -315,11 +317,11 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("ball_y", NUMBER, _make_center_coordinate_getter(1)),
     *((f"annotated_{side}", NUMBER, _make_box_getter(_get_annotated_box, side)) for side in _SIDES),
     *((f"box_{side}", NUMBER, _make_box_getter(_choose_exported_box, side)) for side in _SIDES),
-    ("ball_3d_x", NUMBER, _make_ball_coordinate_getter(0)),
-    ("ball_3d_y", NUMBER, _make_ball_coordinate_getter(1)),
-    ("ball_3d_z", NUMBER, _make_ball_coordinate_getter(2)),
-    ("sigma_m", NUMBER, _make_ball_getter("sigma_m")),
-    ("parallax_degrees", NUMBER, _make_ball_getter("parallax_degrees")),
+    ("ball_3d_x", NUMBER, _make_ball_3d_coordinate_getter(0)),
+    ("ball_3d_y", NUMBER, _make_ball_3d_coordinate_getter(1)),
+    ("ball_3d_z", NUMBER, _make_ball_3d_coordinate_getter(2)),
+    ("sigma_m", NUMBER, _make_ball_3d_getter("sigma_m")),
+    ("parallax_degrees", NUMBER, _make_ball_3d_getter("parallax_degrees")),
     ("point", TEXT, _make_solution_getter(lambda solution: solution.point)),
     (
         "mean_sigma_m",
@@ -334,7 +336,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
         _make_solution_getter(lambda solution: _get_ball_sigma(solution.best_ball)),
     ),
     ("p_value", NUMBER, _make_solution_getter(_get_p_value_of_solution)),
-    ("covariance", LIST, lambda row: _to_float_list(_make_ball_getter("covariance")(row))),
+    ("covariance", LIST, lambda row: _to_float_list(_make_ball_3d_getter("covariance")(row))),
     ("reprojected", LIST, _get_reprojected_ball_pixels),
     ("error_px", NUMBER, _make_ball_fit_getter("error_px")),
     ("error_percent", NUMBER, _make_ball_fit_getter("error_percent")),
@@ -351,8 +353,8 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("balls", TEXT, _make_annotated_json_getter("balls")),
     ("given", TEXT, _make_annotated_json_getter("given")),
     ("given_covariance", LIST, lambda row: row.annotated_values.get("given_covariance")),
-    ("picture", TEXT, _make_optional_annotated_getter("picture")),
-    ("proposed", TEXT, _make_optional_annotated_getter("proposed")),
+    ("picture", TEXT, _make_optional_annotated_json_getter("picture")),
+    ("proposed", TEXT, _make_optional_annotated_json_getter("proposed")),
     ("extras", TEXT, lambda row: json_text(row.view.extras.to_plain_values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver_version(row)),
@@ -419,7 +421,7 @@ def read_parquet(
 
 def _read_views(
     tree: FileTree, name: str, names: list[str], report: ReaderReport, limits: ImportLimits
-) -> Iterator[PlacedView]:
+) -> Iterator[ViewWithGroupHead]:
     shown, present, number = tree.shown(name), set(names), 0
     try:
         for row in _read_rows(tree, name, limits):
@@ -474,7 +476,7 @@ def _open_as_file_on_disk(tree: FileTree, name: str, limits: ImportLimits) -> It
         yield Path(file.name)
 
 
-def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
+def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> ViewWithGroupHead:
     parsed = {
         name: None
         if not isinstance(row.get(name), str)
@@ -488,7 +490,7 @@ def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> PlacedVie
         value["left_out"] = {"reason": row["left_out_reason"], "note": row.get("left_out_note")}
     state = RecordFieldReader(value, path, record)
     view = state.read_view(state.read_size(), extras_from_json(parsed["extras"]))
-    return PlacedView(state.read_group_head(), state.read_count("position"), view)
+    return ViewWithGroupHead(state.read_group_head(), state.read_count("position"), view)
 
 
 def _find_row_media(tree: FileTree, name: str, present: set[str]) -> Media | None:

@@ -98,7 +98,7 @@ def flat_frame_name(place: str, split: str) -> str:
     return f"{digest}_{stem}"
 
 
-def map_line_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def map_line_file_names_to_owners(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``frame_names``).
 
     The place of a frame is a name, too: what is read again has it for a key. A static camera has

@@ -327,7 +327,7 @@ def _list_or_empty(value: Any) -> list[Any]:
 
 
 @dataclass(frozen=True)
-class PlacedView:
+class ViewWithGroupHead:
     """A view, its place in its group, and its group's head."""
 
     head: GroupHead
@@ -344,12 +344,12 @@ class GroupAssembler:
 
     def __init__(self, report: ReaderReport):
         self._report = report
-        self._waiting: dict[str, list[PlacedView]] = {}
+        self._waiting: dict[str, list[ViewWithGroupHead]] = {}
         self._shared: dict[str, Station] = {}
         self._done: set[str] = set()
         """Groups that were ready: whatever comes of them afterwards comes twice."""
 
-    def add(self, item: PlacedView, path: str) -> Iterator[Group]:
+    def add(self, item: ViewWithGroupHead, path: str) -> Iterator[Group]:
         """The group that this view completes, if it does; ``path`` is the file that it comes from."""
         key = item.head.key
         waiting = [] if key in self._done else self._waiting.setdefault(key, [])
@@ -377,7 +377,7 @@ class GroupAssembler:
         for key in list(self._waiting):
             yield self._make_group(self._waiting.pop(key))
 
-    def _make_group(self, items: list[PlacedView]) -> Group:
+    def _make_group(self, items: list[ViewWithGroupHead]) -> Group:
         self._report.imported += len(items)
         items.sort(key=lambda item: item.position)
         return items[0].head.make_group(

@@ -31,7 +31,7 @@ _TINY = 1e-9
 
 
 @dataclass(frozen=True)
-class Rays:
+class RayPixels:
     """Image points, each of one camera and of one point of space.
 
     Attributes:
@@ -53,11 +53,11 @@ class Rays:
         """How many points there are."""
         return int(self.point.max(initial=-1)) + 1
 
-    def select_rays_of_points(self, kept: BoolArray) -> Rays:
+    def select_rays_of_points(self, kept: BoolArray) -> RayPixels:
         """The rays of some points, shape (points,), in the same order."""
         return self._select_rays(kept, kept[self.point])
 
-    def select_common_points(self, *cameras: int) -> tuple[Rays, IntArray]:
+    def select_common_points(self, *cameras: int) -> tuple[RayPixels, IntArray]:
         """The rays of points that all of some cameras see, from these alone, and the points' rows."""
         seen = np.zeros((self.point_count, len(self.half_diagonals)), dtype=np.bool_)
         seen[self.point, self.camera] = True
@@ -65,10 +65,10 @@ class Rays:
         rays = self._select_rays(kept, kept[self.point] & np.isin(self.camera, cameras))
         return rays, np.flatnonzero(kept)
 
-    def _select_rays(self, kept: BoolArray, rows: BoolArray) -> Rays:
+    def _select_rays(self, kept: BoolArray, rows: BoolArray) -> RayPixels:
         """Some rays of the points that are kept."""
         place = np.cumsum(kept) - 1
-        return Rays(
+        return RayPixels(
             self.pixels[rows],
             self.camera[rows],
             place[self.point[rows]],
@@ -92,7 +92,7 @@ class LinearizedRays:
     by_point: FloatArray
 
 
-def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> LinearizedRays:
+def linearize(parameters: FloatArray, points: FloatArray, rays: RayPixels) -> LinearizedRays:
     """Residuals and derivatives of all rays.
 
     Args:
@@ -115,7 +115,7 @@ def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> Lineari
     return LinearizedRays(residuals, slopes, -slopes[:, :, X : Z + 1])
 
 
-def triangulate_nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
+def triangulate_nearest_points(parameters: FloatArray, rays: RayPixels) -> FloatArray:
     """The points nearest to their rays in space, pitch frame, metres, shape (F, 3).
 
     The least squares of the distances to rays from C along d: the sum of (I - d d') X equals that
@@ -138,7 +138,7 @@ def triangulate_nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray
     return np.asarray(points, dtype=np.float64)
 
 
-def optimize_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
+def optimize_points(parameters: FloatArray, rays: RayPixels, scale: float) -> FloatArray:
     """The points of least soft-L1 cost for these cameras, metres, shape (F, 3).
 
     Args:
@@ -162,7 +162,7 @@ def soft_l1_weights(residuals: FloatArray, scale: float) -> FloatArray:
 
 
 def bundle_equations(
-    parameters: FloatArray, rays: Rays, scale: float
+    parameters: FloatArray, rays: RayPixels, scale: float
 ) -> tuple[float, FloatArray, FloatArray]:
     """Cost, gradient and J^T W J of the cameras with every point at its best.
 
@@ -200,7 +200,7 @@ def bundle_equations(
 
 
 def _point_equations(
-    at: LinearizedRays, weights: FloatArray, rays: Rays
+    at: LinearizedRays, weights: FloatArray, rays: RayPixels
 ) -> tuple[FloatArray, FloatArray]:
     """J^T W J and gradient of each point, shapes (F, 3, 3) and (F, 3)."""
     information, gradient = np.zeros((rays.point_count, 3, 3)), np.zeros((rays.point_count, 3))
@@ -212,7 +212,7 @@ def _point_equations(
 
 
 def ray_pair_distances_px(
-    parameters: FloatArray, rays: Rays
+    parameters: FloatArray, rays: RayPixels
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """How far the two rays of each point pass each other in the pictures, in pixels.
 

@@ -243,16 +243,18 @@ def select_farthest_points(pixels, curve, limits, keep):
         keep[begin:end] = end - begin <= left
         if end - begin > left:
             x, y = pixels[begin:end, 0].mean(), pixels[begin:end, 1].mean()
-            farthest = _update_distances(pixels, apart, begin, end, x, y, True)
+            farthest = _update_distances_and_find_farthest(pixels, apart, begin, end, x, y, True)
             for nth in range(left):
                 keep[farthest] = True
                 x, y = pixels[farthest]
-                farthest = _update_distances(pixels, apart, begin, end, x, y, nth == 0)
+                farthest = _update_distances_and_find_farthest(
+                    pixels, apart, begin, end, x, y, nth == 0
+                )
         begin = end
 
 
 @compiled
-def _update_distances(pixels, apart, begin, end, x, y, anew):
+def _update_distances_and_find_farthest(pixels, apart, begin, end, x, y, anew):
     """Lowers each point's squared distance to the nearest chosen one (``anew``: to this one alone);
     returns the point whose distance is largest."""
     farthest, most = begin, -1.0

@@ -33,16 +33,16 @@ from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.people.visibility_queries import Visibility
 from app.features.policies.noise import NoiseCache
 from app.features.practice.service import register_practice_resume
-from app.features.predictions.jobs import resume_prediction_jobs
+from app.features.predictions.jobs import register_prediction_jobs
 from app.features.predictions.reader import PredictionReader
-from app.features.recordings.camera_jobs import resume_camera_jobs
+from app.features.recordings.camera_jobs import register_camera_jobs
 from app.features.recordings.follow import BallFollower
-from app.features.recordings.frames import RecordingFrames
-from app.features.recordings.jobs import resume_recording_jobs
+from app.features.recordings.frames import RecordingFrameDecoder
+from app.features.recordings.jobs import register_recording_jobs
 from app.features.solve.jobs import register_solve_resume, request_solve_of_leftovers
 from app.features.tracks.jobs import TRACKS
-from app.features.tracks.link_ball import resume_link_by_ball_jobs
-from app.features.versions.jobs import resume_version_jobs
+from app.features.tracks.link_ball import register_link_by_ball_jobs
+from app.features.versions.jobs import register_version_jobs
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsCache
@@ -111,7 +111,7 @@ class Services:
     settings: Settings
     store: Store
     frames: FrameProvider
-    recordings: RecordingFrames
+    recordings: RecordingFrameDecoder
     balls: BallFollower
     large: LargeGroupSolver
     previews: PreviewSolver
@@ -142,7 +142,7 @@ class Services:
             settings,
             store,
             frames,
-            RecordingFrames(settings),
+            RecordingFrameDecoder(settings),
             BallFollower(settings),
             large,
             PreviewSolver(settings, store, PaintUpdater(frames), large),
@@ -166,12 +166,12 @@ class Services:
         for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
             kind.register_with_jobs(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
-        resume_version_jobs(self.jobs, self.store)
+        register_version_jobs(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
-        resume_recording_jobs(self.jobs, self.store)
-        resume_camera_jobs(self.jobs, self.store)
-        resume_link_by_ball_jobs(self.jobs, self.store)
-        resume_prediction_jobs(self.jobs, self.store)
+        register_recording_jobs(self.jobs, self.store)
+        register_camera_jobs(self.jobs, self.store)
+        register_link_by_ball_jobs(self.jobs, self.store)
+        register_prediction_jobs(self.jobs, self.store)
         register_practice_resume(self.jobs, self.store)
         self.jobs.call_on_leadership(self._start_leader_work)
         self.jobs.start()

@@ -31,7 +31,7 @@ from app.features.maintenance.service import Banner, read_banner
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
     LoggedChange,
-    find_newest_entry_and_solution,
+    find_newest_entry_and_solution_ids,
     read_groups_solved_since,
     read_new_changes,
     read_newest_entry_id,
@@ -78,7 +78,7 @@ class DatasetEvent(BaseModel):
     actor: str | None
 
 
-class WorkEvent(BaseModel):
+class AssignedGroupEvent(BaseModel):
     """A group of a batch was opened, left, taken over or handed in."""
 
     batch: int
@@ -97,7 +97,7 @@ EVENTS: dict[str, type[BaseModel]] = {
     "group": GroupEvent,
     "dataset": DatasetEvent,
     "job": JobDocument,
-    "work": WorkEvent,
+    "work": AssignedGroupEvent,
     "maintenance": MaintenanceEvent,
 }
 """What the data of each kind of event is."""
@@ -199,7 +199,7 @@ class EventPublisher:
 
     def read_resume_token(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
-        return "-".join(map(str, find_newest_entry_and_solution(self._store)))
+        return "-".join(map(str, find_newest_entry_and_solution_ids(self._store)))
 
     def read_banner_json(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""
@@ -326,7 +326,7 @@ class EventPublisher:
         if lease.group is None:
             return
         here = [PresenceDocument.model_validate(one) for one in lease.here]
-        event = WorkEvent(
+        event = AssignedGroupEvent(
             batch=lease.batch.id, group=lease.group, dataset=lease.batch.dataset, here=here
         )
         self._publish_work(lease.batch.dataset_id, event)
@@ -337,9 +337,9 @@ class EventPublisher:
         kind, _, rest = word.partition(" ")
         if kind == _WORK:
             dataset_id, _, text = rest.partition(" ")
-            self._publish_work(int(dataset_id), WorkEvent.model_validate_json(text))
+            self._publish_work(int(dataset_id), AssignedGroupEvent.model_validate_json(text))
 
-    def _publish_work(self, dataset_id: int, document: WorkEvent) -> None:
+    def _publish_work(self, dataset_id: int, document: AssignedGroupEvent) -> None:
         event = _format_event("work", document)
         _deliver_events(
             {feed: [event] for feed in self._list_listeners() if feed.wants(dataset_id)}

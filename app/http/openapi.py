@@ -234,15 +234,19 @@ def _make_openapi_document(app: FastAPI) -> dict[str, Any]:
         schemas.update(described.pop("$defs", {}))
         schemas[model.__name__] = described
     shown = [field.field_info.annotation for field in get_fields_from_routes(app.routes)]
-    for kind in {value for model in (*shown, *models) for value in _value_types(model)}:
-        _describe_value(kind, schemas)
+    for kind in {
+        value for model in (*shown, *models) for value in _iterate_dataclasses_of_type(model)
+    }:
+        _describe_dataclass_schema(kind, schemas)
     _describe_schemas(schemas)
     _describe_security(document, routes)
     _add_examples(document)
     return document
 
 
-def _value_types(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any]]:
+def _iterate_dataclasses_of_type(
+    kind: Any, above: frozenset[Any] = frozenset()
+) -> Iterator[type[Any]]:
     """Frozen values that a response holds, which are their own models."""
     if kind in above:
         return
@@ -253,10 +257,10 @@ def _value_types(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[typ
     elif isinstance(kind, type) and issubclass(kind, BaseModel):
         hints = [field.annotation for field in kind.model_fields.values()]
     for hint in hints:
-        yield from _value_types(hint, above | {kind})
+        yield from _iterate_dataclasses_of_type(hint, above | {kind})
 
 
-def _describe_value(kind: type[Any], schemas: Mapping[str, dict[str, Any]]) -> None:
+def _describe_dataclass_schema(kind: type[Any], schemas: Mapping[str, dict[str, Any]]) -> None:
     """Say of a value that all its fields are there, and what each is as its docstring does."""
     schema, text = schemas[kind.__name__], inspect.cleandoc(kind.__doc__ or "")
     text = text.replace("``", "`").replace("None", "null")

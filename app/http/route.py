@@ -147,16 +147,18 @@ class Route(APIRoute):
     ) -> Response:
         """The answer that was given before, else a new one."""
         if request.method in SAFE_METHODS or not self.stores_response:
-            return await self._answer_within_limits(gate, ReadRequest(request, body), handler)
+            return await self._answer_within_limits(
+                gate, RequestWithReadBody(request, body), handler
+            )
         digest = RequestDigest(
             request, body.value, has_value=body.has_value, is_streamed=self._takes_bytes
         )
-        read = ReadRequest(request, body, digest.receive if self._takes_bytes else None)
+        read = RequestWithReadBody(request, body, digest.receive if self._takes_bytes else None)
         return await gate.idempotency.answer_once(
             request,
             digest,
             find_actor_name(request.scope, LOCAL_USER),
-            hidden or _is_never_hidden,
+            hidden or _return_not_hidden,
             partial(self._answer_within_limits, gate, read, handler),
         )
 
@@ -186,7 +188,7 @@ class Route(APIRoute):
             return refusal or await handler(request)
 
 
-class SecretRoute(Route):
+class UnstoredResponseRoute(Route):
     """A route that shows a secret, or ends one: what it answers is stored nowhere."""
 
     stores_response = False
@@ -201,7 +203,7 @@ class RequestBody:
     has_value: bool = False
 
 
-class ReadRequest(StarletteRequest):
+class RequestWithReadBody(StarletteRequest):
     """A request whose body has been read, or is read by ``receive`` as it passes."""
 
     def __init__(self, request: Request, body: RequestBody, receive: Receive | None = None):
@@ -254,7 +256,7 @@ def list_routes(app: FastAPI) -> Iterator[tuple[str, Route]]:
                 yield f"{method} {context.path}", context.original_route
 
 
-async def _is_never_hidden() -> bool:
+async def _return_not_hidden() -> bool:
     return False
 
 

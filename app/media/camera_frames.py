@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.media.files import decode_frame, orient_as_annotated, read_video_times
+from app.media.files import decode_frame, read_video_times, to_rgb_as_annotated
 from app.media.frames import find_later_frame_file
 from app.media.object_frames import is_in_object_store
 from app.media.video import FrameReader
@@ -80,7 +80,7 @@ def _find_frames_between(
             yield here.number + off, between
 
 
-class CameraFrames:
+class CameraFrameReader:
     """Reads frames of a camera in the size that its annotations have.
 
     Args:
@@ -162,7 +162,7 @@ class CameraFrames:
                 raise NotFoundError(
                     f"frame {media.frame} of {Path(media.path).name} cannot be decoded"
                 )
-            picture = orient_as_annotated(found, self._flipped)
+            picture = to_rgb_as_annotated(found, self._flipped)
         size = self._size.width, self._size.height
         if picture.shape[1::-1] == size:
             return picture

@@ -19,8 +19,8 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.json_text import digest_content
-from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
-from app.media.object_frames import ArchiveMembers, is_in_object_store, read_object
+from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_jpeg_scans, check_size, read_header
+from app.media.object_frames import ArchiveMemberReader, is_in_object_store, read_object
 from app.media.video import Times, make_index, open_video, read_cached_index, read_frame_at
 from app.object_store.path import split_pinned_address
 from app.soccer.group import Media
@@ -28,7 +28,7 @@ from app.wording import plural
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
-_ARCHIVES = ArchiveMembers()
+_ARCHIVES = ArchiveMemberReader()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 """Pixels as stored; ``_turn_upright`` turns them as the header says, for OpenCV and browsers differ."""
 _CACHE_VERSION = 2
@@ -106,7 +106,7 @@ def read_digest_and_pixels(
             picture = _decode_pixels(data, settings, name)
     if digest == known:
         return digest, None
-    return digest, orient_as_annotated(picture, flipped)
+    return digest, to_rgb_as_annotated(picture, flipped)
 
 
 def read_cached_frame(
@@ -305,10 +305,10 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
     _require_inside_root(media, settings)
-    return orient_as_annotated(_decode_frame(media, settings), flipped)
+    return to_rgb_as_annotated(_decode_frame(media, settings), flipped)
 
 
-def orient_as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
+def to_rgb_as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
     """Red green blue, and turned right where it is mirrored."""
     return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
 
@@ -332,7 +332,7 @@ def _decode_pixels(data: bytes, settings: Settings, name: str) -> Any:
     header = read_header(data, name)
     check_size(header, settings, name)
     if header.kind == JPEG:
-        check_scans(data, name)
+        check_jpeg_scans(data, name)
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), _FLAGS)
     except cv2.error as error:

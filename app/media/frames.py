@@ -202,7 +202,7 @@ class FrameProvider:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._submit_fetch(media, bounded=True)
+        return self._submit_frame_preparation(media, bounded=True)
 
     def request_picture(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
         """Have a picture made; its future has it, or the errors of ``read_encoded_frame``.
@@ -217,7 +217,7 @@ class FrameProvider:
         found = self.read_cached(media, width, flipped)
         if found is not None:
             return found
-        fetching = self._submit_fetch(media, bounded=False)
+        fetching = self._submit_frame_preparation(media, bounded=False)
         if fetching is not None:
             fetching.future.result()
         made: EncodedPicture = self._submit_picture(
@@ -321,7 +321,7 @@ class FrameProvider:
         indexing.future.add_done_callback(continue_after_index)
         return waiting
 
-    def _submit_fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
+    def _submit_frame_preparation(self, media: Media, *, bounded: bool) -> PoolTask | None:
         if media.frame is not None:
             return self._videos.request_indexing(media, bounded=bounded)
         if not is_in_object_store(media) or is_cached(media, self._settings):
@@ -387,7 +387,7 @@ class VideoIndexer:
             NotFoundError: The video is not there.
             OverloadedError: Too many wait.
         """
-        if media.frame is None or self._is_ready(media):
+        if media.frame is None or self._has_index(media):
             return None
 
         def explain(error: WorkerEnded) -> ReviewError:
@@ -400,7 +400,7 @@ class VideoIndexer:
                     index_video, media, self._settings, explain=explain, bounded=bounded
                 )
                 self._running[media.path] = running
-        running.future.add_done_callback(partial(self._forget_finished, media.path))
+        running.future.add_done_callback(partial(self._finish_indexing, media.path))
         # Who waits may leave; the index is made all the same, for it takes long and is needed again.
         waiting = PoolTask(explain)
         running.future.add_done_callback(partial(_forward_result, waiting.future))
@@ -449,13 +449,13 @@ class VideoIndexer:
         """End the process."""
         self.pool.close()
 
-    def _is_ready(self, media: Media) -> bool:
+    def _has_index(self, media: Media) -> bool:
         if has_video_index(media, self._settings):
             return True
         stamp, _ = self._unkept.get(media.path, ("", None))
         return stamp == make_video_stamp(media)
 
-    def _forget_finished(self, path: str, done: Future[Any]) -> None:
+    def _finish_indexing(self, path: str, done: Future[Any]) -> None:
         if not done.cancelled() and done.exception() is None:
             stamp, unkept = done.result()
             if unkept is not None:

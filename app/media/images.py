@@ -113,7 +113,7 @@ def check_size(header: ImageHeader, settings: Settings, name: str = "the image")
         )
 
 
-def check_scans(data: bytes, name: str = "the image") -> None:
+def check_jpeg_scans(data: bytes, name: str = "the image") -> None:
     """Refuse a JPEG that draws its picture over and over.
 
     Args:

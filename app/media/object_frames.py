@@ -33,7 +33,7 @@ _Key = tuple[str, int, int, str]
 inside it last, or empty."""
 
 
-class ArchiveMembers:
+class ArchiveMemberReader:
     """Members of zip archives by path; safe to use from many threads.
 
     A member may lie in a zip that is itself a member: ``<match>/Frames-v3.zip/7.png``.
@@ -146,7 +146,7 @@ def _archive_key(path: _Place) -> _Key:
     return str(path), status.st_mtime_ns, status.st_size, ""
 
 
-_ARCHIVES = ArchiveMembers()
+_ARCHIVES = ArchiveMemberReader()
 DIGEST = hashlib.sha256().digest_size
 LOOKS = 50
 """After every fiftieth part of the room a process looks whether there is too much."""

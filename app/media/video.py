@@ -53,7 +53,7 @@ MOST_DAMAGED = 500
 """Pictures in a row that may be damaged; the end of a video is where no more come than that."""
 
 
-def grab_next_frame(video: cv2.VideoCapture) -> int | None:
+def grab_next_frame_counting_damaged(video: cv2.VideoCapture) -> int | None:
     """Grab the next frame that can be decoded.
 
     Returns:
@@ -193,7 +193,7 @@ class FrameReader:
         self.close()
         video = self._ensure_open()
         while self._next <= number:
-            if grab_next_frame(video) is None:
+            if grab_next_frame_counting_damaged(video) is None:
                 self.close()
                 return None
             self._next += 1
@@ -230,7 +230,7 @@ class FrameReader:
 
     def skip(self) -> bool:
         """Pass over the frame that follows the one read last; whether there is one."""
-        if self._video is None or grab_next_frame(self._video) is None:
+        if self._video is None or grab_next_frame_counting_damaged(self._video) is None:
             return False
         self._next += 1
         return True
@@ -259,7 +259,7 @@ class FrameReader:
         """Go to about a frame on the way to another one; whether it is known which one this is."""
         video = self._ensure_open()
         video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
-        if grab_next_frame(video) is None:
+        if grab_next_frame_counting_damaged(video) is None:
             return False
         places = np.flatnonzero(_is_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
         # Where the jump led too far, or two frames have one time, nothing says which one this is.
@@ -277,7 +277,7 @@ class FrameReader:
         """Decode on to a frame; whether every frame on the way came when it should."""
         video = self._ensure_open()
         while self._next <= number:
-            gone = grab_next_frame(video) is None
+            gone = grab_next_frame_counting_damaged(video) is None
             if gone or not _is_same_time(self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)):
                 return False
             self._next += 1
@@ -305,7 +305,7 @@ def _retrieve_frame(video: Any) -> Any:
 def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
     with _open_video(path) as video:
-        while grab_next_frame(video) is not None:
+        while grab_next_frame_counting_damaged(video) is not None:
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")

@@ -22,7 +22,7 @@ from app.object_store.store import (
 )
 
 if TYPE_CHECKING:
-    from app.config import Settings, StoreSettings
+    from app.config import ObjectStoreSettings, Settings
 
 _SEAL = re.compile(r"(.+)#(etag|sha256)=([^#]+)", re.DOTALL)
 
@@ -77,7 +77,7 @@ class StoredPath:
     """
 
     store_name: str
-    settings: StoreSettings
+    settings: ObjectStoreSettings
     key: str
     stored: StoredObject | None = None
 

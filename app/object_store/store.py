@@ -19,7 +19,7 @@ from app.durable import is_open_to_others
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 
 if TYPE_CHECKING:
-    from app.config import Settings, StoreSettings
+    from app.config import ObjectStoreSettings, Settings
 
 SCHEME = "s3://"
 """What addresses begin with."""
@@ -65,7 +65,7 @@ class ObjectStore:
         keys: Access key, secret and token, or None of a public one.
     """
 
-    def __init__(self, name: str, settings: StoreSettings, keys: tuple[str, ...] | None):
+    def __init__(self, name: str, settings: ObjectStoreSettings, keys: tuple[str, ...] | None):
         self.name, self.settings = name, settings
         self._engine = _load_library()
         self._store = self._connect(keys, settings.seconds)
@@ -274,23 +274,23 @@ def open_store(settings: Settings, name: str) -> ObjectStore:
     return open_configured_store(name, found)
 
 
-def open_configured_store(name: str, settings: StoreSettings) -> ObjectStore:
+def open_configured_store(name: str, settings: ObjectStoreSettings) -> ObjectStore:
     """The store that is described so, with the keys that hold now.
 
     Raises:
         StorageError: Its file of keys cannot be used, or the library is missing.
     """
-    return _open_with_keys(name, settings, read_keys(settings))
+    return _open_with_keys(name, settings, read_access_keys(settings))
 
 
 @lru_cache(maxsize=64)
 def _open_with_keys(
-    name: str, settings: StoreSettings, keys: tuple[str, ...] | None
+    name: str, settings: ObjectStoreSettings, keys: tuple[str, ...] | None
 ) -> ObjectStore:
     return ObjectStore(name, settings, keys)
 
 
-def read_keys(settings: StoreSettings) -> tuple[str, ...] | None:
+def read_access_keys(settings: ObjectStoreSettings) -> tuple[str, ...] | None:
     """Access key, secret and token, or None of a public store.
 
     They are read anew each time, for keys in a file are changed there.
@@ -306,7 +306,7 @@ def read_keys(settings: StoreSettings) -> tuple[str, ...] | None:
     return tuple("" if value is None else value.get_secret_value() for value in given)
 
 
-def _read_key_file(settings: StoreSettings) -> tuple[str, ...]:
+def _read_key_file(settings: ObjectStoreSettings) -> tuple[str, ...]:
     path, parser = settings.key_file, configparser.ConfigParser(interpolation=None)
     assert path is not None
     try:

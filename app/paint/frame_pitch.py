@@ -24,7 +24,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 from app.solving.tripod_pitch import (
-    PaintSightings,
+    FrameWithPaint,
     TripodPitch,
     find_tripod_pitch,
     second_moment_about_plan,
@@ -73,7 +73,9 @@ def group_by_position(
     return found
 
 
-def find_agreed_pitch(frames: Sequence[PitchSizeFrameLines], pitch: Pitch) -> Pitch | None:
+def find_differing_agreed_pitch(
+    frames: Sequence[PitchSizeFrameLines], pitch: Pitch
+) -> Pitch | None:
     """The size that all frames certainly show where it is another one; None otherwise.
 
     Args:
@@ -92,7 +94,7 @@ def _is_near(camera: Camera, other: Camera | None) -> bool:
     return other is not None and bool(np.linalg.norm(camera.position - other.position) < NEAR_M)
 
 
-def make_paint_sightings(snapped: SnappedCamera) -> PaintSightings:
+def make_paint_sightings(snapped: SnappedCamera) -> FrameWithPaint:
     """A camera on its paint, as frames are solved together."""
     evidence, camera = snapped.evidence, snapped.camera
     traced = evidence.traced
@@ -100,7 +102,7 @@ def make_paint_sightings(snapped: SnappedCamera) -> PaintSightings:
     pixels = np.ascontiguousarray(pixels - camera.principal_point)
     half = float(np.hypot(*snapped.size)) / 2
     sightings = CurvePoints(pixels, traced.marking, np.ones(len(pixels)))
-    return PaintSightings(parameters_from_camera(camera, half), sightings, evidence.sigmas)
+    return FrameWithPaint(parameters_from_camera(camera, half), sightings, evidence.sigmas)
 
 
 def find_shared_pitch(

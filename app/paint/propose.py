@@ -59,7 +59,7 @@ from app.paint.search import (
     PictureToScore,
     VisiblePaint,
     find_visible_paint,
-    is_same_view,
+    is_same_or_half_turned_view,
     search_cameras,
 )
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
@@ -140,7 +140,7 @@ class FrameProposal:
 
 
 @dataclass(frozen=True)
-class SearchedFrame:
+class FrameToSearch:
     """A frame in the width in which it is searched."""
 
     image: Image
@@ -206,7 +206,7 @@ def propose_camera(
             their lenses, first.
         policy: Prior of the distortion.
     """
-    frame = read_and_prepare_frame(image)
+    frame = resize_and_prepare_frame(image)
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     return propose_for_frame(
@@ -215,7 +215,7 @@ def propose_camera(
 
 
 def propose_for_frame(
-    frame: SearchedFrame,
+    frame: FrameToSearch,
     image: Image,
     pitch: Pitch,
     known: Sequence[Camera],
@@ -259,7 +259,7 @@ def explain_too_small_picture(image: Image) -> str | None:
     return f"the picture is too small ({width} x {height} pixels): no line can be followed"
 
 
-def read_and_prepare_frame(image: Image) -> SearchedFrame | str:
+def resize_and_prepare_frame(image: Image) -> FrameToSearch | str:
     """A frame ready to be searched, or why there is nothing to search for."""
     if (small := explain_too_small_picture(image)) is not None:
         return small
@@ -280,7 +280,7 @@ def read_and_prepare_frame(image: Image) -> SearchedFrame | str:
 
 def prepare_frame_to_search(
     image: Image, field: BoolArray, strength: Strength, reading: PreparedPicture
-) -> SearchedFrame | str:
+) -> FrameToSearch | str:
     """A frame that is read, ready to be searched, or why there is nothing to search for.
 
     Args:
@@ -294,7 +294,7 @@ def prepare_frame_to_search(
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
     picture = PictureToScore.of(strength > 0, field, center)
-    return SearchedFrame(image, field, strength, pieces, picture, reading)
+    return FrameToSearch(image, field, strength, pieces, picture, reading)
 
 
 def line_strength(image: Image, field: BoolArray) -> Strength:
@@ -306,7 +306,7 @@ def line_strength(image: Image, field: BoolArray) -> Strength:
 
 
 def _rank_at_full_resolution(
-    image: Image, frame: SearchedFrame, ranked: Sequence[RankedCamera], pitch: Pitch
+    image: Image, frame: FrameToSearch, ranked: Sequence[RankedCamera], pitch: Pitch
 ) -> list[RankedCamera]:
     """The best cameras of a frame once more, in the picture's own size and by clear paint alone.
 
@@ -346,7 +346,7 @@ def _rank_at_full_resolution(
 
 
 def _snap_at_full_resolution(
-    looked: SearchedFrame, item: RankedCamera, factor: float, pitch: Pitch
+    looked: FrameToSearch, item: RankedCamera, factor: float, pitch: Pitch
 ) -> RankedCamera | None:
     """A camera drawn onto the paint of the picture in its own size, from near and from afar; the
     better of both."""
@@ -364,14 +364,14 @@ def _snap_at_full_resolution(
     return max(found, key=lambda item: item.score, default=None)
 
 
-def _resize_field(frame: SearchedFrame, width: int, height: int) -> BoolArray:
+def _resize_field(frame: FrameToSearch, width: int, height: int) -> BoolArray:
     """The field of play in the picture as it is."""
     size, small = (width, height), frame.field.astype(np.uint8)
     return cv2.resize(small, size, interpolation=cv2.INTER_NEAREST).astype(np.bool_)
 
 
 def rank_cameras(
-    frame: SearchedFrame, library: CameraSearchSpace, pitch: Pitch, policy: CalibrationPolicy
+    frame: FrameToSearch, library: CameraSearchSpace, pitch: Pitch, policy: CalibrationPolicy
 ) -> list[RankedCamera]:
     """The cameras of a library that lie on the paint of a frame, best first."""
     amount = (SNAPPED, SCOUTED, SEARCHED)
@@ -401,7 +401,7 @@ def rank_cameras(
 
 
 def _rank_snapped(
-    frame: SearchedFrame,
+    frame: FrameToSearch,
     snapped: SnappedCamera,
     pitch: Pitch,
     policy: CalibrationPolicy,
@@ -414,7 +414,7 @@ def _rank_snapped(
 
 
 def _snap_from_search(
-    frame: SearchedFrame,
+    frame: FrameToSearch,
     start: Camera,
     library: CameraSearchSpace,
     pitch: Pitch,
@@ -435,7 +435,7 @@ def _snap_from_search(
 
 
 def _move_to_known_position(
-    frame: SearchedFrame, item: RankedCamera, match: CameraSearchSpace, pitch: Pitch
+    frame: FrameToSearch, item: RankedCamera, match: CameraSearchSpace, pitch: Pitch
 ) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
     the markings there as well."""
@@ -515,7 +515,7 @@ def measure_weakest_marking(
 
 
 def merge_ranked_cameras(
-    frame: SearchedFrame, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
+    frame: FrameToSearch, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
 ) -> list[RankedCamera]:
     """Both lists in one, best first, each camera once."""
     kept: list[RankedCamera] = []
@@ -526,7 +526,7 @@ def merge_ranked_cameras(
         camera = item.snapped.camera
         if (height, width) != (rows, columns):
             camera = camera.scaled(columns / width, rows / height)
-        if not any(is_same_view(old, camera, frame.picture) for old in shown):
+        if not any(is_same_or_half_turned_view(old, camera, frame.picture) for old in shown):
             kept.append(item)
             shown.append(find_visible_paint(camera, frame.picture))
     return kept
@@ -590,7 +590,7 @@ def explain_non_square_pixels(image: Image, camera: Camera, pitch: Pitch) -> str
 
 
 def _choose_proposal(
-    image: Image, frame: SearchedFrame, ranked: list[RankedCamera], pitch: Pitch
+    image: Image, frame: FrameToSearch, ranked: list[RankedCamera], pitch: Pitch
 ) -> FrameProposal:
     reason = explain_uncertain_camera(ranked)
     if not ranked:
@@ -619,7 +619,7 @@ def _choose_proposal(
 
 
 def _snap_at_full_size(
-    image: Image, frame: SearchedFrame, best: RankedCamera, pitch: Pitch
+    image: Image, frame: FrameToSearch, best: RankedCamera, pitch: Pitch
 ) -> SnappedCamera:
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""

@@ -337,7 +337,7 @@ def _select_distinct_cameras(
         if len(found) == most or score[index] <= 0 or not np.isfinite(rows[index]).all():
             break
         camera = camera_from_parameters(rows[index], (x0, y0), picture.half_diagonal)
-        if not any(is_same_view(other, camera, picture) for other in shown):
+        if not any(is_same_or_half_turned_view(other, camera, picture) for other in shown):
             found.append(FoundCamera(rows[index], camera, float(score[index])))
             shown.append(find_visible_paint(camera, picture))
     return found
@@ -365,7 +365,9 @@ def find_visible_paint(camera: Camera, picture: PictureToScore) -> VisiblePaint:
     return VisiblePaint(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def is_same_view(shown: VisiblePaint, other: Camera, picture: PictureToScore) -> bool:
+def is_same_or_half_turned_view(
+    shown: VisiblePaint, other: Camera, picture: PictureToScore
+) -> bool:
     """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
     if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
         return False

@@ -106,7 +106,7 @@ NOTHING_NEW = "The paint shows no line that is not drawn here already."
 
 
 @dataclass(frozen=True)
-class _DrawnLinesFit:
+class _DrawnLinesComparison:
     """Proposed lines, and how far drawn ones lie from where their camera puts them.
 
     Attributes:
@@ -141,7 +141,10 @@ def keep_undrawn_markings(
     if found.outcome != "proposed" or not drawn:
         return found
     turned = make_lines({opposite_marking(name): points for name, points in found.lines.items()})
-    sides = [_fit_drawn_lines(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)]
+    sides = [
+        _compare_with_drawn_lines(lines, drawn, pitch, size, policy)
+        for lines in (found.lines, turned)
+    ]
     side = min(sides, key=lambda item: item.contradiction_cost(FAR_PERCENT / 100 * size.diagonal))
     rest = {name: points for name, points in side.lines.items() if name not in drawn}
     sentence = _describe_contradiction(side.apart, APART_PERCENT / 100 * size.diagonal)
@@ -170,15 +173,15 @@ def propose_undrawn_lines(
     return keep_undrawn_markings(found, drawn, pitch, size, policy)
 
 
-def _fit_drawn_lines(
+def _compare_with_drawn_lines(
     lines: Lines, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
-) -> _DrawnLinesFit:
+) -> _DrawnLinesComparison:
     camera = calibrate(lines, pitch, size, policy).camera
     fits = measure_calibration(
         Calibration("lines", camera), drawn, policy.pitch_for_fitted_lines(pitch), size
     ).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
-    return _DrawnLinesFit(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
+    return _DrawnLinesComparison(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
 
 
 def _describe_contradiction(apart: Mapping[str, float], limit: float) -> str:

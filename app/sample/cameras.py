@@ -261,7 +261,7 @@ REPLAY_SHARE = (0.18, 0.24, 0.15, 0.15, 0.16, 0.12)
 
 
 @dataclass(frozen=True)
-class CameraStands:
+class CameraPositions:
     """Where the cameras of one match stand.
 
     Attributes:
@@ -273,7 +273,7 @@ class CameraStands:
     seats: dict[str, tuple[FloatArray, ...]]
 
 
-def place_cameras(rng: np.random.Generator) -> CameraStands:
+def place_cameras(rng: np.random.Generator) -> CameraPositions:
     """Cameras as broadcasters place them."""
     y = rng.uniform(46.0, 90.0)
     height = np.clip(9.5 + 0.24 * (y - 41.0) + rng.normal(0, 2.0), 9.3, 24.7)
@@ -300,11 +300,11 @@ def place_cameras(rng: np.random.Generator) -> CameraStands:
             for end in ends
         ),
     }  # fmt: skip
-    return CameraStands(main, seats)
+    return CameraPositions(main, seats)
 
 
 def choose_replay_position(
-    rng: np.random.Generator, rig: CameraStands, ball: FloatArray
+    rng: np.random.Generator, rig: CameraPositions, ball: FloatArray
 ) -> tuple[str, FloatArray]:
     """A replay camera, most often one at the ball's end; where it stands, metres, shape (3,)."""
     kind = str(rng.choice(REPLAYS, p=REPLAY_SHARE))

@@ -249,7 +249,7 @@ KICK_OFFS = ((13, 30), (16, 0), (18, 30), (20, 45))
 
 
 @dataclass(frozen=True)
-class Fixture:
+class SampleMatch:
     """One match.
 
     Attributes:
@@ -281,7 +281,7 @@ class Fixture:
         return f"{self.league}/{self.season}/{self.name}"
 
 
-def make_fixture(index: int, seed: int) -> Fixture:
+def make_sample_match(index: int, seed: int) -> SampleMatch:
     """The match of that number: the same for the same seed, whatever else is made."""
     rng = np.random.default_rng([seed, index, 0xF1])
     league = index % len(LEAGUES)
@@ -296,7 +296,7 @@ def make_fixture(index: int, seed: int) -> Fixture:
     hour, minute = KICK_OFFS[int(rng.integers(len(KICK_OFFS)))]
     kick_off = FIRST_KICK_OFF + timedelta(weeks=week, days=pairing % 2, hours=hour, minutes=minute)
     goals = rng.poisson((1.6, 1.2))
-    return Fixture(
+    return SampleMatch(
         index=index,
         league=LEAGUES[league],
         season=SEASON,

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
-from app.sample.fixture import Colour, Fixture
+from app.sample.fixture import Colour, SampleMatch
 from app.sample.play import BALL_DIAMETER, HALF_LENGTH, Instant
 from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
 
@@ -303,7 +303,7 @@ DARK = (44, 34, 28)
 LIGHT = (240, 240, 240)
 
 
-def draw_scoreboard(image: Image, fixture: Fixture, game_time: str, is_main: bool) -> None:
+def draw_scoreboard(image: Image, fixture: SampleMatch, game_time: str, is_main: bool) -> None:
     """Teams, score and time on the main camera; a small mark on replays."""
     if not is_main:
         _draw_text_cell(image, LEFT, 84, "REPLAY", (36, 36, 190), LIGHT)

@@ -34,7 +34,7 @@ from app.sample.film import (
     make_backdrop,
     render_picture,
 )
-from app.sample.fixture import make_fixture
+from app.sample.fixture import make_sample_match
 from app.sample.play import BALL_DIAMETER, TEAM, Play, choose_shirt_numbers, make_play
 from app.sample.props import Image, draw_scoreboard
 
@@ -310,7 +310,7 @@ class _ShotRenderer:
 
     def __init__(self, shot: _FilmedShot, play: Play, backdrop: Backdrop, seed: int) -> None:
         self.shot, self._play, self._backdrop = shot, play, backdrop
-        self._fixture = make_fixture(MATCH, seed)
+        self._fixture = make_sample_match(MATCH, seed)
         self._kept: dict[int, Image] = {}
 
     def frame(self, number: int) -> Image:
@@ -350,7 +350,7 @@ class _ShotRenderer:
 
 def _render_frames(shots: list[_FilmedShot], play: Play, seed: int) -> Iterator[Image]:
     """All frames of the video, in their order."""
-    look = make_fixture(MATCH, seed).look
+    look = make_sample_match(MATCH, seed).look
     main = [camera for shot in shots if shot.part.kind == "main" for camera in shot.cameras]
     shared = make_backdrop(main, look) if main else None
 

@@ -13,7 +13,7 @@ from app.formats.fields import parse_whole_number
 from app.formats.json_reader import read_json
 from app.geometry.camera import Camera
 from app.json_text import json_text
-from app.sample.fixture import Fixture
+from app.sample.fixture import SampleMatch
 from app.sample.play import Instant
 from app.soccer.frames import Box
 from app.soccer.group import Group
@@ -105,7 +105,7 @@ class Scene:
 
     group: Group
     truth: SceneTruth
-    fixture: Fixture
+    fixture: SampleMatch
     instants: Mapping[str, Instant]
 
 

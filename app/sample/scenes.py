@@ -19,7 +19,7 @@ from app.sample.cameras import (
     MIN_PARALLAX,
     PITCH,
     WIDTH,
-    CameraStands,
+    CameraPositions,
     Indices,
     choose_replay_position,
     find_camera,
@@ -35,7 +35,7 @@ from app.sample.faults import (
     plant_annotation_fault,
     remove_markings,
 )
-from app.sample.fixture import Fixture, make_fixture
+from app.sample.fixture import SampleMatch, make_sample_match
 from app.sample.play import (
     BALL_DIAMETER,
     PLAYER_RADIUS,
@@ -70,7 +70,7 @@ def simulate_line_clicks(rng: np.random.Generator, camera: Camera) -> Lines:
     Straight markings get 2 to 8 points, circles 5 to 12, in any order now and then. A marking is
     forgotten rarely, and never one of the last six.
     """
-    paths = find_visible_paths(camera)
+    paths = find_visible_marking_paths(camera)
     markings = _drop_some_markings(rng, np.flatnonzero(paths.lengths >= SHORTEST_PX))
     owner, share = _draw_click_places(rng, markings, paths.lengths)
     clicks = paths.pixels_at(owner, share)
@@ -83,7 +83,7 @@ def simulate_line_clicks(rng: np.random.Generator, camera: Camera) -> Lines:
 
 
 @dataclass(frozen=True)
-class VisiblePaths:
+class VisibleMarkingPaths:
     """The parts of all markings that lie in the image, as short straight steps, in order.
 
     Attributes:
@@ -120,7 +120,7 @@ class VisiblePaths:
         return np.asarray(np.searchsorted(self.along, place, side="right") - 1, np.int64)
 
 
-def find_visible_paths(camera: Camera) -> VisiblePaths:
+def find_visible_marking_paths(camera: Camera) -> VisibleMarkingPaths:
     """What each marking shows of itself, with its ends on the image border where it is cut."""
     pixels = camera.project(FINE.points)
     seen = is_inside_image(pixels)
@@ -138,7 +138,7 @@ def find_visible_paths(camera: Camera) -> VisiblePaths:
     np.add.at(lengths, FINE.marking[first], sizes)
     along = np.concatenate([[0.0], np.cumsum(sizes)])
     before = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    return VisiblePaths(a, steps, along, lengths, before)
+    return VisibleMarkingPaths(a, steps, along, lengths, before)
 
 
 def _find_border_crossings(inner: FloatArray, outer: FloatArray) -> FloatArray:
@@ -253,8 +253,8 @@ class CameraAtInstant:
 class MatchSetup:
     """What all groups of a match share."""
 
-    fixture: Fixture
-    rig: CameraStands
+    fixture: SampleMatch
+    rig: CameraPositions
     numbers: tuple[int, ...]
     seed: int
     groups: int
@@ -279,7 +279,7 @@ def make_match_setup(match: int, groups: int, seed: int) -> MatchSetup:
     """What the groups of a match share: the same for the same seed."""
     rng = np.random.default_rng([seed, match, 0x21])
     return MatchSetup(
-        make_fixture(match, seed), place_cameras(rng), choose_shirt_numbers(rng), seed, groups
+        make_sample_match(match, seed), place_cameras(rng), choose_shirt_numbers(rng), seed, groups
     )
 
 
@@ -323,7 +323,7 @@ def make_scene(stage: MatchSetup, number: int, plan: FaultPlan | None) -> Scene:
         ball = simulate_loose_box(rng, box)
         people = make_person_boxes(rng, shot.camera, shot.instant, tags)
         views.append(View(key, station, (ball,), extras=Extras(people, metadata=metadata)))
-    recorded = _record_fault(plan, planted, keys)
+    recorded = _make_planted_faults(plan, planted, keys)
     if plan is not None and plan.kind == "undrawn_line":
         views[plan.view_index], recorded = remove_markings(plan, views[plan.view_index])
     elif plan is not None and planted is None:
@@ -412,7 +412,7 @@ def _make_camera_at_other_instant(
             return camera, moved, amount
 
 
-def _record_fault(
+def _make_planted_faults(
     plan: FaultPlan | None, amount: float | None, keys: list[str]
 ) -> tuple[PlantedFault, ...]:
     if plan is None or amount is None:

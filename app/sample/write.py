@@ -23,7 +23,7 @@ from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample import GROUPS, SEED
-from app.sample.fixture import group_counts_by_match, make_fixture
+from app.sample.fixture import group_counts_by_match, make_sample_match
 from app.sample.render import render_view
 from app.sample.scene import TRUTH, TruthWriter, truth_to_json
 from app.sample.scenes import make_match_scenes
@@ -183,7 +183,7 @@ def _write_frames(
     jobs = [part for match in matches for part in _split_job(match)]
     drawn = zip(jobs, run(_render_frames_of_groups, jobs), strict=True)
     for match, parts in groupby(drawn, key=lambda pair: pair[0].match):
-        archive = out / make_fixture(match, jobs[0].seed).folder / ARCHIVE
+        archive = out / make_sample_match(match, jobs[0].seed).folder / ARCHIVE
         temporary = archive.with_suffix(".part")
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as frames:
             for job, members in parts:

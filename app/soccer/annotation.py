@@ -54,7 +54,7 @@ class BallAnnotation:
         return self.box.center if self.box is not None else self.point
 
 
-def make_followed_source(group: str) -> str:
+def format_followed_from_group(group: str) -> str:
     """What a ball says it comes from that was followed from one of another group, by its key."""
     return f"followed from {group}"
 

@@ -48,7 +48,7 @@ def lines_from_json(value: Mapping[str, Any]) -> Lines:
     return {name: at for name, at in sorted(msgspec.convert(value, _LINES).items()) if at}
 
 
-def not_visible_from_json(value: Mapping[str, Any]) -> tuple[str, ...]:
+def not_visible_markings_from_json(value: Mapping[str, Any]) -> tuple[str, ...]:
     """Markings without points: somebody said that the picture does not show them."""
     return tuple(sorted(name for name, points in value.items() if not points))
 
@@ -216,7 +216,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         given_covariance=covariance_from_json(covariance),
         picture=picture_geometry_from_json(value.get("picture")),
         proposed=tuple(value.get("proposed", ())),
-        not_visible=not_visible_from_json(value["lines"]),
+        not_visible=not_visible_markings_from_json(value["lines"]),
     )
 
 

@@ -263,15 +263,15 @@ class Policy:
     @cached_property
     def hash(self) -> str:
         """Digest of every value but the name."""
-        return _digest_of_values(values_to_digest(self))
+        return _digest_of_values(collect_digested_values(self))
 
     @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
-        return _digest_of_values(calibration_values_to_digest(self.calibration))
+        return _digest_of_values(collect_digested_calibration_values(self.calibration))
 
 
-def values_to_digest(policy: Policy) -> dict[str, Any]:
+def collect_digested_values(policy: Policy) -> dict[str, Any]:
     """What the digests of a policy cover: every value but the name.
 
     A threshold that came later counts only where it asks for something else than before it came:
@@ -279,11 +279,11 @@ def values_to_digest(policy: Policy) -> dict[str, Any]:
     """
     values = _values_without_later_defaults(policy)
     del values["name"]
-    values["calibration"] = calibration_values_to_digest(policy.calibration)
+    values["calibration"] = collect_digested_calibration_values(policy.calibration)
     return values
 
 
-def calibration_values_to_digest(policy: CalibrationPolicy) -> dict[str, Any]:
+def collect_digested_calibration_values(policy: CalibrationPolicy) -> dict[str, Any]:
     """The same of its part for calibrations."""
     return _values_without_later_defaults(policy)
 

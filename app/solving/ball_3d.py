@@ -15,7 +15,11 @@ from app.soccer.frames import height_above_grass
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, BestBall, ChiSquare, TriangulatedPair
-from app.solving.ball_covariance import MeanCovariance, major_axis_sigma, ray_covariances
+from app.solving.ball_covariance import (
+    CovarianceOfMeanBall,
+    major_axis_sigma,
+    observation_pixel_covariances,
+)
 from app.solving.chi_square import group_sigma_widening
 from app.solving.facts import GroupFacts
 from app.solving.judgement import PASSES, Judgement
@@ -86,7 +90,7 @@ def compute_mean_ball(
     keys: Sequence[str],
     facts: GroupFacts,
     judgement: Judgement,
-    uncertainty: MeanCovariance,
+    uncertainty: CovarianceOfMeanBall,
     policy: Policy,
     chi_square: ChiSquare | None = None,
 ) -> Ball3D | None:
@@ -276,7 +280,9 @@ class _ViewSubsets:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
         observations = [self.observations[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
-        return ray_covariances(observations, places, self._policy).reshape(*chosen.shape, 2, 2)
+        return observation_pixel_covariances(observations, places, self._policy).reshape(
+            *chosen.shape, 2, 2
+        )
 
 
 def _is_behind_a_camera(pair: TriangulatedPair, observations: Sequence[BallObservation]) -> bool:

@@ -11,7 +11,7 @@ from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
-from app.solving.ball_covariance import calibration_covariance
+from app.solving.ball_covariance import calibration_pixel_covariance
 
 
 def measure_ball_fit(
@@ -83,7 +83,7 @@ def predict_ball_in_view(
         return None
     jacobian = calibration.camera.jacobian(point)
     covariance = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
-    covariance = covariance + calibration_covariance(calibration, size, point)
+    covariance = covariance + calibration_pixel_covariance(calibration, size, point)
     return ExpectedBall(
         place=ImagePoint(x, y),
         covariance=flatten_covariance(covariance),

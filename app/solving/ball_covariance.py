@@ -165,7 +165,7 @@ def pixel_covariances(
     return found
 
 
-def calibration_covariance(
+def calibration_pixel_covariance(
     calibration: Calibration, size: ImageSize, point: FloatArray
 ) -> FloatArray:
     """Covariance of the projected point due to that of the calibration, square pixels, (2, 2).
@@ -196,11 +196,11 @@ def pixel_covariance(observation: BallObservation, point: FloatArray, policy: Po
     The noise of the click, that of a given camera, and, where the camera comes from lines, the
     covariance of its calibration carried to the ball.
     """
-    found: FloatArray = ray_covariances([observation], point[None], policy)[0]
+    found: FloatArray = observation_pixel_covariances([observation], point[None], policy)[0]
     return found
 
 
-def ray_covariances(
+def observation_pixel_covariances(
     observations: Sequence[BallObservation], points: FloatArray, policy: Policy
 ) -> FloatArray:
     """``pixel_covariance`` of several observations at a point each, square pixels, shape (N, 2, 2).
@@ -227,7 +227,7 @@ def ray_covariances(
         ):
             plain[row] = observation.uncertain_camera_parameters
         else:
-            found[row] += calibration_covariance(
+            found[row] += calibration_pixel_covariance(
                 observation.calibration, observation.size, points[row]
             )
     if plain:
@@ -274,7 +274,7 @@ def is_covariance_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     return within
 
 
-class MeanCovariance:
+class CovarianceOfMeanBall:
     """Covariances of the mean of valid pairs, for each group of some facts.
 
     The uncertainty of each view's pixel is carried through the estimator itself, by central

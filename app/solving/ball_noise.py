@@ -20,16 +20,16 @@ from scipy.special import chdtri
 from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D
-from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_covariance
+from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_pixel_covariance
 from app.solving.line_noise import (
     BLOCKS,
     NORMAL_95,
     SPREAD,
     STUDENT,
-    calibrated_log_sigma,
     fit_cost_minimum,
     jackknife_variance,
     log_sigma_posterior_variance,
+    log_sigma_with_95_percent_coverage,
     sigma_prior_cost,
 )
 from app.solving.triangulate import BallObservation
@@ -158,7 +158,9 @@ def compute_ray_residuals(
     known = np.zeros((len(offsets), len(offsets)))
     for at, observation in enumerate(seen):
         part = slice(2 * at, 2 * at + 2)
-        known[part, part] = calibration_covariance(observation.calibration, observation.size, point)
+        known[part, part] = calibration_pixel_covariance(
+            observation.calibration, observation.size, point
+        )
     # ... turned until the cameras' errors are independent in them, as equal clicks are anyway.
     _, turn = np.linalg.eigh(normals.T @ known @ normals)
     normals = normals @ turn
@@ -256,7 +258,9 @@ def _jackknife_sigma(
     # Where neighbours err alike, there are fewer independent numbers than there seem to be.
     weight = log_sigma_posterior_variance(0.0, numbers, known.spread) / variance
     sigma = math.exp(
-        calibrated_log_sigma(_LOGS, weight * _sigma_costs(rows[kept], found) + known.prior_costs)
+        log_sigma_with_95_percent_coverage(
+            _LOGS, weight * _sigma_costs(rows[kept], found) + known.prior_costs
+        )
     )
     wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)

@@ -140,7 +140,7 @@ def calibrate_near_position(
     )
 
 
-def calibrate_picture(
+def calibrate_altered_picture(
     lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy, picture: PictureGeometry
 ) -> Calibration:
     """``calibrate`` of a picture that was stretched or cropped since it was taken.
@@ -278,7 +278,9 @@ def _calibrate_counting_all_markings(
         given = Calibration("given", station.given, covariance=station.given_covariance)
         return _measure_against_station(given, station, pitch, policy)
     if station.picture is not None:
-        return calibrate_picture(station.lines, pitch, station.size, policy, station.picture)
+        return calibrate_altered_picture(
+            station.lines, pitch, station.size, policy, station.picture
+        )
     alone = calibrate(station.lines, pitch, station.size, policy)
     if shared is None:
         return alone
@@ -358,7 +360,7 @@ def calibrate_view(
     """
     key = compute_click_calibration_key(group, view, policy)
     clicked = known.get(key) or calibrate_from_clicks(group, view, policy)
-    reading = find_usable_paint_reading(group, view, policy)
+    reading = find_wanted_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
         if not is_lone_frame(group, view, policy):
             return clicked
@@ -385,7 +387,7 @@ def compute_view_calibration_keys(
 ) -> tuple[str, ...]:
     """The same, and after it the key of the clicks that it starts from where it is another."""
     key = compute_click_calibration_key(group, view, policy)
-    reading = find_usable_paint_reading(group, view, policy)
+    reading = find_wanted_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
         if not is_lone_frame(group, view, policy):
             return (key,)
@@ -426,7 +428,7 @@ def is_lone_frame(group: Group, view: View, policy: CalibrationPolicy) -> bool:
     return not (is_exact or is_said or is_given) and len(group.views) == 1
 
 
-def find_usable_paint_reading(
+def find_wanted_paint_reading(
     group: Group, view: View, policy: CalibrationPolicy
 ) -> PaintReading | None:
     """What was read for a view, as far as the policy wants it; perhaps for other clicks."""

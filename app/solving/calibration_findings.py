@@ -14,7 +14,7 @@ from app.soccer.picture import size_centred_on_principal_point
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, ViewSolution
-from app.solving.calibrate import MAX_POSITION_SIGMA_M, find_usable_paint_reading
+from app.solving.calibrate import MAX_POSITION_SIGMA_M, find_wanted_paint_reading
 from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrameUncertainty
 from app.solving.picture_camera import BELIEVED, MIN_SHIFT, MIN_STRETCH
 from app.wording import format_metres, format_pixels
@@ -316,7 +316,7 @@ def find_paint_findings(
     if policy.source != "paint" or not view.can_use_paint or solved.calibration.camera is None:
         return
     fit = solved.calibration.paint
-    if find_usable_paint_reading(group, view, policy) is None:
+    if find_wanted_paint_reading(group, view, policy) is None:
         return
     if fit is None:
         yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=SuggestedFix(READ_PAINT, view.key))

@@ -77,7 +77,7 @@ LEAST_SPREAD = 0.1
 """Markings are taken to be seen at least so far apart, as a share of the diagonal."""
 
 
-def make_starts_from_known_positions(observations: Observations, diagonal: float) -> FloatArray:
+def make_starts_at_typical_positions(observations: Observations, diagonal: float) -> FloatArray:
     """One start for each stand, aimed and zoomed so that the seen markings lie where they are.
 
     Args:

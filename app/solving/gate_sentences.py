@@ -120,7 +120,7 @@ def _make_calibratable_gate(group: _JudgedGroup) -> Gate:
     blamed = "calibratable" in group.failed
     sentence = f"in {count} of {len(views)} views"
     if guessed := [view for view in views if _has_undetermined_parameters(view.calibration)]:
-        sentence += f", {_list_letters(guessed)} uncertain"
+        sentence += f", {_join_letters(guessed)} uncertain"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
     return _make_gate(
@@ -181,7 +181,7 @@ def _make_worst_view_gate(
     elif len(shown) > 1:
         sentence += " (lowest)"
     if fallen and not blamed:
-        sentence += f"; {_list_letters([view for _, view in fallen])} too low, not used"
+        sentence += f"; {_join_letters([view for _, view in fallen])} too low, not used"
     key = view.key if blamed else None
     return _make_gate(name, not blamed, value, threshold, sentence, view=key)
 
@@ -217,7 +217,7 @@ def _make_ball_gate(group: _JudgedGroup) -> Gate:
     passed = "ball" not in group.failed
     sentence = f"in {plural(count, 'view')}"
     for why in dict.fromkeys(view.no_ball for view in without):
-        alike = _list_letters([view for view in without if view.no_ball == why])
+        alike = _join_letters([view for view in without if view.no_ball == why])
         sentence += f", {why.format(alike)}"
     if not passed:
         idle = _describe_failed_views([view for view in group.views if view.has_ball])
@@ -233,7 +233,7 @@ def _describe_failed_views(views: Sequence[JudgedView]) -> list[str]:
         for name in dict.fromkeys(view.failed for view in views if view.failed is not None)
     }
     return [
-        f"{_list_letters(fallen)} not counted ({_FALLEN_AT[name]})"
+        f"{_join_letters(fallen)} not counted ({_FALLEN_AT[name]})"
         for name, fallen in reasons.items()
     ]
 
@@ -424,5 +424,5 @@ def _make_unjudged_gate(name: str, threshold: float | None, *, active: bool = Tr
     return Gate(name, False, None, threshold, None, "not judged", active=active)
 
 
-def _list_letters(views: Sequence[JudgedView]) -> str:
+def _join_letters(views: Sequence[JudgedView]) -> str:
     return ", ".join(view.letter for view in views)

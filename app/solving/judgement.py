@@ -12,7 +12,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
-from app.solving.ball_covariance import MeanCovariance, is_covariance_within, is_sigma_within
+from app.solving.ball_covariance import CovarianceOfMeanBall, is_covariance_within, is_sigma_within
 from app.solving.chi_square import chi_square_residuals, p_values
 from app.solving.facts import GroupFacts
 
@@ -80,7 +80,10 @@ class Judgement:
 
 
 def judge_groups(
-    facts: GroupFacts, policy: Policy, uncertainty: MeanCovariance, jac: FloatArray | None = None
+    facts: GroupFacts,
+    policy: Policy,
+    uncertainty: CovarianceOfMeanBall,
+    jac: FloatArray | None = None,
 ) -> Judgement:
     """Judge every group by the thresholds of a policy.
 
@@ -100,7 +103,7 @@ def judge_groups(
 def judge_with_known_view_failures(
     facts: GroupFacts,
     policy: Policy,
-    uncertainty: MeanCovariance,
+    uncertainty: CovarianceOfMeanBall,
     jac: FloatArray,
     standing: tuple[IntArray, IntArray],
     *,

@@ -60,7 +60,7 @@ def log_sigma_posterior_variance(scatter: float, numbers: float, spread: float =
     return max(scatter, 1 / (2 * numbers + spread**-2))
 
 
-def calibrated_log_sigma(log_sigmas: FloatArray, cost: FloatArray) -> float:
+def log_sigma_with_95_percent_coverage(log_sigmas: FloatArray, cost: FloatArray) -> float:
     """Logarithm of the sigma whose 95 % ellipsoids hold the truth, though nobody knows sigma exactly.
 
     As Student's quantiles, of few numbers it is larger than the most likely sigma.

@@ -37,7 +37,7 @@ from app.solving.labels import GAMMA_SHARE, RELABELLED
 from app.solving.line_noise import compute_line_noise
 from app.solving.observations import Observations, pitch_curves
 from app.solving.picture_camera import undo_warp
-from app.solving.pitch_size import derive_points_by_pitch_size
+from app.solving.pitch_size import point_derivatives_by_pitch_size
 from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
 
 SIZE_SIGMA_M = np.array([2.0, 1.0])
@@ -319,7 +319,7 @@ class _LoneFrameProblem:
         slopes[:, :, 0] /= np.exp(warp[0])
         # A line's normal turns and shrinks when the picture is stretched.
         length = np.maximum(np.hypot(slopes[..., 0], slopes[..., 1]), 0.25)
-        moves = derive_points_by_pitch_size(self.problem, camera, seen, offsets[:, 1] != 0)
+        moves = point_derivatives_by_pitch_size(self.problem, camera, seen, offsets[:, 1] != 0)
         foot = np.exp(warp[0]) * seen.pixels[:, None, 0]
         jacobian = (
             np.concatenate(

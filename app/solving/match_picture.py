@@ -28,7 +28,7 @@ from app.solving.pitch_size import (
     MAX_FRAMES,
     Share,
     eliminate_camera,
-    eliminate_own_numbers,
+    eliminate_frame_deviations,
     estimate_sigmas_of_shared_numbers,
     find_frames_with_enough_measurements,
 )
@@ -147,7 +147,7 @@ class _FittedFrame:
         # A frame that says nearly nothing may say a little less than nothing, by rounding.
         values, vectors = np.linalg.eigh((reduced + reduced.T) / 2)
         reduced = vectors * np.maximum(values, 0.0) @ vectors.T
-        return eliminate_own_numbers((pull, reduced), FRAME_SIGMA)
+        return eliminate_frame_deviations((pull, reduced), FRAME_SIGMA)
 
 
 def _adjust_picture(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArray, FloatArray]:

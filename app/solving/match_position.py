@@ -134,7 +134,7 @@ SCATTER, GIVE_UP = 3.0, 12.0
 frames are not of one match."""
 
 
-def find_camera_place(calibration: Calibration, size: ImageSize) -> FrameCameraPlace | None:
+def find_main_camera_place(calibration: Calibration, size: ImageSize) -> FrameCameraPlace | None:
     """The place of a main camera; None for other cameras, and where the lines leave it open."""
     if calibration.camera is None or calibration.covariance is None:
         return None
@@ -147,7 +147,7 @@ def find_camera_place(calibration: Calibration, size: ImageSize) -> FrameCameraP
     return FrameCameraPlace(position, covariance, float(parameters[PAN]))
 
 
-def find_pan(calibration: Calibration) -> float | None:
+def find_main_camera_pan(calibration: Calibration) -> float | None:
     """Where a main camera looks, radians; None for other cameras."""
     if calibration.camera is None or not is_main_position(calibration.camera.position):
         return None
@@ -218,7 +218,7 @@ WANDER_IN_RUN_M = np.array([0.3, 0.3, 0.18])
 """What frames of one match are allowed to differ by, each axis, beyond their own sigmas."""
 
 
-def guess_matches(places: Sequence[FrameCameraPlace | None]) -> list[int]:
+def guess_match_of_each_frame(places: Sequence[FrameCameraPlace | None]) -> list[int]:
     """A match for each frame, from 0, where nobody names them: runs whose places agree.
 
     Args:

@@ -21,19 +21,19 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import (
     calibrate_view,
     compute_paint_search_key,
-    find_usable_paint_reading,
+    find_wanted_paint_reading,
 )
 from app.solving.paint_camera import WORST_PX, collect_curve_points
 from app.solving.resect import ResectionProblem
-from app.solving.tripod_pitch import LEAST_FRAMES, PaintSightings, find_tripod_pitch
+from app.solving.tripod_pitch import LEAST_FRAMES, FrameWithPaint, find_tripod_pitch
 
 LEAST_SHARE = 0.5
 """Of the frames, those that stand on one tripod: with fewer it is not known which of them do."""
 
 
 @dataclass(frozen=True)
-class _MainFrame:
-    frame: PaintSightings
+class _MainCameraFrame:
+    frame: FrameWithPaint
     covariance: FloatArray
 
     @property
@@ -45,7 +45,7 @@ class _MainFrame:
         return float(np.sqrt(off @ np.linalg.solve(self.covariance[X : Z + 1, X : Z + 1], off)))
 
 
-def solve_match_tripod(
+def add_match_tripod_to_readings(
     groups: Mapping[int, Group], policy: CalibrationPolicy
 ) -> dict[int, PaintReading]:
     """What was read of main cameras, each with what the frames of its match know together.
@@ -58,11 +58,11 @@ def solve_match_tripod(
         Of each group whose main view has a camera from its paint, its reading: with ``tripod``, or without
         where the frames are too few or stand on no tripod.
     """
-    frames: dict[tuple[ImageSize, Pitch], dict[int, _MainFrame]] = {}
+    frames: dict[tuple[ImageSize, Pitch], dict[int, _MainCameraFrame]] = {}
     found: dict[int, PaintReading] = {}
     for number, group in groups.items():
         view = group.views[0]
-        reading = find_usable_paint_reading(group, view, policy)
+        reading = find_wanted_paint_reading(group, view, policy)
         if reading is None or reading.reason or not view.included:
             continue
         if reading.sought_for != compute_paint_search_key(group, view, policy):
@@ -77,9 +77,9 @@ def solve_match_tripod(
         found[number] = alone
         problem = ResectionProblem.of(view.size, policy)
         points, sigmas = collect_curve_points(reading.evidence, view.size)
-        frame = PaintSightings(problem.parameters(calibration.camera), points, sigmas)
+        frame = FrameWithPaint(problem.parameters(calibration.camera), points, sigmas)
         at = (view.size, policy.pitch_for_fitted_lines(group.pitch))
-        frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))
+        frames.setdefault(at, {})[number] = _MainCameraFrame(frame, np.reshape(known, (8, 8)))
     for (size, pitch), some in frames.items():
         for number, tripod in _solve_tripod_cameras(some, size, pitch, policy).items():
             found[number] = replace(found[number], tripod=tripod)
@@ -87,7 +87,7 @@ def solve_match_tripod(
 
 
 def _solve_tripod_cameras(
-    some: Mapping[int, _MainFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
+    some: Mapping[int, _MainCameraFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
 ) -> dict[int, TripodPitchCamera]:
     if len(some) < LEAST_FRAMES:
         return {}

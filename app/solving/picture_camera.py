@@ -57,7 +57,7 @@ def warp_to_picture(warp: FloatArray, sigma: tuple[float, float, float]) -> Pict
     return PictureGeometry(float(np.exp(stretch)), (right, down), sigma)
 
 
-def is_picture_estimated(picture: PictureGeometry) -> bool:
+def needs_picture_estimate(picture: PictureGeometry) -> bool:
     """Whether the lines of the view are asked what the picture is."""
     return bool((np.array(picture.sigma) > KNOWN_SIGMA).any())
 
@@ -280,7 +280,7 @@ def estimate_picture(
     Raises:
         DegenerateGeometryError: The lines do not determine the camera.
     """
-    if not is_picture_estimated(picture):
+    if not needs_picture_estimate(picture):
         return picture
     seen = undo_warp(problem, observations, picture_to_warp(picture))
     search = PictureProblem.of(problem, observations, picture)
@@ -322,7 +322,7 @@ class _LinearizedProblem:
         """Step of the first ``width`` unknowns; ``prior`` is their information, shape (11,)."""
         normal = (self.normal + np.diag(prior))[:width, :width]
         pull = (self.pull + prior * offset)[:width]
-        scale = _normal_scale(normal)
+        scale = _normal_matrix_scale(normal)
         solved = np.linalg.solve(normal / np.outer(scale, scale), pull / scale)
         step: FloatArray = solved / scale
         return step
@@ -381,7 +381,9 @@ def _fit_picture_distortion(
     left = max(linear.squares, floor * freedom)
     ratio = (before - left) / left * freedom / 3
     prior[PARAMETERS:] = variance / PRIOR**2
-    sigma = np.sqrt(variance * np.diag(_invert_normal(linear.normal + np.diag(prior)))[PARAMETERS:])
+    sigma = np.sqrt(
+        variance * np.diag(_invert_normal_matrix(linear.normal + np.diag(prior)))[PARAMETERS:]
+    )
     if ratio < BELIEVED or not _is_significant(warp, sigma).any():
         return None
     stretch, x, y = warp.tolist()
@@ -436,7 +438,7 @@ def _linearize(
     )
 
 
-def _normal_scale(normal: FloatArray) -> FloatArray:
+def _normal_matrix_scale(normal: FloatArray) -> FloatArray:
     """Root of the diagonal of a normal matrix; LinAlgError where an unknown is in no equation."""
     scale: FloatArray = np.sqrt(np.diag(normal))
     if not scale.all():
@@ -444,7 +446,7 @@ def _normal_scale(normal: FloatArray) -> FloatArray:
     return scale
 
 
-def _invert_normal(normal: FloatArray) -> FloatArray:
-    scale = _normal_scale(normal)
+def _invert_normal_matrix(normal: FloatArray) -> FloatArray:
+    scale = _normal_matrix_scale(normal)
     inverse: FloatArray = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
     return inverse

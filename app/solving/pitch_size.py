@@ -69,7 +69,7 @@ def eliminate_camera(gradient: FloatArray, information: FloatArray, variance: fl
     return pull, reduced
 
 
-def eliminate_own_numbers(share: Share, sigma: FloatArray) -> Share:
+def eliminate_frame_deviations(share: Share, sigma: FloatArray) -> Share:
     """A frame's share where its numbers are its own, about those of the match (random effects).
 
     Args:
@@ -284,7 +284,7 @@ class _FittedFrame:
         gradient, information = self._normal_equations()
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
         share = eliminate_camera(gradient, information, variance)
-        return eliminate_own_numbers(share, np.full(2, FRAME_SIGMA_M))
+        return eliminate_frame_deviations(share, np.full(2, FRAME_SIGMA_M))
 
     def _normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Gradient and J^T W J of camera, length and width, shapes (10,) and (10, 10)."""
@@ -295,7 +295,7 @@ class _FittedFrame:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        moves = derive_points_by_pitch_size(
+        moves = point_derivatives_by_pitch_size(
             self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0
         )
         length, width = moves.T
@@ -314,7 +314,7 @@ class _FittedFrame:
         return gradient, information
 
 
-def derive_points_by_pitch_size(
+def point_derivatives_by_pitch_size(
     problem: ResectionProblem,
     parameters: FloatArray,
     observations: Observations,

@@ -39,7 +39,7 @@ from app.solving.camera_positions import (
     STANDS,
     PositionPrior,
     is_main_position,
-    make_starts_from_known_positions,
+    make_starts_at_typical_positions,
 )
 from app.solving.line_noise import LineNoise, LinePrior, compute_line_noise
 from app.solving.observations import (
@@ -216,7 +216,7 @@ class ResectionProblem:
 
     def _search_all_stages(self, observations: Observations, plan: SearchPlan) -> Resection:
         thinned = observations.thin_points(POINTS_PER_LINE, POINTS_PER_CIRCLE)
-        starts = make_starts_from_known_positions(observations, self.size.diagonal)
+        starts = make_starts_at_typical_positions(observations, self.size.diagonal)
         scouted = self._run_stage(thinned, starts, plan.scout, damping=1e-2)
         searched = self._run_stage(
             thinned, choose_best_starts(scouted, plan.search.starts), plan.search

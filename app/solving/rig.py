@@ -15,7 +15,7 @@ import numpy as np
 
 from app.errors import InputError
 from app.geometry.arrays import BoolArray, FloatArray
-from app.geometry.bundle import Rays, bundle_equations, linearize, optimize_points
+from app.geometry.bundle import RayPixels, bundle_equations, linearize, optimize_points
 from app.geometry.camera import Camera
 from app.geometry.least_squares import covariance, levenberg_marquardt
 from app.geometry.resection import (
@@ -114,7 +114,7 @@ class Rig:
     """
 
     cameras: tuple[RigCamera, ...]
-    rays: Rays
+    rays: RayPixels
     times: FloatArray
     pitch: Pitch
 
@@ -223,7 +223,7 @@ class _RigProblem:
     """The sum of squares of a rig, in sigmas."""
 
     cameras: tuple[RigCamera, ...]
-    rays: Rays
+    rays: RayPixels
     observed: list[Observations]
     anchors: list[FloatArray]
     line_sigma_px: float
@@ -311,7 +311,7 @@ def _find_cameras_sharing_balls(
 
 def _collect_rays_of_frames(
     cameras: Sequence[RigCamera], frames: Sequence[RigFrame], policy: Policy
-) -> tuple[Rays, FloatArray]:
+) -> tuple[RayPixels, FloatArray]:
     places = {camera.key: place for place, camera in enumerate(cameras)}
     pixels: list[FloatArray] = []
     rows: list[tuple[int, int]] = []
@@ -327,7 +327,7 @@ def _collect_rays_of_frames(
         times.append(frame.time)
     camera_rows, point_rows = np.array(rows, dtype=np.int64).reshape(-1, 2).T
     units = np.array([camera.pixels_per_reference_pixel for camera in cameras])
-    rays = Rays(
+    rays = RayPixels(
         np.array(pixels, float).reshape(-1, 2),
         camera_rows,
         point_rows,
@@ -363,7 +363,7 @@ def _make_camera_observations(camera: RigCamera, pitch: Pitch) -> Observations:
     return replace(observed, pixels=observed.pixels + shift)
 
 
-def _estimate_click_noise_factor(parameters: FloatArray, rays: Rays) -> float:
+def _estimate_click_noise_factor(parameters: FloatArray, rays: RayPixels) -> float:
     """Noise of the clicks, robustly, as a multiple of what the rays are said to have."""
     points = optimize_points(parameters, rays, np.inf)
     squares = (linearize(parameters, points, rays).residuals ** 2).sum(axis=1)

@@ -38,7 +38,7 @@ from app.soccer.solution import (
 )
 from app.solving.ball_3d import choose_exported_ball, compute_mean_ball, find_best_ball, judge_pairs
 from app.solving.ball_box import measure_ball_fit, predict_ball_in_view
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.calibrate import calibrate, calibrate_view, compute_view_calibration_key
 from app.solving.contradiction import compute_chi_square, find_contradiction
 from app.solving.facts import GroupFacts, collect_facts
@@ -74,10 +74,10 @@ def solve_group(
         calibrations: Calibrations known from before under their ``compute_calibration_key``; they save
             time and change nothing.
     """
-    return solve_with_facts(group, policy, calibrations)[0]
+    return solve_and_collect_facts(group, policy, calibrations)[0]
 
 
-def solve_with_facts(
+def solve_and_collect_facts(
     group: Group, policy: Policy, calibrations: Mapping[str, Calibration]
 ) -> tuple[Solution, GroupFacts]:
     """``solve_group``, and the facts that its gates were judged by."""
@@ -87,7 +87,7 @@ def solve_with_facts(
     observations = collect_ball_observations(group.views, found)
     pair_points = triangulate_observation_pairs(combinations(observations, 2))
     facts = collect_facts(group.views, found, pair_points)
-    uncertainty = MeanCovariance(facts)
+    uncertainty = CovarianceOfMeanBall(facts)
     judgement = judge_groups(facts, policy, uncertainty)
     pairs = judge_pairs(pair_points, judgement)
     names = [view.key for view in group.views]

@@ -76,7 +76,7 @@ _OWN = [X, X + 1, Z, KAPPA]
 
 
 @dataclass(frozen=True)
-class PaintSightings:
+class FrameWithPaint:
     """A frame with its camera on the plan, and its paint.
 
     Attributes:
@@ -184,12 +184,12 @@ class TripodPitch:
         which = np.full(len(points), MARKINGS.index(marking))
         return points + compute_paint_shift(points[:, :2], which, self.terms, self.pitch)
 
-    def compute_paint_shift_of_frame(self, frame: PaintSightings) -> FloatArray:
+    def compute_paint_shift_of_frame(self, frame: FrameWithPaint) -> FloatArray:
         """How far each place of paint lies off the plan of the size that is shown, metres, shape (N, 3)."""
         grass = project_paint_to_grass(frame, self.size)
         return compute_paint_shift(grass, frame.sightings.curve, self.terms, self.pitch)
 
-    def fit_camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
+    def fit_camera(self, frame: FrameWithPaint) -> tuple[FloatArray, FloatArray]:
         """The camera of a frame on the pitch that is shown, shape (8,), and its covariance, shape (8, 8)."""
         frames = _TripodProblem([frame], self.size, self.plan, self.policy, self)
         for _ in range(ALONE_ROUNDS):
@@ -199,7 +199,7 @@ class TripodPitch:
             )
         return frames.parameters[0], self.covariance_of(frame, frames.parameters[0])
 
-    def error_px(self, frame: PaintSightings, parameters: FloatArray) -> float:
+    def error_px(self, frame: FrameWithPaint, parameters: FloatArray) -> float:
         """Median distance of a frame's paint from the pitch that is shown, by its camera there, pixels."""
         at = replace(frame, parameters=parameters)
         seen = _TripodProblem([at], self.size, self.plan, self.policy, self).measure_frame_offsets(
@@ -207,7 +207,7 @@ class TripodPitch:
         )
         return float(np.median(np.abs(seen.offsets)))
 
-    def covariance_of(self, frame: PaintSightings, parameters: FloatArray) -> FloatArray:
+    def covariance_of(self, frame: FrameWithPaint, parameters: FloatArray) -> FloatArray:
         """The same of parameters that are known already, shape (8, 8)."""
         at = replace(frame, parameters=parameters)
         parts = _TripodProblem(
@@ -238,7 +238,7 @@ def second_moment_about_plan(
 
 
 def find_tripod_pitch(
-    frames: Sequence[PaintSightings], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
+    frames: Sequence[FrameWithPaint], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
 ) -> TripodPitch | None:
     """The pitch that frames of one camera on a tripod show together.
 
@@ -293,7 +293,7 @@ class _TripodProblem:
 
     def __init__(
         self,
-        frames: Sequence[PaintSightings],
+        frames: Sequence[FrameWithPaint],
         size: ImageSize,
         plan: Pitch,
         policy: CalibrationPolicy,
@@ -435,7 +435,7 @@ def _eliminate_frames(parts: _NormalEquations, carried: FloatArray) -> FloatArra
     return np.asarray(parts.common - np.einsum("nis,nit->st", parts.between, carried))
 
 
-def project_paint_to_grass(frame: PaintSightings, size: ImageSize) -> FloatArray:
+def project_paint_to_grass(frame: FrameWithPaint, size: ImageSize) -> FloatArray:
     """Where on the grass each place of paint lies by the frame's camera, metres, shape (N, 2)."""
     center = principal_point(size)
     camera = camera_from_parameters(frame.parameters, center, size.diagonal / 2)

@@ -55,7 +55,7 @@ class TrackConstraints:
 
 
 @dataclass(frozen=True)
-class InstantConstraints:
+class ConstraintsByKnot:
     """What is said, by the knots of a run.
 
     Attributes:
@@ -92,7 +92,7 @@ class InstantConstraints:
         return not int(self.may_not[to]) >> kind & 1
 
 
-def build_instant_constraints(times: FloatArray, said: TrackConstraints) -> InstantConstraints:
+def build_constraints_by_knot(times: FloatArray, said: TrackConstraints) -> ConstraintsByKnot:
     """What is said of a run.
 
     Args:
@@ -120,7 +120,7 @@ def build_instant_constraints(times: FloatArray, said: TrackConstraints) -> Inst
         if abs(times[at] - place.time) < _SAME_S:
             places.append((at, place))
     places.sort(key=lambda one: one[0])
-    return InstantConstraints(
+    return ConstraintsByKnot(
         wanted,
         begin,
         due,

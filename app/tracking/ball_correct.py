@@ -162,7 +162,7 @@ def _group_corrections(
     first = last = -1
     said: list[EventCorrection] = []
     for row, item in wanted:
-        begin, end = _find_resolve_limit(track, row, -1), _find_resolve_limit(track, row, 1)
+        begin, end = _find_end_of_new_solve(track, row, -1), _find_end_of_new_solve(track, row, 1)
         if said and begin > last:
             yield first, last, tuple(said)
             said = []
@@ -171,7 +171,7 @@ def _group_corrections(
     yield first, last, tuple(said)
 
 
-def _find_resolve_limit(track: BallTrack, row: int, step: int) -> int:
+def _find_end_of_new_solve(track: BallTrack, row: int, step: int) -> int:
     """The row up to which a track is solved anew: as far as no two views see the ball."""
     times, at = track.times, row
     events = np.array([event.time_s for event in track.events])

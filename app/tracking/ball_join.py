@@ -75,7 +75,7 @@ def join_runs(
     for run in runs:
         knots, fitted, history = run.knots, run.fitted, run.history
         if knots is None or fitted is None or history is None:
-            untracked.append(_make_untracked(measurements, run, run.reason or ""))
+            untracked.append(_make_untracked_run(measurements, run, run.reason or ""))
             continue
         assert run.used is not None and run.noise is not None
         spread = _add_event_time_covariance(knots, fitted)
@@ -83,7 +83,7 @@ def join_runs(
         sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
         known = sigma <= options.most_sigma_m
         if not known.any():
-            untracked.append(_make_untracked(measurements, run, OPEN))
+            untracked.append(_make_untracked_run(measurements, run, OPEN))
         at_times = knots.times[knots.at]
         for row, knot in _match_rows_to_knots(knots, times):
             if not known[knot]:
@@ -154,7 +154,7 @@ def _mean_noise_by_view(
     return tuple((name, value) for name, value in mean.items() if value > 1 + 1e-9)
 
 
-def _make_untracked(measurements: BallMeasurements, run: TrackRun, reason: str) -> UntrackedRun:
+def _make_untracked_run(measurements: BallMeasurements, run: TrackRun, reason: str) -> UntrackedRun:
     of_run = measurements.frames[run.rows]
     return UntrackedRun(int(of_run.min()), int(of_run.max()), len(run.rows), reason)
 

@@ -9,9 +9,9 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_constraints import (
-    InstantConstraints,
+    ConstraintsByKnot,
     TrackConstraints,
-    build_instant_constraints,
+    build_constraints_by_knot,
 )
 from app.tracking.ball_models import REST
 from app.tracking.ball_search_kernels import find_likeliest_modes
@@ -58,7 +58,7 @@ class TrackKnots:
     far: FloatArray
     far_sigma: FloatArray
     view: IntArray
-    asked: InstantConstraints
+    asked: ConstraintsByKnot
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def build_knots(
         far,
         np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
         view[rows],
-        build_instant_constraints(knots, said or TrackConstraints()),
+        build_constraints_by_knot(knots, said or TrackConstraints()),
     )
 
 

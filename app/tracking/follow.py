@@ -239,7 +239,7 @@ class CameraFollower:
         if self._was_recently_proposed(picture, every):
             return None
         self.tried, self.turned_since = picture.number, 0.0
-        libraries = self._choose_camera_libraries()
+        libraries = self._choose_search_spaces()
         self.in_vain += 1
         try:
             found = propose_camera_in_picture(
@@ -265,7 +265,7 @@ class CameraFollower:
             is_key=True,
         )  # fmt: skip
 
-    def _choose_camera_libraries(self) -> tuple[CameraSearchSpace, ...]:
+    def _choose_search_spaces(self) -> tuple[CameraSearchSpace, ...]:
         """Where a camera is sought besides the positions that are known: a tripod stays where it is.
 
         The farther off, the more seldom: to look everywhere costs ten times what a frame may.

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
 from app.tracking.ball_rays import BallRays
-from app.tracking.link_fit import FEWEST_PAIRS, LinearTimeMap, LinkFit, estimate_frame_interval_s
+from app.tracking.link_fit import FEWEST_PAIRS, LinearTimeMap, LinkFitter, estimate_frame_interval_s
 from app.tracking.link_reasons import judge_map
 from app.tracking.time_map import TimeMap, fit_map_to_instants
 
@@ -55,7 +55,7 @@ def fit_time_map(
         if len(rays) < FEWEST_PAIRS:
             reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
-    fit = LinkFit(live, replay, hints)
+    fit = LinkFitter(live, replay, hints)
     tried = [fit.refine_map(one) for one in fit.find_candidate_maps()]
     found = [one for one in tried if one is not None]
     if not found:
@@ -89,7 +89,7 @@ def measure_ray_distances(
         inside = (replay.times >= piece.first) & (replay.times <= piece.last)
         part = replay.part(np.flatnonzero(inside))
         if len(part):
-            fit = LinkFit(live, part, np.zeros((0, 2)))
+            fit = LinkFitter(live, part, np.zeros((0, 2)))
             pairs = fit.find_ray_pairs(LinearTimeMap(piece.offset, piece.speed, 0.0))
             times.append(part.times[pairs.replay])
             misses.append(np.abs(pairs.miss))
@@ -102,14 +102,16 @@ def _make_map_from_hints(live: BallRays, replay: BallRays, hints: FloatArray) ->
     if made.reason is not None or min(len(live), len(replay)) < 2:
         return made
     assert made.offset is not None and made.speed is not None
-    pairs = LinkFit(live, replay, hints).find_ray_pairs(LinearTimeMap(made.offset, made.speed, 0.0))
+    pairs = LinkFitter(live, replay, hints).find_ray_pairs(
+        LinearTimeMap(made.offset, made.speed, 0.0)
+    )
     count = len(pairs.miss)
     miss = float(np.median(np.abs(pairs.miss))) if count else None
     return replace(made, miss=miss, pairs=count)
 
 
 def _split_into_pieces(
-    fit: LinkFit, made: TimeMap, best: LinearTimeMap, found: Sequence[LinearTimeMap]
+    fit: LinkFitter, made: TimeMap, best: LinearTimeMap, found: Sequence[LinearTimeMap]
 ) -> TimeMap:
     """What became of a link, refused where one map does not fit the whole replay.
 
@@ -121,7 +123,7 @@ def _split_into_pieces(
     fit.run = 1.0
     maps = [best, *found]
     for rows in np.array_split(np.arange(len(replay)), 3):
-        near = LinkFit(live, replay.part(rows), fit.hints[:0])
+        near = LinkFitter(live, replay.part(rows), fit.hints[:0])
         at = float(best.to_live_times(np.array(near.middle)))
         one = near.refine_map(replace(best, at=at, middle=near.middle))
         if one is not None:
@@ -134,7 +136,7 @@ def _split_into_pieces(
         if fit.has_enough_pairs(best, rows)
     ]
     for rows in left:
-        near = LinkFit(live, replay.part(rows), fit.hints[:0])
+        near = LinkFitter(live, replay.part(rows), fit.hints[:0])
         maps += [one for one in map(near.refine_map, near.find_candidate_maps()) if one is not None]
     parts = [replay.part(rows) for rows in _find_stretches_by_map(fit, maps)]
     pieces: list[TimeMap] = []
@@ -157,7 +159,7 @@ def _split_into_pieces(
 
 
 def _find_stretches_by_map(
-    fit: LinkFit, maps: Sequence[LinearTimeMap], none: bool = False
+    fit: LinkFitter, maps: Sequence[LinearTimeMap], none: bool = False
 ) -> list[IntArray]:
     """Rays of the replay that follow each other and fit one map best; or with ``none`` no map."""
     gains = np.array([np.zeros(len(fit.replay)), *(fit.ray_log_likelihoods(one) for one in maps)])

@@ -134,7 +134,7 @@ def _interpolate_rays(
     return positions, directions / np.linalg.norm(directions, axis=1, keepdims=True), known
 
 
-class LinkFit:
+class LinkFitter:
     """Maps between two views, compared at the noise that their rays have."""
 
     def __init__(self, live: BallRays, replay: BallRays, hints: FloatArray):

@@ -13,7 +13,7 @@ from app.tracking.link_fit import (
     LEAST_OVERLAP_S,
     LEAST_SHARE,
     LinearTimeMap,
-    LinkFit,
+    LinkFitter,
     RayPairs,
 )
 from app.tracking.time_map import TimeMap
@@ -32,7 +32,7 @@ _RESTS_M = 1.0
 """Way of a ball that hardly moves."""
 
 
-def judge_map(fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap]) -> TimeMap:
+def judge_map(fit: LinkFitter, best: LinearTimeMap, found: Sequence[LinearTimeMap]) -> TimeMap:
     """What can be said of the best map among others."""
     for _ in range(3):
         fit.set_noise_from_misses(best)
@@ -43,7 +43,7 @@ def judge_map(fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap])
     return replace(made, reason=reason or _explain_uncertainty(fit, made, pairs))
 
 
-def _explain_mismatch(fit: LinkFit, made: TimeMap, pairs: RayPairs) -> str | None:
+def _explain_mismatch(fit: LinkFitter, made: TimeMap, pairs: RayPairs) -> str | None:
     """Why the rays do not meet under a map; None where they do."""
     assert made.miss is not None
     if made.overlap < LEAST_OVERLAP_S:
@@ -76,7 +76,7 @@ def _explain_mismatch(fit: LinkFit, made: TimeMap, pairs: RayPairs) -> str | Non
 
 
 def _explain_ambiguity(
-    fit: LinkFit, best: LinearTimeMap, found: Sequence[LinearTimeMap], pairs: RayPairs
+    fit: LinkFitter, best: LinearTimeMap, found: Sequence[LinearTimeMap], pairs: RayPairs
 ) -> str | None:
     """Why the ball cannot tell a map from others; None where it can."""
     shifted = [(replace(best, at=best.at + shift), 0) for shift in _SHIFTS_S]
@@ -97,7 +97,7 @@ def _explain_ambiguity(
     return None
 
 
-def _explain_uncertainty(fit: LinkFit, made: TimeMap, pairs: RayPairs) -> str | None:
+def _explain_uncertainty(fit: LinkFitter, made: TimeMap, pairs: RayPairs) -> str | None:
     """Why a map is too uncertain to be used; None where it is not."""
     assert made.covariance is not None and made.speed is not None
     middle = np.array([1.0, float(np.median(fit.replay.times[pairs.replay]))])

@@ -125,7 +125,7 @@ def _follow_both_ways(
         if start > 0 and shot.frames[start - 1] is not first[start - 1]:
             _follow_run(clip, shot, range(start, end), pitch, policy)
     _bridge_or_drop_runs(shot.frames, shot.matches)
-    _drop_unconfirmed(clip, shot.frames, pitch, policy)
+    _drop_cameras_of_unconfirmed_runs(clip, shot.frames, pitch, policy)
     return shot, follower
 
 
@@ -280,7 +280,7 @@ def _bridge_or_drop_runs(
                 frames[number] = replace(frame, outcome=LOST, camera=None, snapped=None)
 
 
-def _drop_unconfirmed(
+def _drop_cameras_of_unconfirmed_runs(
     clip: Clip, frames: list[TrackedFrame], pitch: Pitch, policy: CalibrationPolicy
 ) -> None:
     """Take the cameras of runs that tie to no key frame, unless their own paint says the same."""

@@ -56,7 +56,7 @@ from app.solving.tripod_pitch import (
     DEVIATION_M,
     KAPPA_DEVIATION,
     KAPPA_SLOPE_SIGMA,
-    PaintSightings,
+    FrameWithPaint,
     TripodPitch,
     find_tripod_pitch,
     project_paint_to_grass,
@@ -222,7 +222,7 @@ class _ShotProblem:
         assert frame.camera is not None
         return parameters_from_camera(frame.camera, self.half_diagonal)
 
-    def _make_frame_sightings(self, frame: TrackedFrame) -> PaintSightings | None:
+    def _make_frame_sightings(self, frame: TrackedFrame) -> FrameWithPaint | None:
         if frame.outcome != TRACKED or frame.snapped is None:
             return None
         return make_paint_sightings(frame.snapped)
@@ -251,7 +251,7 @@ class _ShotProblem:
             self.parameters[place], self.principal_point, self.half_diagonal
         )
 
-    def sightings_by_place(self) -> dict[int, PaintSightings]:
+    def sightings_by_place(self) -> dict[int, FrameWithPaint]:
         """The frames with paint, by their place in the shot."""
         return {
             place: replace(sight, parameters=self.parameters[place])

@@ -21,7 +21,7 @@ _SIGNS[[X, Y]] = -1.0
 """Of the parameters of a camera: pan grows by half a turn, which changes no derivative."""
 
 
-def turn_frame_camera(frame: FrameCamera) -> FrameCamera:
+def move_camera_to_opposite_side(frame: FrameCamera) -> FrameCamera:
     """The camera of a frame, and its covariance, turned by 180 degrees about the centre mark; twice is as before."""
     if frame.camera is None:
         return frame

@@ -17,7 +17,7 @@ from app.config import Settings
 from app.errors import ImageError, TooLargeError
 from app.geometry.arrays import FloatArray, IntArray
 from app.media.images import ImageHeader, check_size
-from app.media.video import MAX_FRAMES, FrameReader, grab_next_frame, open_video
+from app.media.video import MAX_FRAMES, FrameReader, grab_next_frame_counting_damaged, open_video
 from app.video.index import RecordingFacts, RecordingIndex, find_time_base
 from app.video.measures import (
     COMB_EVERY,
@@ -91,7 +91,7 @@ def _build_index(
         aspect = read_pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
-        while (skipped := grab_next_frame(video)) is not None:
+        while (skipped := grab_next_frame_counting_damaged(video)) is not None:
             damaged += skipped
             row, before = rows.append_row()
             if settings is not None:

@@ -199,10 +199,10 @@ def index_and_find_shots(
     def report_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         tell((done, total, sentence))
 
-    return find_shots_of_indexed(path, index, report_progress)
+    return find_shots_of_indexed_recording(path, index, report_progress)
 
 
-def find_shots_of_indexed(
+def find_shots_of_indexed_recording(
     path: Path, index: RecordingIndex, progress: ReportProgress | None = None
 ) -> RecordingShots:
     """Find the shots of a recording that is indexed, in this process.
@@ -218,12 +218,12 @@ def find_shots_of_indexed(
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 
         def analyse_numbered_frames(numbers: Sequence[int]) -> list[FrameContent]:
-            return [analyse_frame(_narrow_image(reader.read(number))) for number in numbers]
+            return [analyse_frame(_downscale_image(reader.read(number))) for number in numbers]
 
         return find_shots(index, analyse_numbered_frames, progress)
 
 
-def _narrow_image(image: Image) -> Image:
+def _downscale_image(image: Image) -> Image:
     height, width = image.shape[:2]
     if width <= _LOOKED_WIDTH:
         return image

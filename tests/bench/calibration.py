@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.evaluation.cameras import measure_error_without_marking, score_frame, score_frames
+from app.evaluation.cameras import combine_frame_scores, measure_error_without_marking, score_frame
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
@@ -82,7 +82,7 @@ def _run(frames: Mapping[str, Lines], policy: CalibrationPolicy) -> Run:
 
 
 def _scores(frames: Mapping[str, Lines], run: Run) -> list[object]:
-    total = score_frames(
+    total = combine_frame_scores(
         None if found.camera is None else score_frame(found.camera, frames[stem], PITCH, SIZE)
         for stem, found in run.calibrations.items()
     )

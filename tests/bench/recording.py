@@ -28,7 +28,7 @@ from app.tracking.time_map import TimeMap
 from app.tracking.track import FrameCamera, track_clip
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
-from app.video.shots import Shot, find_shots_of_indexed
+from app.video.shots import Shot, find_shots_of_indexed_recording
 from tests.bench.table import print_table
 
 NOISE_PX = 0.5
@@ -61,7 +61,7 @@ class KnownRecording:
 
     def found_shots(self) -> list[Shot]:
         """Its shots as the product finds them."""
-        return list(find_shots_of_indexed(self.path, self.index).shots)
+        return list(find_shots_of_indexed_recording(self.path, self.index).shots)
 
     def tracked(self, shot: int) -> list[FrameCamera]:
         """The cameras of a shot as the product finds them."""

@@ -19,7 +19,7 @@ from playwright.sync_api import Page, sync_playwright
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.tracks.service import list_tracks, make_tracks, read_track
+from app.features.tracks.service import list_tracks, make_tracks, read_track_detail
 from tests.bench.table import print_table
 from tests.e2e.install_chromium import find_chromium
 from tests.e2e.service import free_port, killable, run_touchline
@@ -104,7 +104,7 @@ def _make_home(home: Path, data: Path) -> tuple[str, list[tuple[int, int]]]:
         else:
             add_flight(store, count=90)
         (track,) = list_tracks(store, "flight")
-        groups = read_track(store, track.id).groups
+        groups = read_track_detail(store, track.id).groups
     frames = sorted(groups)
     chosen = [frames[int(share * len(frames))] for share in PLACES]
     what = "ISSIA's six cameras" if real.is_dir() else "four cameras"

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image, ImageOps
 
 from app.config import Settings
-from app.features.exports.source import ExportImages
+from app.features.exports.source import ExportImageWriter
 from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _read_frame
 from app.formats.report import ReaderReport
@@ -58,7 +58,7 @@ def exported(path: Path, images: str, settings: Settings) -> np.ndarray:
     station = Station("7", ImageSize(width, height))
     group = Group("m/7", (View("7", station, media=Media(str(path))),), "m")
     root = Path(mkdtemp(dir=path.parent))
-    out = ExportImages(
+    out = ExportImageWriter(
         root,
         images,
         lambda media, width, turn: make_picture(media, width, turn, settings),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
-from app.evaluation.frame import Frame
+from app.evaluation.frame import GroundTruthFrame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import import_groups
 from app.features.predictions.frames import read_live_truth
@@ -73,5 +73,5 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
 _TEST = frozenset(TEST_CAMERAS)
 
 
-def _key(frame: Frame) -> str:
+def _key(frame: GroundTruthFrame) -> str:
     return f"{frame.group} {frame.view}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
-from app.evaluation.frame import Detection, Frame
+from app.evaluation.frame import Detection, GroundTruthFrame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import import_groups
 from app.features.predictions.frames import EvaluationTruth, read_live_truth
@@ -70,7 +70,7 @@ def true_boxes(scenes: Sequence[Scene]) -> dict[str, Box]:
     }
 
 
-def _learnt(frames: Sequence[Frame], boxes: Mapping[str, Box], kind: str) -> float:
+def _learnt(frames: Sequence[GroundTruthFrame], boxes: Mapping[str, Box], kind: str) -> float:
     pairs = {
         _key(frame): (frame.boxes[kind], boxes[_key(frame)])
         for frame in frames
@@ -80,7 +80,7 @@ def _learnt(frames: Sequence[Frame], boxes: Mapping[str, Box], kind: str) -> flo
 
 
 def _detections(
-    frames: Sequence[Frame], boxes: Mapping[str, Box], ratio: float, seed: int
+    frames: Sequence[GroundTruthFrame], boxes: Mapping[str, Box], ratio: float, seed: int
 ) -> dict[int, list[Detection]]:
     """The same balls found and missed for both detectors: they differ in their boxes alone."""
     detector = SimulatedDetector(ratio, seed)
@@ -89,7 +89,9 @@ def _detections(
     }
 
 
-def _cameras(frames: Sequence[Frame], scenes: Sequence[Scene], seed: int) -> dict[int, object]:
+def _cameras(
+    frames: Sequence[GroundTruthFrame], scenes: Sequence[Scene], seed: int
+) -> dict[int, object]:
     views = {
         f"{scene.group.key} {view.key}": (view, scene.group.pitch)
         for scene in scenes
@@ -104,5 +106,5 @@ def _cameras(frames: Sequence[Frame], scenes: Sequence[Scene], seed: int) -> dic
     return found
 
 
-def _key(frame: Frame) -> str:
+def _key(frame: GroundTruthFrame) -> str:
     return f"{frame.group} {frame.view}"

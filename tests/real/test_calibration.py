@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.evaluation.cameras import score_frame, score_frames
+from app.evaluation.cameras import combine_frame_scores, score_frame
 from app.formats.cameras import read_cameras
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
@@ -43,7 +43,7 @@ def calibrations(frames):
 
 class TestCalibrate:
     def test_beats_the_published_calibrators_by_far(self, frames, calibrations):
-        total = score_frames(
+        total = combine_frame_scores(
             None if found.camera is None else score_frame(found.camera, frames[stem], Pitch(), SIZE)
             for stem, found in calibrations.items()
         )
@@ -82,7 +82,7 @@ class TestScore:
     def test_gives_cameras_of_others_the_numbers_of_the_public_evaluator(self):
         report = ReaderReport()
         cameras = read_cameras(PNLCALIB, report)
-        total = score_frames(
+        total = combine_frame_scores(
             score_frame(cameras[file.stem], file.lines, Pitch(), SIZE)
             if file.stem in cameras
             else None

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from app.evaluation.cameras import measure_error_without_marking
-from app.features.file_tools.matches import collect_shared_match_places
+from app.features.file_tools.matches import collect_camera_places_of_other_frames
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.match_position import NO_PLACES, find_camera_place
+from app.solving.match_position import NO_PLACES, find_main_camera_place
 from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -38,8 +38,10 @@ def files():
 
 @pytest.fixture(scope="module")
 def shares(files):
-    places = [find_camera_place(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
-    return collect_shared_match_places(files, places, None)
+    places = [
+        find_main_camera_place(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files
+    ]
+    return collect_camera_places_of_other_frames(files, places, None)
 
 
 class TestShares:

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 import yaml
 
-from app.config import Settings, StoreSettings
-from app.object_store.store import read_keys
+from app.config import ObjectStoreSettings, Settings
+from app.object_store.store import read_access_keys
 from app.workers.cluster import parse_scheduler_address
 from tests.team_at_scale import FOLDER, make_secrets, settings_of, together
 
@@ -218,8 +218,8 @@ class TestSecrets:
     def test_touchline_takes_them(self, scaled: dict[str, Any], secrets: Path) -> None:
         settings = settings_of(scaled["services"]["touchline"], secrets)
         assert re.fullmatch(r"postgresql://touchline:\w{48}@database/touchline", settings.database)
-        store: StoreSettings = settings.stores["store"]
-        key, secret, _ = read_keys(store) or ("", "", "")
+        store: ObjectStoreSettings = settings.stores["store"]
+        key, secret, _ = read_access_keys(store) or ("", "", "")
         (identity,) = json.loads((secrets / "store.json").read_text())["identities"]
         assert identity["credentials"] == [{"accessKey": key, "secretKey": secret}]
         assert {right.partition(":")[2] for right in identity["actions"]} == {store.bucket}

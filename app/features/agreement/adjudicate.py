@@ -46,7 +46,7 @@ class OpenCase:
 
 
 @dataclass(frozen=True)
-class AgreementCase:
+class AdjudicationCase:
     """A group that waits for a decision, with what it is to be decided between.
 
     Attributes:
@@ -83,7 +83,7 @@ def list_open_cases(store: Store, dataset: str | int) -> list[OpenCase]:
     return found
 
 
-def read_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
+def read_case(store: Store, group_id: int, *, actor: str) -> AdjudicationCase:
     """What is to be decided about a group.
 
     Raises:
@@ -108,7 +108,7 @@ def read_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
     refused = None
     if own and (others := _possible_judges(store, original.dataset_id, annotations)):
         refused = f"you annotated this group yourself; {_join_names(others)} can decide"
-    return AgreementCase(
+    return AdjudicationCase(
         original,
         row.batch_id or None,
         tuple(annotations),

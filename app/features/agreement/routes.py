@@ -20,7 +20,7 @@ from app.evaluation.rater_agreement import (
 )
 from app.features.agreement import adjudicate
 from app.features.agreement import service as limits
-from app.features.agreement.adjudicate import AgreementCase, OpenCase
+from app.features.agreement.adjudicate import AdjudicationCase, OpenCase
 from app.features.agreement.service import AnnotationPair, AnnotationsComparison, compare_groups
 from app.features.agreement.summary import (
     GroupAgreement,
@@ -201,7 +201,7 @@ class CaseDocument(Document):
     )
 
     @staticmethod
-    def of(case: AgreementCase) -> CaseDocument:
+    def of(case: AdjudicationCase) -> CaseDocument:
         """The document of a case."""
         return CaseDocument.model_validate(
             {

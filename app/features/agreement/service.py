@@ -173,7 +173,7 @@ def set_limits(
 
 
 @dataclass(frozen=True)
-class AnnotationComparison:
+class StoredAnnotationPair:
     """Two independent annotations of a group, by their ids and people, and how far they lie apart."""
 
     a: int
@@ -187,7 +187,7 @@ class AnnotationComparison:
 class StoredComparison:
     """All that is kept of a comparison."""
 
-    pairs: tuple[AnnotationComparison, ...]
+    pairs: tuple[StoredAnnotationPair, ...]
 
 
 def compare_or_adopt_submission(
@@ -399,7 +399,7 @@ def _build_agreement_columns(
 ) -> dict[str, Any]:
     """What is kept of a comparison, as a row that waits for a decision."""
     pairs = tuple(
-        AnnotationComparison(
+        StoredAnnotationPair(
             annotations[pair.a].id,
             annotations[pair.b].id,
             (annotations[pair.a].person, annotations[pair.b].person),

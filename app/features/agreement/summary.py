@@ -20,7 +20,7 @@ from app.evaluation.rater_agreement import (
     krippendorff_alpha,
 )
 from app.features.agreement.queries import AGREED, DECIDED, OPEN, AgreementRow, list_agreements
-from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits
+from app.features.agreement.service import StoredAnnotationPair, StoredComparison, read_limits
 from app.features.datasets.service import dataset_id
 from app.features.solutions.codec import from_json
 from app.formats.csv_text import format_csv_line
@@ -95,7 +95,7 @@ class _ComparedGroup:
     """A row with its pairs as they were kept."""
 
     row: AgreementRow
-    pairs: tuple[AnnotationComparison, ...]
+    pairs: tuple[StoredAnnotationPair, ...]
 
     @property
     def verdicts(self) -> dict[str, str | None]:

@@ -361,7 +361,7 @@ _STARTS = {
 }
 
 
-def _describe_known_work(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+def _find_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
@@ -393,7 +393,7 @@ def _describe_known_work(row: AuditRow, body: Mapping[str, Any]) -> str | None:
 
 
 def _describe_work(row: AuditRow, body: Mapping[str, Any]) -> str:
-    sentence = _describe_known_work(row, body)
+    sentence = _find_work_sentence(row, body)
     if sentence is not None:
         return sentence
     parts = ("name", "batch", "group", "take", "person")

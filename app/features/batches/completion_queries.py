@@ -10,7 +10,7 @@ from app.db.dialects.dialect import select_from_number_parameter
 from app.db.session import Session
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
-from app.features.webhooks.queries import DONE, queue_batch_messages
+from app.features.webhooks.queries import DONE, queue_messages_about_batch
 from app.features.webhooks.tables import WebhookModel
 from app.json_text import json_text
 
@@ -86,4 +86,4 @@ def _announce_finished_batches(
         BatchGroupModel.batch_id.in_(batch_ids), BatchGroupModel.settled.is_(None)
     )
     for batch_id in sorted(set(batch_ids) - set(session.scalars(waits.distinct()))):
-        queue_batch_messages(session, batch_id, DONE, actor=actor, at=at)
+        queue_messages_about_batch(session, batch_id, DONE, actor=actor, at=at)

@@ -31,8 +31,8 @@ from app.features.batches.queries import (
     find_batch_group,
     find_next_waiting_group,
     list_group_leases,
-    mark_submitted,
     save_lease,
+    set_group_submission,
 )
 from app.features.batches.service import WORK, Batch, BatchRole, Presence, read_batch
 from app.features.independent_annotations.adopt import log_and_notify_return, strip_and_check_reason
@@ -142,7 +142,7 @@ class LeaseService:
     ) -> Lease:
         at = self._current_time_text()
         delete_ended_leases(session, at)
-        found = find_next_open_group(session, batch, worker, at, after=after)
+        found = find_next_group_to_lease(session, batch, worker, at, after=after)
         if found is None:
             return Lease(batch, None)
         row, part = found
@@ -225,7 +225,7 @@ class LeaseService:
                 raise ConflictError(
                     f"{by} has submitted this group", hint="Continue with the next group."
                 )
-            mark_submitted(
+            set_group_submission(
                 session,
                 batch_id,
                 group,
@@ -258,7 +258,7 @@ class LeaseService:
             if row.submitted is None:
                 raise ConflictError("this group is not submitted")
             person = row.submitted_by
-            mark_submitted(session, batch_id, group, at=None, by=person, returned=True)
+            set_group_submission(session, batch_id, group, at=None, by=person, returned=True)
             log_and_notify_return(
                 session, WORK, group, person, checked, actor=actor, batch=batch_id
             )
@@ -298,7 +298,7 @@ class LeaseService:
         return format_utc_time(self._clock())
 
 
-def find_next_open_group(
+def find_next_group_to_lease(
     session: Session, batch: Batch, worker: BatchMember, at: str, *, after: int | None = None
 ) -> tuple[Any, BatchRole] | None:
     """The row of the group that somebody gets next of a batch, and what they do with it.

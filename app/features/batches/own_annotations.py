@@ -11,7 +11,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.batches.queries import list_returned_batch_groups, read_batch_groups
-from app.features.batches.queries import mark_submitted as hand_in_group
+from app.features.batches.queries import set_group_submission as hand_in_group
 from app.features.batches.service import Batch, BatchRole, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
@@ -32,7 +32,7 @@ from app.features.independent_annotations.submission_queries import (
     require_annotation_open,
     submit_copy,
 )
-from app.features.people.visibility_queries import READER, sees_all_work
+from app.features.people.visibility_queries import READER, sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
 from app.soccer.actors import person_of_actor
 
@@ -103,7 +103,7 @@ def hide_others_progress(session: Session, batch: Batch) -> Batch:
     Of one that they annotate blind they see their own part alone: counts of the groups change with
     what is submitted of them, and not with what is submitted of a gold group.
     """
-    if query_reveals_hidden_work(batch.query) and not sees_all_work(batch.dataset_id):
+    if query_reveals_hidden_work(batch.query) and not sees_independent_work(batch.dataset_id):
         batch = replace(batch, query="")
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):

@@ -312,7 +312,7 @@ def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, WorkCo
     }
 
 
-def mark_submitted(
+def set_group_submission(
     session: Session,
     batch_id: int,
     group_id: int,

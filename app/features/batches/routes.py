@@ -263,11 +263,11 @@ class BatchMemberResolver:
         return self.member_in_dataset(batches.find_dataset_of_batch(store, batch))
 
 
-async def _get_batch_members(request: Request) -> BatchMemberResolver:
+async def _get_batch_member_resolver(request: Request) -> BatchMemberResolver:
     return BatchMemberResolver(get_current_login(request.scope))
 
 
-Members = Annotated[BatchMemberResolver, Depends(_get_batch_members)]
+Members = Annotated[BatchMemberResolver, Depends(_get_batch_member_resolver)]
 
 
 def _announce_lease(services: Services, lease: Lease) -> Lease:

@@ -41,7 +41,7 @@ from app.features.people.service import list_members
 from app.features.queue.queries import GroupListing
 from app.features.queue.query import MAX_LISTED_LENGTH, Query, parse_query
 from app.features.tracks.queries import list_track_rows
-from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, queue_batch_messages
+from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, queue_messages_about_batch
 from app.json_text import Moment
 from app.soccer.actors import person_of_actor
 from app.wording import plural
@@ -254,7 +254,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         batch = read_batch(session, made)
         _log_change(session, batch, "made", actor)
         _notify_assigned_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
-        queue_batch_messages(session, made, GIVEN_OUT, actor=actor, at=batch.created)
+        queue_messages_about_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
         session.respond(batch)
         return batch
 
@@ -334,7 +334,7 @@ def change_batch(
         new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
         _notify_assigned_people(session, batch, new, actor)
         if known != (*batch.annotators, *batch.reviewers):
-            queue_batch_messages(session, batch_id, HANDED_ON, actor=actor, at=now())
+            queue_messages_about_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
         session.respond(batch)
         return batch
 

@@ -136,7 +136,7 @@ class ThreadRecord:
 
 
 @dataclass(frozen=True)
-class ThreadGroup:
+class CommentedGroup:
     """The group that a thread is about, and what people call it."""
 
     dataset_id: int
@@ -146,7 +146,7 @@ class ThreadGroup:
     views: frozenset[str] = field(default_factory=frozenset)
 
 
-def find_group(session: Session, group_id: int) -> ThreadGroup | None:
+def find_group(session: Session, group_id: int) -> CommentedGroup | None:
     """The group of an id, with the keys of its views; None where there is none."""
     statement = (
         select(GroupModel.dataset_id, DatasetModel.name, GroupModel.label, GroupModel.key)
@@ -157,7 +157,9 @@ def find_group(session: Session, group_id: int) -> ThreadGroup | None:
     if row is None:
         return None
     views = session.scalars(select(ViewModel.key).where(ViewModel.group_id == group_id))
-    return ThreadGroup(row.dataset_id, row.name, group_id, row.label or row.key, frozenset(views))
+    return CommentedGroup(
+        row.dataset_id, row.name, group_id, row.label or row.key, frozenset(views)
+    )
 
 
 def read_threads(
@@ -223,7 +225,7 @@ def _read_comments_by_thread(
 
 def insert_thread(
     session: Session,
-    group: ThreadGroup,
+    group: CommentedGroup,
     view: str | None,
     at: tuple[float, float] | None,
     time: str,

@@ -16,10 +16,8 @@ from app.db.log import LogEntry, NewLogEntry, append_entries, iterate_entries_of
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, StorageError
-from app.features.comments.queries import StoredComment as StoredComment
-from app.features.comments.queries import StoredThread as StoredThread
 from app.features.comments.queries import (
-    ThreadGroup,
+    CommentedGroup,
     ThreadRecord,
     change_comment,
     delete_thread,
@@ -31,6 +29,8 @@ from app.features.comments.queries import (
     set_mentions,
     set_thread_resolved,
 )
+from app.features.comments.queries import StoredComment as StoredComment
+from app.features.comments.queries import StoredThread as StoredThread
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify_person
 from app.features.people.logins import read_roles
@@ -213,7 +213,7 @@ def delete_comment(
 
 def _insert_comment(
     session: Session,
-    group: ThreadGroup,
+    group: CommentedGroup,
     thread_id: int,
     text: str,
     actor: str,
@@ -231,7 +231,7 @@ def _insert_comment(
 
 def _notify_people(
     session: Session,
-    group: ThreadGroup,
+    group: CommentedGroup,
     thread_id: int,
     actor: str,
     mentioned: Iterable[str],
@@ -254,7 +254,9 @@ def _notify_people(
         )
 
 
-def _find_reader_ids(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
+def _find_reader_ids(
+    session: Session, group: CommentedGroup, names: Iterable[str]
+) -> dict[str, int]:
     """Ids of those among some names who see a group's dataset; the others are not told apart."""
     found: dict[str, int] = {}
     for name in names:
@@ -272,7 +274,7 @@ def _can_read_dataset(row: MemberRow) -> bool:
 
 
 def _log_comment(
-    session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any
+    session: Session, group: CommentedGroup, actor: str, time: str, **fields: Any
 ) -> None:
     body = {name: value for name, value in fields.items() if value is not None}
     append_entries(
@@ -289,7 +291,7 @@ def _validate_comment(text: str) -> str:
     return text
 
 
-def _require_group(session: Session, group_id: int) -> ThreadGroup:
+def _require_group(session: Session, group_id: int) -> CommentedGroup:
     group = find_group(session, group_id)
     if group is None:
         raise NotFoundError.group(group_id)

@@ -215,7 +215,7 @@ def find_job_owner(session: Session, job_id: int) -> JobOwner | None:
     return session.row(JobOwner, _JOB, {"id": job_id})
 
 
-class VersionName(NamedTuple):
+class VersionIdentity(NamedTuple):
     """What a version can be named by."""
 
     id: int
@@ -224,7 +224,7 @@ class VersionName(NamedTuple):
     hash: str
 
 
-def find_versions_by_text(session: Session, text: str) -> Sequence[VersionName]:
+def find_versions_by_text(session: Session, text: str) -> Sequence[VersionIdentity]:
     """The versions that a text may name."""
     if "\0" in text:
         return []
@@ -232,7 +232,7 @@ def find_versions_by_text(session: Session, text: str) -> Sequence[VersionName]:
     if text.isascii() and text.isdigit() and len(text) < 19:
         fits.append(VersionModel.id == int(text))
     columns = (VersionModel.id, VersionModel.dataset_id, VersionModel.name, VersionModel.hash)
-    return session.rows(VersionName, select(*columns).where(or_(*fits)))
+    return session.rows(VersionIdentity, select(*columns).where(or_(*fits)))
 
 
 def count_dataset_contents(session: Session, dataset_id: int) -> dict[str, int]:

@@ -18,7 +18,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import find_licence, read_dataset_head
 from app.features.exports.source import (
-    ExportImages,
+    ExportImageWriter,
     ExportSource,
     Item,
     LiveSource,
@@ -199,7 +199,7 @@ def export_dataset(
     with store.read() as session:
         source = _open_source(session, store, dataset, options, version)
         with open_output(out, store.settings.exports, beside, progress) as root:
-            frames = ExportImages(
+            frames = ExportImageWriter(
                 root,
                 images,
                 read or _make_local_picture_reader(store),
@@ -304,7 +304,7 @@ def _require_exportable_in_format(
         if format == CARRY:
             return
         source = _FirstGroupsSource(whole)
-        frames = ExportImages(
+        frames = ExportImageWriter(
             Path(folder), "none", _make_local_picture_reader(store), find_frame_path_rule(format)
         )
         with ViewFileBuffer(Path(folder)) as small:
@@ -427,7 +427,7 @@ class _ExportRun:
         self,
         source: ExportSource,
         options: _ExportOptions,
-        images: ExportImages,
+        images: ExportImageWriter,
         names: ExportKeyAssigner,
         progress: ReportProgress | None,
     ):

@@ -206,10 +206,10 @@ class VersionSource:
         for item in read_frozen_groups(self._session, self._version, rows):
             frames = item.row.frames or {}
             facts = {key: frame["facts"] for key, frame in frames.items() if "facts" in frame}
-            yield export_record_of_frozen_group(item), facts
+            yield make_export_record_of_frozen_group(item), facts
 
 
-def export_record_of_frozen_group(item: FrozenGroup) -> ExportRecord:
+def make_export_record_of_frozen_group(item: FrozenGroup) -> ExportRecord:
     """A group of a version as writers get it."""
     verdict = item.row.verdict or {"state": "unreviewed", "reason": None}
     return ExportRecord(
@@ -295,7 +295,7 @@ class _PlacedPicture:
     whose: str
 
 
-class ExportImages:
+class ExportImageWriter:
     """Puts the frames of groups into an export.
 
     Attributes:

@@ -15,11 +15,11 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.cameras import measure_leave_one_out_errors, score_frame, score_frames
+from app.evaluation.cameras import combine_frame_scores, measure_leave_one_out_errors, score_frame
 from app.features.file_tools.matches import (
-    SharedMatchPlaces,
+    OtherFramesCameraPlaces,
     choose_picture_geometry,
-    collect_shared_match_places,
+    collect_camera_places_of_other_frames,
     map_points_to_original_pictures,
     read_match_of_each_frame,
 )
@@ -49,7 +49,7 @@ from app.solving.match_position import (
     FrameCameraPlace,
     FrameCameraPlaces,
     calibrate_with_match_position,
-    find_camera_place,
+    find_main_camera_place,
 )
 from app.solving.solve import warm_up_solver
 
@@ -147,7 +147,9 @@ def calibrate_files(
     )
     groups = 0
     if sharing:
-        shares = collect_shared_match_places(files, [frame.place for frame in frames], named)
+        shares = collect_camera_places_of_other_frames(
+            files, [frame.place for frame in frames], named
+        )
         groups = len({share.match for share in shares})
         jobs = []
         for start in range(0, len(files), CHUNK):
@@ -180,7 +182,7 @@ def calibrate_chunk(
 def recalibrate_chunk_with_match(
     files: Sequence[LineFile],
     frames: Sequence[CalibratedFrame],
-    shares: Sequence[SharedMatchPlaces],
+    shares: Sequence[OtherFramesCameraPlaces],
     size: ImageSize,
     policy: CalibrationPolicy,
     with_leave_one_out: bool,
@@ -261,7 +263,7 @@ def _make_frame(
         left_out=left_out,
         milliseconds=milliseconds,
         alone=alone,
-        place=find_camera_place(calibration, size),
+        place=find_main_camera_place(calibration, size),
         lone=lone,
     )
 
@@ -391,7 +393,7 @@ def score_camera_files(
         )
     # A line file that cannot be read is a frame without a camera.
     scores.extend([None] * (report.read - len(scores)))
-    total = score_frames(scores)
+    total = combine_frame_scores(scores)
     return {
         "frames": total.frames,
         "calibrated": total.calibrated,

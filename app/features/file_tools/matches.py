@@ -31,7 +31,12 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrameLines, estimate_match_picture
-from app.solving.match_position import NO_PLACES, FrameCameraPlace, FrameCameraPlaces, guess_matches
+from app.solving.match_position import (
+    NO_PLACES,
+    FrameCameraPlace,
+    FrameCameraPlaces,
+    guess_match_of_each_frame,
+)
 from app.solving.pitch_size import PitchSizeFrameLines, estimate_pitch
 
 ONE = "one"
@@ -39,7 +44,7 @@ ONE = "one"
 
 
 @dataclass(frozen=True)
-class SharedMatchPlaces:
+class OtherFramesCameraPlaces:
     """What a frame gets from the others of its match: their places. ``match`` is its name."""
 
     match: str
@@ -69,11 +74,11 @@ def read_match_of_each_frame(path: Path) -> dict[str, str]:
     return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}
 
 
-def collect_shared_match_places(
+def collect_camera_places_of_other_frames(
     files: Sequence[LineFile],
     places: Sequence[FrameCameraPlace | None],
     named: Mapping[str, str] | None,
-) -> list[SharedMatchPlaces]:
+) -> list[OtherFramesCameraPlaces]:
     """What each frame gets from the others of its match.
 
     Args:
@@ -83,14 +88,14 @@ def collect_shared_match_places(
     """
     if named is None:
         order = sorted(range(len(files)), key=lambda index: files[index].stem)
-        guessed = guess_matches([places[index] for index in order])
+        guessed = guess_match_of_each_frame([places[index] for index in order])
         match = {files[index].stem: str(run) for index, run in zip(order, guessed, strict=True)}
     else:
         match = {file.stem: named.get(file.stem, "") for file in files}
     members = defaultdict(list)
     for index, file in enumerate(files):
         members[match[file.stem]].append(index)
-    shares = [SharedMatchPlaces(match[file.stem], NO_PLACES) for file in files]
+    shares = [OtherFramesCameraPlaces(match[file.stem], NO_PLACES) for file in files]
     for name, indices in members.items():
         if not name:
             continue
@@ -99,7 +104,7 @@ def collect_shared_match_places(
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
             others = all_.without_frame(row[index]) if index in row else all_
-            shares[index] = SharedMatchPlaces(name, others)
+            shares[index] = OtherFramesCameraPlaces(name, others)
     return shares
 
 

@@ -22,7 +22,11 @@ from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import flatten_covariance
 from app.geometry.camera import Camera
 from app.json_text import json_text
-from app.paint.frame_pitch import collect_pitch_size_evidence, find_agreed_pitch, group_by_position
+from app.paint.frame_pitch import (
+    collect_pitch_size_evidence,
+    find_differing_agreed_pitch,
+    group_by_position,
+)
 from app.paint.propose import FrameProposal, propose_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
@@ -108,7 +112,7 @@ def _estimate_pitch_of_each_frame(seen: Sequence[_ProposedCamera | None]) -> dic
     found = {}
     for film in group_by_position(cameras, sizes):
         frames = [one.frame for index in film if (one := seen[index]) is not None]
-        pitch = find_agreed_pitch(frames, Pitch())
+        pitch = find_differing_agreed_pitch(frames, Pitch())
         if pitch is not None:
             found.update(dict.fromkeys(film, pitch))
     return found

@@ -25,7 +25,7 @@ from app.soccer.frames import ImageSize
 from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import OUTCOMES
-from app.tracking.sides import turn_frame_camera
+from app.tracking.sides import move_camera_to_opposite_side
 from app.tracking.track import CameraTrack, FrameCamera, track_clip
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
@@ -88,7 +88,7 @@ def track_cameras_of_clip(
     frames = found.shown_frames if on_shown else found.frames
     pitch = pitch_to_row(found.shown, on_shown=on_shown)
     if turn:
-        frames = [turn_frame_camera(frame) for frame in frames]
+        frames = [move_camera_to_opposite_side(frame) for frame in frames]
         if pitch is not None:
             x, y, z = pitch["tripod"]
             pitch["tripod"] = [-x, -y, z]

@@ -77,7 +77,7 @@ def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
     """What was noticed about a group as it is now.
 
     Args:
-        rows: Of the group, as ``read_import_findings`` has them.
+        rows: Of the group, as ``read_import_findings_and_dismissals`` has them.
         inputs_hash: Of the group now; what was said of another state of it is left out.
     """
     return [_finding_from_row(row) for row in rows if row.of_inputs in (None, inputs_hash)]
@@ -94,7 +94,7 @@ def _finding_from_row(row: Any) -> Finding:
     )
 
 
-def list_group_findings(session: Session, group_id: int) -> list[Noticed]:
+def list_group_import_findings(session: Session, group_id: int) -> list[Noticed]:
     """What is noticed about a group, in the order in which it was."""
     model = ImportFindingModel
     statement = select(model.view, model.sentence).where(
@@ -124,7 +124,7 @@ def add_group_findings(
         session.execute(insert(ImportFindingModel), rows)
 
 
-def replace_group_findings(
+def replace_group_import_findings(
     session: Session, group_id: int, kind: str, noticed: Iterable[Noticed]
 ) -> None:
     """Put findings in the place of all that imports noticed about a group."""
@@ -299,7 +299,7 @@ NOTHING_DISMISSED = GroupDismissals()
 def current_dismissals_by_group(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
-    ``rows`` are those of the table, the oldest first (``read_import_findings`` reads them).
+    ``rows`` are those of the table, the oldest first (``read_import_findings_and_dismissals`` reads them).
     """
     found: dict[int, GroupDismissals] = {}
     for row in rows:
@@ -409,7 +409,7 @@ _NOTICED = union_all(
 """A group's own come before those of its static cameras; then what people have dismissed."""
 
 
-def read_import_findings(
+def read_import_findings_and_dismissals(
     session: Session, ids: Sequence[int]
 ) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
     """What imports noticed about groups and about the shared stations of their views, and which
@@ -427,5 +427,5 @@ def read_import_findings(
 
 
 def read_import_notices(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
-    """The first part of ``read_import_findings``."""
-    return read_import_findings(session, ids)[0]
+    """The first part of ``read_import_findings_and_dismissals``."""
+    return read_import_findings_and_dismissals(session, ids)[0]

@@ -10,7 +10,7 @@ from app.db.session import now
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import dataset_id
-from app.features.findings.queries import insert_dismissal, read_import_findings
+from app.features.findings.queries import insert_dismissal, read_import_findings_and_dismissals
 from app.features.groups.state import (
     GroupState,
     read_states,
@@ -186,7 +186,7 @@ def set_dismissal(
                     session, stored.dataset_id, group_id, dismissal, dismissed=dismissed
                 )
                 refresh_queue(session, [group_id])
-                dismissals = read_import_findings(session, [group_id])[1][group_id]
+                dismissals = read_import_findings_and_dismissals(session, [group_id])[1][group_id]
                 after = replace(record, dismissals=dismissals).make_state(solution)
                 session.respond(after)
                 return after

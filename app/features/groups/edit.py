@@ -96,7 +96,7 @@ class SetStationLines:
 
 
 @dataclass(frozen=True)
-class SetStationCalibration:
+class SetStationCalibrationSource:
     """Choose which calibration of a station counts: ``given`` or ``lines``.
 
     ``given`` without a given camera is no contradiction: the lines count then.
@@ -110,9 +110,9 @@ class SetStationCalibration:
             raise InputError('calibration must be "given" or "lines"', pointer="/calibration")
         return replace(station, calibration=self.calibration)
 
-    def inverse(self, station: Station) -> SetStationCalibration:
+    def inverse(self, station: Station) -> SetStationCalibrationSource:
         """The choice as it was."""
-        return SetStationCalibration(station.calibration)
+        return SetStationCalibrationSource(station.calibration)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class SetCalibrationSource:
     def apply(self, group: Group) -> Group:
         """The group with that choice."""
         view = require_view(group, self.view)
-        station = SetStationCalibration(self.calibration).apply(view.station)
+        station = SetStationCalibrationSource(self.calibration).apply(view.station)
         return replace_station_in_group(group, view, station)
 
     def inverse(self, group: Group) -> SetCalibrationSource:

@@ -19,7 +19,7 @@ from app.features.groups.edit import (
     SetPaintReadings,
     SetPictureGeometry,
     SetPitch,
-    SetStationCalibration,
+    SetStationCalibrationSource,
     SetStationCamera,
     SetStationLines,
     SetViewInclusion,
@@ -86,7 +86,7 @@ def _station_edit_to_json(edit: Edit | StationEdit) -> Json:
     match edit:
         case SetStationLines(lines, proposed, not_visible):
             return {"edit": "set_station_lines", **_lines_to_json(lines, proposed, not_visible)}
-        case SetStationCalibration(calibration):
+        case SetStationCalibrationSource(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
         case SetStationCamera(given, covariance, calibration):
             return {
@@ -132,7 +132,7 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
         case "set_station_lines":
             return SetStationLines(_lines_from_json(value["lines"]), *_parse_line_sources(value))
         case "set_station_calibration":
-            return SetStationCalibration(value["calibration"])
+            return SetStationCalibrationSource(value["calibration"])
         case "set_station_camera":
             given = value["given"]
             return SetStationCamera(

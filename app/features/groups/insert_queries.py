@@ -63,7 +63,7 @@ def paint_to_column(paint: Mapping[str, str]) -> str | None:
     return canonical_json_text(dict(paint)) if paint else None
 
 
-def positions_to_column(group: Group) -> str | None:
+def camera_positions_to_column(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codec.positions_to_json(group.positions)
     return canonical_json_text(shared) if shared else None
@@ -89,7 +89,7 @@ def group_to_columns(
         "label": group.label,
         "pitch_length": group.pitch.length,
         "pitch_width": group.pitch.width,
-        "positions": positions_to_column(group),
+        "positions": camera_positions_to_column(group),
         "paint": paint_to_column(read),
         "inputs_hash": hash_group_inputs(group, read, views),
     }

@@ -156,7 +156,7 @@ def find_group_of_view(session: Session, view_id: int) -> int:
     return int(found)
 
 
-class ViewName(NamedTuple):
+class ViewIdentity(NamedTuple):
     """A view with its key and that of its group."""
 
     id: int
@@ -167,7 +167,7 @@ class ViewName(NamedTuple):
 
 def find_views(
     session: Session, dataset_id: int, ids: Collection[int], groups: Collection[str]
-) -> Sequence[ViewName]:
+) -> Sequence[ViewIdentity]:
     """Views of a dataset by their ids, and those of groups by the groups' keys.
 
     Views of groups that are hidden from whoever asks are left out.
@@ -179,7 +179,7 @@ def find_views(
         .where(group.dataset_id == dataset_id, or_(view.id.in_(ids), group.key.in_(groups)))
         .where(*visible_groups_condition(dataset_id, group.id))
     )
-    return session.rows(ViewName, statement)
+    return session.rows(ViewIdentity, statement)
 
 
 def _build_stored_group(
@@ -195,7 +195,7 @@ def _build_stored_group(
         pitch=Pitch(head.pitch_length, head.pitch_width),
         split=head.split,
         label=head.label,
-        positions=positions_from_text(head.positions),
+        positions=camera_positions_from_text(head.positions),
         paint={} if head.paint is None else _paint_from_text(head.paint, readings),
     )
     return StoredGroup(
@@ -228,7 +228,7 @@ def _view_from_row(row: Any, station: Station) -> View:
         media=media,
         included=row.included,
         extras=Extras() if extras is None else _extras_from_bytes(extras),
-        left_out=None if why is None else _left_out_from_text(why),
+        left_out=None if why is None else _view_exclusion_from_text(why),
         noise=1.0 if row.noise is None else row.noise,
     )
 
@@ -238,7 +238,7 @@ def _paint_from_text(text: str, readings: Mapping[str, PaintReading]) -> dict[st
         return {view: readings[digest] for view, digest in read_paint_digests(text).items()}
 
 
-def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
+def camera_positions_from_text(text: str | None) -> dict[str, SharedPosition]:
     """Shared positions of a group from its column, by the views' keys."""
     if text is None:
         return {}
@@ -246,7 +246,7 @@ def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
         return codec.positions_from_json(parse_json_column(text))
 
 
-def _left_out_from_text(text: str) -> ViewExclusion | None:
+def _view_exclusion_from_text(text: str) -> ViewExclusion | None:
     with translate_shape_errors_to_damage():
         return codec.view_exclusion_from_json(parse_json_column(text))
 

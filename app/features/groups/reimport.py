@@ -27,7 +27,7 @@ KIND = "upstream_changed"
 
 
 @dataclass(frozen=True)
-class KeptEdit:
+class KeptEditFinding:
     """Something a person edited and the dataset changed too: the person's version stayed."""
 
     view: str | None
@@ -43,7 +43,7 @@ class MergedGroup:
 
     group: Group
     base: Group
-    kept: tuple[KeptEdit, ...]
+    kept: tuple[KeptEditFinding, ...]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class MergedStation:
 
     station: Station
     base: Station
-    kept: KeptEdit | None
+    kept: KeptEditFinding | None
 
 
 def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGroup:
@@ -62,7 +62,7 @@ def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGro
     """
     views: list[View] = []
     bases: list[View] = []
-    kept: list[KeptEdit] = []
+    kept: list[KeptEditFinding] = []
     for view in incoming.views:
         result, base, noticed = _update_view_from_dataset(stored, view)
         views.append(result)
@@ -73,7 +73,7 @@ def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGro
             views.append(view)
             bases.append(view)
             sentence = f"{view.key} is no longer in the imported files; it is kept because a person edited it"
-            kept.append(KeptEdit(view.key, sentence))
+            kept.append(KeptEditFinding(view.key, sentence))
     return MergedGroup(
         replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
     )
@@ -115,17 +115,19 @@ def update_station_from_dataset(
     kept = None
     if station_digest(incoming) not in (stored.digest, stored.source_digest):
         sentence = f"the imported files have new lines or a new camera for {incoming.key}; the edits are kept"
-        kept = KeptEdit(None, sentence)
+        kept = KeptEditFinding(None, sentence)
     # What no edit can touch follows all the same.
     station = incoming.with_annotations_of(stored.station)
     return MergedStation(station, incoming, kept)
 
 
-def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
+def _update_view_from_dataset(
+    stored: StoredGroup, view: View
+) -> tuple[View, View, list[KeptEditFinding]]:
     old = stored.group.view(view.key)
     if old is None or not has_same_station(stored, view):
         return view, view, []
-    kept: list[KeptEdit] = []
+    kept: list[KeptEditFinding] = []
     result = base = view
     if not view.included and not old.included:
         # Saying why is no edit of what is solved; the dataset's word counts where it has one.
@@ -137,7 +139,7 @@ def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, Vi
             sentence = (
                 f"the imported files have another ball in {view.key}; the edited ball is kept"
             )
-            kept.append(KeptEdit(view.key, sentence))
+            kept.append(KeptEditFinding(view.key, sentence))
     if result.balls == old.balls:
         # How noisy they are is no word of the dataset's.
         result = replace(result, noise=old.noise)
@@ -146,7 +148,7 @@ def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, Vi
         result = replace(result, station=followed.station)
         base = replace(base, station=followed.base)
         if followed.kept is not None:
-            kept.append(KeptEdit(view.key, followed.kept.sentence))
+            kept.append(KeptEditFinding(view.key, followed.kept.sentence))
     return result, base, kept
 
 

@@ -90,7 +90,7 @@ def _replay_policy(snapshot: StateSnapshot, entry: LogEntry) -> None:
     snapshot.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
 
 
-def _replay_station(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_station_import(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None and entry.dataset_id is not None
     station, base = entry.body["station"], entry.body["base"]
     _save_station(
@@ -209,7 +209,7 @@ def _replay_station_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     _save_station(snapshot, record.dataset_id, entry.station_id, station, None)
 
 
-def _replay_camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_given_camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = snapshot.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
@@ -253,7 +253,7 @@ def _replay_dataset_deletion(snapshot: StateSnapshot, entry: LogEntry) -> None:
     }
 
 
-def _replay_unassigned(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_unassigned_frames(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     for camera, frame, extras in entry.body["frames"]:
         snapshot.unassigned[entry.dataset_id, camera, frame] = extras_from_json(extras)
@@ -336,7 +336,7 @@ _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
     "dataset": _replay_dataset,
     "dataset_deleted": _replay_dataset_deletion,
     "policy": _replay_policy,
-    "station": _replay_station,
+    "station": _replay_station_import,
     "import": _replay_group_import,
     "edit": _replay_edit,
     "undo": _replay_edit,
@@ -348,10 +348,10 @@ _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
     "station_edit": _replay_station_edit,
     "station_undo": _replay_station_edit,
     "station_redo": _replay_station_edit,
-    "camera": _replay_camera,
+    "camera": _replay_given_camera,
     "verdict": _replay_verdict,
     DISMISSAL: _replay_dismissal,
-    "spare": _replay_unassigned,
+    "spare": _replay_unassigned_frames,
     # What a batch did stands in the verdicts themselves.
     "verdict_batch": lambda _snapshot, _entry: None,
     "verdict_batch_undo": lambda _snapshot, _entry: None,

@@ -22,13 +22,13 @@ from app.features.datasets.tables import (
 from app.features.findings.queries import DismissalModel
 from app.features.groups.insert_queries import (
     NewRows,
+    camera_positions_to_column,
     group_to_columns,
     paint_to_column,
-    positions_to_column,
     station_to_columns,
     view_to_columns,
 )
-from app.features.groups.queries import StoredGroup, positions_from_text
+from app.features.groups.queries import StoredGroup, camera_positions_from_text
 from app.features.groups.view_queries import save_station
 from app.features.paint.queries import read_paint_digests
 from app.features.solutions.queries import SolutionModel, is_current_solution
@@ -138,7 +138,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     values = {name: getattr(after, name) for name in names}
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
-    values["positions"] = positions_to_column(after.group)
+    values["positions"] = camera_positions_to_column(after.group)
     values["paint"] = paint_to_column(codec.paint_digests_to_json(after.group.paint))
     _update_row(session, GroupModel.__table__, after.id, values)
 
@@ -261,7 +261,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
             noise.setdefault(row.id, {})[row.view] = row.noise
     rows = []
     for key, row in heads.items():
-        positions = positions_from_text(row.positions)
+        positions = camera_positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = read_paint_digests(row.paint)
         digest = hash_solver_inputs(pitch, pairs[key], positions, paint, noise.get(key, {}))

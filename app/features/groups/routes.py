@@ -39,7 +39,7 @@ from app.features.queue.routes import (
     LogEntryDocument,
     Neighbours,
 )
-from app.features.queue.service import MatchingGroups
+from app.features.queue.service import MatchingGroupIds
 from app.http.access import get_current_login
 from app.http.cursor import foreign_cursor_error, paged
 from app.http.deps import (
@@ -196,7 +196,7 @@ def list_group_ids(
     start: Annotated[
         int, Query(alias="from", ge=0, le=MAX_ID, description="Position of the first, from 0.")
     ] = 0,
-) -> MatchingGroups:
+) -> MatchingGroupIds:
     """The ids alone of the groups that match, in the order of the list.
 
     What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.

@@ -23,7 +23,7 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.policies.schemas import PolicyDocument
 from app.http.documents import Document, IdentityCache, ListDocument, make_document_response
-from app.soccer.annotation import BallAnnotation, Lines, make_followed_source
+from app.soccer.annotation import BallAnnotation, Lines, format_followed_from_group
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
 from app.soccer.group import (
@@ -216,7 +216,7 @@ class BallEdit(BaseModel):
             inferred=self.inferred and not self.out_of_view,
             predicted_by=""
             if self.followed_from is None
-            else make_followed_source(self.followed_from),
+            else format_followed_from_group(self.followed_from),
         )
 
 
@@ -536,7 +536,7 @@ class ViewEdit(BaseModel):
         return self
 
 
-class StationCalibrationEdit(BaseModel):
+class StationCalibrationSourceEdit(BaseModel):
     """Choose which calibration of a static camera counts."""
 
     model_config = ConfigDict(

@@ -14,7 +14,7 @@ from app.features.findings.queries import (
     NOTHING_DISMISSED,
     GroupDismissals,
     findings_from_rows,
-    read_import_findings,
+    read_import_findings_and_dismissals,
     read_import_notices,
 )
 from app.features.groups.queries import StoredGroup, read_groups
@@ -320,7 +320,7 @@ def read_groups_without_solution(
 ) -> list[GroupWithoutSolution]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
-    noticed, dismissals = read_import_findings(session, group_ids)
+    noticed, dismissals = read_import_findings_and_dismissals(session, group_ids)
     verdicts = read_last_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [

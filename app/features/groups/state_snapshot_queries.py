@@ -92,7 +92,7 @@ def replace_all_rows(
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.
     session.execute(DeferReferences())
-    with _preserve_view_rows(session):
+    with _preserve_view_dependent_rows(session):
         for model in (QueueModel, ImportFindingModel, UnassignedFrameModel, ViewModel):
             session.execute(delete(model))
         session.execute(delete(GroupModel))
@@ -109,7 +109,7 @@ def replace_all_rows(
 
 
 @contextmanager
-def _preserve_view_rows(session: Session) -> Iterator[None]:
+def _preserve_view_dependent_rows(session: Session) -> Iterator[None]:
     """What goes with its view and is in no log comes back after this, where its view did."""
     for table in _list_view_dependent_tables():
         session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))

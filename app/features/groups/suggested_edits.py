@@ -214,7 +214,7 @@ def _swap_sides_edit(view: View, _fix: SuggestedFix, _point: ImagePoint | None) 
     return SetLines(view.key, changes, not_visible=unseen) if changes else None
 
 
-def _estimate_picture_edit(
+def _estimate_picture_geometry_edit(
     view: View, _fix: SuggestedFix, _point: ImagePoint | None
 ) -> Edit | None:
     """Its own lines say what was done to the picture; that of a static camera belongs to no view."""
@@ -309,7 +309,7 @@ _ACTIONS = {
         1,
         "the picture of {letter} was stretched or cropped",
         "Use this geometry",
-        edit=_estimate_picture_edit,
+        edit=_estimate_picture_geometry_edit,
     ),
     "move_point": _FixAction(
         1,

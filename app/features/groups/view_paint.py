@@ -34,7 +34,7 @@ from app.solving.calibrate import (
     compute_click_calibration_key,
     compute_paint_search_key,
     compute_view_calibration_key,
-    find_usable_paint_reading,
+    find_wanted_paint_reading,
 )
 from app.solving.observations import principal_point
 from app.worker_pool import PoolTask
@@ -241,7 +241,7 @@ def _iterate_outdated_paint_tasks(
     if policy.source != "paint" or not group.paint:
         return
     for view in group.views:
-        reading = find_usable_paint_reading(group, view, policy)
+        reading = find_wanted_paint_reading(group, view, policy)
         if reading is None and (view.media is None or not view.can_use_paint):
             continue
         key = compute_paint_search_key(group, view, policy)

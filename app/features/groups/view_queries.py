@@ -248,9 +248,9 @@ def station_from_row(row: Any) -> StoredStation:
         calibration=row.calibration,
         flipped=row.flipped,
         given_covariance=None if row.given is None else _covariance_from_text(row.given),
-        picture=None if row.picture is None else _picture_from_text(row.picture),
+        picture=None if row.picture is None else _picture_geometry_from_text(row.picture),
         proposed=() if row.proposed is None else _proposed_markings_from_text(row.proposed),
-        not_visible=_not_visible_from_text(row.lines),
+        not_visible=_not_visible_markings_from_text(row.lines),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -295,9 +295,9 @@ def _lines_from_text(text: str) -> Lines:
 
 
 @lru_cache(maxsize=1024)
-def _not_visible_from_text(text: str) -> tuple[str, ...]:
+def _not_visible_markings_from_text(text: str) -> tuple[str, ...]:
     with translate_shape_errors_to_damage():
-        return codec.not_visible_from_json(parse_json_column(text))
+        return codec.not_visible_markings_from_json(parse_json_column(text))
 
 
 @lru_cache(maxsize=1024)
@@ -319,6 +319,6 @@ def _proposed_markings_from_text(text: str) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=256)
-def _picture_from_text(text: str) -> PictureGeometry | None:
+def _picture_geometry_from_text(text: str) -> PictureGeometry | None:
     with translate_shape_errors_to_damage():
         return codec.picture_geometry_from_json(parse_json_column(text))

@@ -14,7 +14,7 @@ from app.db.session import Session, now
 from app.features.findings.queries import (
     add_group_findings,
     filter_groups_with_finding,
-    list_group_findings,
+    list_group_import_findings,
 )
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
@@ -97,7 +97,7 @@ def save_missing_group_findings(
         base = chains[number].base
         save_reimported_group(session, item, item.group, at=at, source=base)
         body = _make_missing_group_entry_body(
-            item, base, source, list_group_findings(session, number)
+            item, base, source, list_group_import_findings(session, number)
         )
         entries.append(NewLogEntry("import", actor, at, body, dataset_id, number))
     if entries:

@@ -18,8 +18,8 @@ from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, read_dataset_head
 from app.features.findings.queries import (
     filter_groups_with_finding,
-    list_group_findings,
-    replace_group_findings,
+    list_group_import_findings,
+    replace_group_import_findings,
 )
 from app.features.groups.edit import SetCameraPositions, SetPaintReadings
 from app.features.groups.insert_queries import NewRows
@@ -31,7 +31,12 @@ from app.features.groups.queries import (
     read_unassigned_extras,
     upsert_unassigned_frames,
 )
-from app.features.groups.reimport import KIND, KeptEdit, SharedStations, update_group_from_dataset
+from app.features.groups.reimport import (
+    KIND,
+    KeptEditFinding,
+    SharedStations,
+    update_group_from_dataset,
+)
 from app.features.groups.revision_queries import save_reimported_group
 from app.features.imports.body import (
     GONE,
@@ -86,7 +91,7 @@ class IngestReport:
 
 
 @dataclass(frozen=True)
-class ImportOrigin:
+class ImportContext:
     """Into which dataset, from where, and who brings it."""
 
     dataset_id: int
@@ -134,14 +139,14 @@ def import_groups(
             identity = _ensure_dataset(
                 session, dataset, actor, policy or choose_first_policy(batch)
             )
-            origin = ImportOrigin(identity, source, actor, lines_left)
-            import_group_batch(session, origin, batch, report, stations)
+            origin = ImportContext(identity, source, actor, lines_left)
+            import_group_chunk(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
             progress(done)
     if done:
         with store.read() as session:
-            missing = _find_missing_groups(session, origin, seen, report)
+            missing = _find_and_report_missing_groups(session, origin, seen, report)
             gone = filter_missing_groups_of_read_matches(session, origin.dataset_id, seen, missing)
         for start in range(0, 0 if dry_run else len(gone), BATCH):
             with store.write() as session:
@@ -179,8 +184,8 @@ def _ensure_dataset(session: Session, dataset: str, actor: str, policy: Policy) 
     return insert_dataset(session, dataset, policy, actor) if row is None else int(row.id)
 
 
-def _find_missing_groups(
-    session: Session, origin: ImportOrigin, seen: Collection[str], report: IngestReport
+def _find_and_report_missing_groups(
+    session: Session, origin: ImportContext, seen: Collection[str], report: IngestReport
 ) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
     missing: set[int] = set()
@@ -228,9 +233,9 @@ def _make_media_path_absolute(view: View) -> View:
     return replace(view, media=replace(view.media, path=str(path)))
 
 
-def import_group_batch(
+def import_group_chunk(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     batch: Sequence[Group],
     report: IngestReport,
     stations: set[str],
@@ -274,7 +279,7 @@ def import_group_batch(
 
 def insert_new_groups(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     fresh: Sequence[tuple[Group, str]],
     shared: dict[str, int],
 ) -> list[int]:
@@ -305,7 +310,7 @@ def insert_new_groups(
 
 def _update_group(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     group_id: int,
     incoming: Group,
     digest: str,
@@ -357,16 +362,16 @@ def _find_edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -
 
 
 def save_findings(
-    session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]
-) -> list[KeptEdit]:
+    session: Session, stored: StoredGroup, kept: Sequence[KeptEditFinding]
+) -> list[KeptEditFinding]:
     """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
 
     A finding goes when its view is as the dataset has it now. Returns what is noticed then.
     """
     fresh = {item.view for item in kept}
     noticed = [
-        KeptEdit(view, sentence)
-        for view, sentence in list_group_findings(session, stored.id)
+        KeptEditFinding(view, sentence)
+        for view, sentence in list_group_import_findings(session, stored.id)
         if view is not None
         and view not in fresh
         and view in stored.view_ids
@@ -374,7 +379,7 @@ def save_findings(
     ]
     noticed.extend(kept)
     sentences = ((item.view, item.sentence) for item in noticed)
-    replace_group_findings(session, stored.id, KIND, sentences)
+    replace_group_import_findings(session, stored.id, KIND, sentences)
     return noticed
 
 
@@ -404,7 +409,7 @@ def import_unassigned_frames(
     while batch := list(islice(items, UNASSIGNED_AT_ONCE)):
         dataset_id = ensure_dataset(store, dataset, actor)
         with store.write() as session:
-            _save_unassigned_frame_batch(session, dataset_id, batch, source, actor, report)
+            _save_unassigned_frame_chunk(session, dataset_id, batch, source, actor, report)
     return report
 
 
@@ -421,7 +426,7 @@ def read_unassigned_persons(session: Session, dataset: str | int) -> Iterator[Fr
             yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 
 
-def _save_unassigned_frame_batch(
+def _save_unassigned_frame_chunk(
     session: Session,
     dataset_id: int,
     batch: Sequence[UnassignedFrame],
@@ -439,10 +444,10 @@ def _save_unassigned_frame_batch(
             report.changed += place in known
             report.new += place not in known
             fresh[place] = body
-    _write_unassigned(session, dataset_id, fresh, source, actor)
+    _write_unassigned_frames(session, dataset_id, fresh, source, actor)
 
 
-def _write_unassigned(
+def _write_unassigned_frames(
     session: Session,
     dataset_id: int,
     fresh: dict[tuple[str, str], bytes],

@@ -27,10 +27,10 @@ from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
 from app.features.imports.ingest import (
-    ImportOrigin,
+    ImportContext,
     IngestReport,
     UnassignedFrame,
-    import_group_batch,
+    import_group_chunk,
     import_unassigned_frames,
     open_import_session,
 )
@@ -50,7 +50,7 @@ from app.features.imports.merge_parse import (
     MergeStation,
     parse_group,
     parse_station,
-    parse_unassigned,
+    parse_unassigned_frame,
     read_lines,
     read_merge_header,
 )
@@ -65,7 +65,7 @@ from app.soccer.group import Group, Station
 
 
 def merge_stations(
-    session: Session, origin: ImportOrigin, exported: Iterable[MergeStation], report: IngestReport
+    session: Session, origin: ImportContext, exported: Iterable[MergeStation], report: IngestReport
 ) -> None:
     """Bring static cameras up to what another installation made of them."""
     for item in exported:
@@ -90,7 +90,7 @@ def _is_station_only_in_other(session: Session, stored: StoredStation, item: Mer
 
 def _merge_station(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     stored: StoredStation,
     item: MergeStation,
     report: IngestReport,
@@ -127,7 +127,7 @@ def _format_finding_sentence(decision: str, stored: StoredStation) -> str | None
 
 def _adopt_other_station(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     stored: StoredStation,
     item: MergeStation,
     chain: StationRevisionChain,
@@ -144,7 +144,7 @@ def _adopt_other_station(
 
 def _save_conflict(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     stored: StoredStation,
     chain: StationRevisionChain,
     sentence: str | None,
@@ -164,7 +164,7 @@ def _save_conflict(
 
 def _log_station(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     stored: StoredStation,
     chain: StationRevisionChain,
     sentence: str | None,
@@ -206,7 +206,7 @@ class _MergeRun:
     counted: set[str]
     """Static cameras that are counted already."""
 
-    def ensure_origin_dataset(self, session: Session) -> ImportOrigin:
+    def ensure_origin_dataset(self, session: Session) -> ImportContext:
         """The dataset, made with the other's policy when there is none of that name."""
         row = find_dataset(session, self.dataset)
         number = (
@@ -214,7 +214,7 @@ class _MergeRun:
             if row is None
             else int(row.id)
         )
-        return ImportOrigin(number, self.source, self.actor)
+        return ImportContext(number, self.source, self.actor)
 
 
 def merge_edits(
@@ -278,7 +278,8 @@ def _merge_tree(
             progress(done)
     if run.keep:
         frames = (
-            UnassignedFrame(*item) for item in _parse_records(tree, SPARE, report, parse_unassigned)
+            UnassignedFrame(*item)
+            for item in _parse_records(tree, SPARE, report, parse_unassigned_frame)
         )
         import_unassigned_frames(run.store, run.dataset, frames, source=run.source, actor=run.actor)
 
@@ -317,7 +318,7 @@ def _merge_group_chunk(
     items = {item.group.key: item for item in batch}
     known = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
     upstream = _list_groups_only_in_other(session, origin, items, known)
-    import_group_batch(session, origin, upstream, run.report, run.counted)
+    import_group_chunk(session, origin, upstream, run.report, run.counted)
     counted = {group.key for group in upstream}
     ids = {item.key: item.id for item in list_known_groups(session, origin.dataset_id, items)}
     stored = read_groups(session, list(ids.values()))
@@ -338,7 +339,7 @@ def _merge_group_chunk(
 
 def _list_groups_only_in_other(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     items: Mapping[str, MergeGroup],
     known: Mapping[str, int],
 ) -> list[Group]:

@@ -10,15 +10,15 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.features.findings.queries import (
     insert_dismissal,
-    list_group_findings,
+    list_group_import_findings,
     read_dismissals_to_export,
 )
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.reimport import KeptEdit
+from app.features.groups.reimport import KeptEditFinding
 from app.features.groups.revision_chain import RevisionChain, format_pitch_size
 from app.features.groups.revision_queries import save_reimported_group
 from app.features.imports.body import collect_view_and_station_ids, make_import_entry_body
-from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
+from app.features.imports.ingest import ImportContext, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, list_verdicts_of_groups
 from app.features.pitches.service import set_pitch_of_groups
@@ -79,7 +79,7 @@ def choose_merge_action(here: UnitHistory, there: UnitHistory) -> str:
 
 def merge_group(
     session: Session,
-    origin: ImportOrigin,
+    origin: ImportContext,
     stored: StoredGroup,
     chain: RevisionChain,
     exported: MergeGroup,
@@ -88,7 +88,7 @@ def merge_group(
     """Bring a group up to what another installation made of it; whether anything changed."""
     merged, kept = _merge_views(stored, chain, exported)
     pitch = choose_merge_action(*_make_pitch_histories(stored, chain, exported))
-    kept += _make_kept_edits(None, pitch, f"pitch of {merged.key}")
+    kept += _make_kept_edit_findings(None, pitch, f"pitch of {merged.key}")
     fresh = _filter_new_findings(session, stored.id, kept)
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
@@ -116,8 +116,8 @@ def merge_group(
 
 def _merge_views(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
-) -> tuple[Group, list[KeptEdit]]:
-    group, kept = stored.group, list[KeptEdit]()
+) -> tuple[Group, list[KeptEditFinding]]:
+    group, kept = stored.group, list[KeptEditFinding]()
     for view in stored.group.views:
         other, base = exported.group.view(view.key), exported.base.view(view.key)
         if other is None or base is None or other.station.shared != view.station.shared:
@@ -130,7 +130,7 @@ def _merge_views(
             view = replace(
                 view, balls=other.balls, included=other.included, left_out=other.left_out
             )
-        kept += _make_kept_edits(view.key, ball, f"ball of {view.key}")
+        kept += _make_kept_edit_findings(view.key, ball, f"ball of {view.key}")
         if not view.station.shared:
             here, there = (
                 _make_local_station_history(stored, chain, view),
@@ -139,12 +139,12 @@ def _merge_views(
             lines = choose_merge_action(here, there)
             if lines in (FOLLOW, UPSTREAM):
                 view = replace(view, station=view.station.with_annotations_of(other.station))
-            kept += _make_kept_edits(view.key, lines, f"lines or the camera of {view.key}")
+            kept += _make_kept_edit_findings(view.key, lines, f"lines or the camera of {view.key}")
         group = group.with_view(view)
     return group, kept
 
 
-def _make_kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
+def _make_kept_edit_findings(view: str | None, decision: str, what: str) -> list[KeptEditFinding]:
     if decision == CONFLICT:
         sentence = (
             f"another installation edited the {what} too; the edit of this installation is kept"
@@ -156,7 +156,7 @@ def _make_kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdi
         )
     else:
         return []
-    return [KeptEdit(view, sentence)]
+    return [KeptEditFinding(view, sentence)]
 
 
 def _make_pitch_histories(
@@ -191,16 +191,18 @@ def _make_exported_station_history(exported: MergeGroup, view: View, base: View)
     return UnitHistory(station_digest(view.station), station_digest(base.station), past)
 
 
-def _filter_new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
+def _filter_new_findings(
+    session: Session, group_id: int, kept: list[KeptEditFinding]
+) -> list[KeptEditFinding]:
     """Those of the findings that are not there already."""
     if not kept:
         return []
-    known = set(list_group_findings(session, group_id))
+    known = set(list_group_import_findings(session, group_id))
     return [item for item in kept if (item.view, item.sentence) not in known]
 
 
 def merge_verdicts(
-    session: Session, origin: ImportOrigin, group_id: int, exported: Sequence[Mapping[str, Any]]
+    session: Session, origin: ImportContext, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add the verdicts of another installation that are not here; whether there were any.
 
@@ -224,7 +226,7 @@ def merge_verdicts(
 
 
 def merge_dismissals(
-    session: Session, origin: ImportOrigin, group_id: int, exported: Sequence[Mapping[str, Any]]
+    session: Session, origin: ImportContext, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add what was dismissed in another installation and is not here; whether there was any.
 

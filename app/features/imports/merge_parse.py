@@ -186,7 +186,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
         raise _make_record_error(error) from error
 
 
-def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
+def parse_unassigned_frame(value: Json) -> tuple[str, str, Extras]:
     """Camera, frame and extras of a line.
 
     Raises:

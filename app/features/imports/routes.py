@@ -195,7 +195,7 @@ async def upload_file(
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @limit(TRANSFER)
-async def send_part(
+async def receive_upload_part(
     upload: UploadId, request: Request, services: AppServices, offset: PartOffset = 0
 ) -> UploadDocument:
     """Add bytes to a file that is sent in parts; `bytes` of the answer are on the disk.
@@ -306,7 +306,7 @@ def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> Upload
 
 @uploads_router.get("/{upload}", operation_id="getUpload", responses=responses(404))
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
-def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
+def get_upload(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
     return UploadDocument.model_validate(find_upload(services.settings, upload))
 
@@ -320,7 +320,7 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @respond_with(make_empty_response)
-def delete_one(upload: UploadId, services: AppServices, visibility: Sees) -> None:
+def delete_upload(upload: UploadId, services: AppServices, visibility: Sees) -> None:
     """Delete a file; 400 while a dataset reads its frames from it.
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.

@@ -18,7 +18,7 @@ Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
 Side = Annotated[int, Field(ge=2, le=MAX_SIDE)]
 
 
-class ImportPlace(BaseModel):
+class UploadOrFolder(BaseModel):
     """Where files are: exactly one of an upload and a folder, which may be `s3://NAME/...` in a store."""
 
     model_config = ConfigDict(extra="forbid")
@@ -27,7 +27,7 @@ class ImportPlace(BaseModel):
     folder: Annotated[str, Field(min_length=1, max_length=4000)] | None = None
 
     @model_validator(mode="after")
-    def _check_one_place(self) -> ImportPlace:
+    def _check_one_place(self) -> UploadOrFolder:
         if (self.upload is None) == (self.folder is None):
             raise ValueError("name an upload or a folder, and not both")
         return self
@@ -72,10 +72,10 @@ class ImportOptions(BaseModel):
     propose: StrictBool = Field(
         default=True, description="frames: whether a job proposes cameras for them afterwards."
     )
-    lines: ImportPlace | None = Field(
+    lines: UploadOrFolder | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )
-    frames: ImportPlace | None = Field(
+    frames: UploadOrFolder | None = Field(
         default=None,
         description="A JSON list of where frames lie in object stores, apart from the labels.",
     )
@@ -100,7 +100,7 @@ class ImportBody(BaseModel):
 
     dataset: Annotated[str, Field(min_length=1, max_length=200)]
     format: ImportFormat
-    source: ImportPlace
+    source: UploadOrFolder
     options: ImportOptions = ImportOptions()
     policy: PolicyName | None = Field(
         default=None,

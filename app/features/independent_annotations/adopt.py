@@ -16,7 +16,7 @@ from app.features.groups.edit import (
     SetCalibrationSource,
     SetLines,
     SetPictureGeometry,
-    SetStationCalibration,
+    SetStationCalibrationSource,
     SetStationLines,
     SetViewInclusion,
     StationEdit,
@@ -189,7 +189,7 @@ def _adopt_stations(
         lines = _make_line_edit(station, own)
         edits += [] if lines is None else [lines]
         if own.calibration != station.calibration:
-            edits.append(SetStationCalibration(own.calibration))
+            edits.append(SetStationCalibrationSource(own.calibration))
         for edit in edits:
             body = edit_and_inverse_to_json(edit, edit.inverse(station))
             station = edit.apply(station)

@@ -15,7 +15,7 @@ from app.features.groups.edit import SetPaintReadings
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
-from app.features.imports.ingest import ImportOrigin, insert_new_groups
+from app.features.imports.ingest import ImportContext, insert_new_groups
 from app.features.imports.queries import find_newest_imports, list_shared_stations
 from app.features.independent_annotations.queries import (
     BARE,
@@ -65,7 +65,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     insert_paint_readings(session, dataset_id, group.paint.values())
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
     shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
-    origin = ImportOrigin(dataset_id, SOURCE, order.person)
+    origin = ImportContext(dataset_id, SOURCE, order.person)
     (copy_id,) = insert_new_groups(
         session, origin, [(group, hash_imported_group(group))], shared.ids
     )

@@ -131,8 +131,8 @@ def examine_database(store: Store) -> list[CheckResult]:
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed_records(session, restore)
         is_whole = all(check.ok for check in computed)
-        checks += [*computed, _check_queue(session, REBUILD if is_whole else restore)]
-    return [*checks, *_check_solutions(store)]
+        checks += [*computed, _check_review_queue(session, REBUILD if is_whole else restore)]
+    return [*checks, *_report_unsolved_groups(store)]
 
 
 def _check_database_file(session: Session, restore: str) -> CheckResult:
@@ -197,7 +197,7 @@ def _check_digests(session: Session) -> CheckResult:
     return summarize_faulty_records("digests", whole, apart, "not of what was said", REBUILD)
 
 
-def _check_queue(session: Session, mend: str) -> CheckResult:
+def _check_review_queue(session: Session, mend: str) -> CheckResult:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
         count, apart = find_outdated_rows(session)
@@ -208,7 +208,7 @@ def _check_queue(session: Session, mend: str) -> CheckResult:
     return summarize_faulty_records("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
-def _check_solutions(store: Store) -> list[CheckResult]:
+def _report_unsolved_groups(store: Store) -> list[CheckResult]:
     """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
     checks = []
     for item in list_datasets(store):
@@ -277,7 +277,7 @@ _PREFIX = "TOUCHLINE_"
 _FORMATS = (".jpg", ".png", ".webp")
 
 
-def examine_home(settings: Settings) -> list[CheckResult]:
+def examine_home_without_database(settings: Settings) -> list[CheckResult]:
     """What can be said of a home without its database."""
     examined = (
         _check_settings,
@@ -294,7 +294,7 @@ def examine_home(settings: Settings) -> list[CheckResult]:
     ]
 
 
-def examine_surroundings(store: Store) -> list[CheckResult]:
+def examine_admins_clock_and_leftovers(store: Store) -> list[CheckResult]:
     """What lies around the tables of a database that can be opened."""
     settings, admins = store.settings, _check_linked_admins(store)
     with store.read() as session:
@@ -467,10 +467,10 @@ def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResu
 def examine_everything(settings: Settings) -> list[CheckResult]:
     """Look at everything; where the database cannot be opened, say why, and what lies around it."""
     make_home(settings)
-    checks = [*examine_home(settings), examine_yield_cache(settings)]
+    checks = [*examine_home_without_database(settings), examine_yield_cache(settings)]
     try:
         with closing(Store.open(settings)) as store:
-            checks += [*examine_surroundings(store), *examine_database(store)]
+            checks += [*examine_admins_clock_and_leftovers(store), *examine_database(store)]
             return [*checks, examine_threads(store), *examine_versions(store)]
     except StorageError as error:
         return [*checks, CheckResult("database", False, error.message, error.hint)]

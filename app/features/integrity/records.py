@@ -25,7 +25,7 @@ from app.features.solutions.stored_queries import (
     check_stored_calibrations,
     check_stored_paint_readings,
     decode_solution_row,
-    iterate_solution_batches,
+    iterate_solution_row_chunks,
     list_calibration_keys_of_row,
 )
 from app.features.versions.frozen_queries import (
@@ -39,7 +39,11 @@ from app.features.versions.frozen_queries import (
     list_lost_calibrations,
     list_members_without_content,
 )
-from app.features.versions.queries import VersionRow, iterate_annotation_rows, list_all_versions
+from app.features.versions.queries import (
+    VersionRow,
+    iterate_version_group_state_rows,
+    list_all_versions,
+)
 from app.features.versions.service import collect_calibration_keys, hash_version
 from app.soccer.codec import hash_group_inputs, paint_digests_to_json, policy_from_json
 from app.soccer.group import Group
@@ -197,7 +201,7 @@ def examine_computed_records(session: Session, restore: str) -> list[CheckResult
     calibrations, damaged = _count_damaged(check_stored_calibrations(session))
     readings, unread = _count_damaged(check_stored_paint_readings(session))
     solutions, apart = 0, list[str]()
-    for rows in iterate_solution_batches(session):
+    for rows in iterate_solution_row_chunks(session):
         solutions += len(rows)
         apart += _find_differing_solutions(session, rows, {*damaged})
     return [
@@ -356,7 +360,7 @@ def _version_matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
 
 def _find_version_fault(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
-    rows = [item._asdict() for item in iterate_annotation_rows(session, row.id)]
+    rows = [item._asdict() for item in iterate_version_group_state_rows(session, row.id)]
     try:
         with translate_shape_errors_to_damage():
             counts, policy = (

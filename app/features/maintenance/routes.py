@@ -60,7 +60,7 @@ class Readiness(BaseModel):
 
 @maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
 @may(Action.ADMINISTER)
-def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
+def put_maintenance_notice(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     """Show a notice on every page, in place of the one before.
 
     Windows that are open show it within some seconds; the login page has it, too.
@@ -76,7 +76,7 @@ def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ADMINISTER)
-def delete_maintenance(store: AppStore, actor: Actor) -> Response:
+def delete_maintenance_notice(store: AppStore, actor: Actor) -> Response:
     """Take the notice away."""
     if not clear_banner(store, actor=actor):
         raise NotFoundError("there is no notice of maintenance")

@@ -16,12 +16,12 @@ from app.terminal.terminal import print_json, print_rows, print_values, say
 from app.wording import plural
 
 if TYPE_CHECKING:
-    from app.features.match_estimates.pictures import MatchPictureState
+    from app.features.match_estimates.pictures import MatchPictureGeometryState
     from app.features.pitches.service import DatasetPitches, PitchState
 from enum import StrEnum
 
 if TYPE_CHECKING:
-    from app.features.policies.noise import Noise
+    from app.features.policies.noise import NoiseReport
 
 
 commands = typer.Typer()
@@ -177,10 +177,10 @@ def picture(
         raise typer.BadParameter("--accept and --as-taken contradict each other")
     if as_taken and match is None:
         raise typer.BadParameter("--as-taken needs --match")
-    _estimate_pictures_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
+    _estimate_picture_geometry_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
 
 
-def _estimate_pictures_of_dataset(
+def _estimate_picture_geometry_of_dataset(
     dataset: str,
     match: str | None,
     accept: bool,
@@ -214,13 +214,13 @@ def _estimate_pictures_of_dataset(
         say(f"{plural(changed, 'view')} changed; run touchline solve --dataset {dataset}")
 
 
-def _describe_picture(state: MatchPictureState) -> str:
+def _describe_picture(state: MatchPictureGeometryState) -> str:
     if state.estimate is None:
         return state.sentence
     return f"{state.sentence}; {'use it with --accept' if state.proposed else 'nothing to change'}"
 
 
-def _picture_to_json(state: MatchPictureState) -> dict[str, Any]:
+def _picture_to_json(state: MatchPictureGeometryState) -> dict[str, Any]:
     from dataclasses import asdict
 
     values = asdict(state)
@@ -228,7 +228,7 @@ def _picture_to_json(state: MatchPictureState) -> dict[str, Any]:
     return {**values, "proposed": None if proposed is None else asdict(proposed)}
 
 
-def print_sentences(states: Iterable[Any], as_json: bool) -> None:
+def print_match_states(states: Iterable[Any], as_json: bool) -> None:
     """The sentence of each match after its name, or the values of all as one JSON list."""
     print_rows(
         states,
@@ -286,7 +286,7 @@ def positions(
                 with store.write() as session:
                     undo_position_sharing(session, dataset, match, actor=get_current_actor())
             found = get_main_camera_positions(store, dataset)
-    print_sentences(filter_by_match(found.items, match), json_)
+    print_match_states(filter_by_match(found.items, match), json_)
 
 
 @commands.command()
@@ -306,7 +306,11 @@ def noise(
     json_: Json = False,
 ) -> None:
     """Estimate how noisy a dataset's balls and lines are, from what its views disagree about."""
-    from app.features.policies.noise import adopt_estimated_noise, read_noise, reset_noise_factors
+    from app.features.policies.noise import (
+        adopt_estimated_noise,
+        estimate_dataset_noise,
+        reset_noise_factors,
+    )
 
     if apply and alike:
         raise typer.BadParameter("--apply and --alike contradict each other")
@@ -314,7 +318,7 @@ def noise(
         if alike:
             with store.write() as session:
                 reset_noise_factors(session, dataset, actor=get_current_actor())
-        found = read_noise(store, dataset)
+        found = estimate_dataset_noise(store, dataset)
         policy = (
             adopt_estimated_noise(store, found, actor=get_current_actor()).policy if apply else None
         )
@@ -336,7 +340,7 @@ def noise(
         say(f"Run it again with --apply to use the estimates: {', '.join(changes)}.")
 
 
-def _print_noise(found: Noise) -> None:
+def _print_noise(found: NoiseReport) -> None:
     for item in found.advice:
         present = "leaves it to each image"
         if item.present is not None:
@@ -356,7 +360,7 @@ def _print_noise(found: Noise) -> None:
         say(sentence)
 
 
-class AcceptedPart(StrEnum):
+class AcceptedRigPart(StrEnum):
     """What of a proposal is saved."""
 
     CAMERAS = "cameras"
@@ -367,7 +371,7 @@ class AcceptedPart(StrEnum):
 def rig(
     dataset: Dataset,
     accept: Annotated[
-        AcceptedPart | None,
+        AcceptedRigPart | None,
         typer.Option(
             help="Save the adjusted cameras, or only how far the cameras in use may be off."
         ),

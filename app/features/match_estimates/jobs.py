@@ -109,7 +109,7 @@ class UndoCallback(Protocol):
 
 
 @dataclass(frozen=True)
-class MatchJob:
+class MatchJobType:
     """A kind of job over one match of a dataset, or all.
 
     Attributes:
@@ -196,7 +196,7 @@ class MatchJob:
         return lambda progress: self.work(MatchJobContext(jobs, store, progress.job), progress)
 
 
-def _estimate_pictures(call: MatchJobContext, progress: JobProgress) -> Json:
+def _estimate_picture_geometries(call: MatchJobContext, progress: JobProgress) -> Json:
     with call.jobs.pool() as executor:
         counter = make_counts_reporter(progress, "matches")
         found = estimate_picture_geometries(
@@ -218,7 +218,7 @@ def _estimate_pictures(call: MatchJobContext, progress: JobProgress) -> Json:
     }
 
 
-PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate_pictures)
+PICTURES = MatchJobType("pictures", "Estimate the pictures of {}", _estimate_picture_geometries)
 
 
 def _share_positions(call: MatchJobContext, progress: JobProgress) -> Json:
@@ -240,7 +240,7 @@ def _share_positions(call: MatchJobContext, progress: JobProgress) -> Json:
 
 
 # Begun again, a share would be one more to take back.
-POSITIONS = MatchJob(
+POSITIONS = MatchJobType(
     "positions",
     "Share the main cameras' positions of {}",
     _share_positions,
@@ -269,7 +269,7 @@ def _adjust_rig(call: MatchJobContext, progress: JobProgress) -> Json:
     return {**rig_proposal_to_json(proposed), "accepted": what}
 
 
-RIG = MatchJob(
+RIG = MatchJobType(
     "rig", "Adjust the cameras of {}", _adjust_rig, require_adjustable_cameras, resumes=False
 )
 

@@ -23,7 +23,7 @@ from app.features.datasets.service import (
 from app.features.groups.edit import SetPictureGeometry
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.match_estimates.queries import MatchPictures, read_match_pictures
+from app.features.match_estimates.queries import MatchPictureGeometry, read_match_picture_geometries
 from app.features.pitches.queries import list_groups_of_match, read_match_pitches
 from app.progress import ReportProgress
 from app.soccer.group import Group, View
@@ -36,7 +36,7 @@ _BATCH = 100
 
 
 @dataclass(frozen=True)
-class MatchPictureState:
+class MatchPictureGeometryState:
     """The main cameras' pictures of one match.
 
     Attributes:
@@ -80,14 +80,14 @@ class _PictureGeometryTask:
     policy: CalibrationPolicy
 
 
-def read_picture_geometries(store: Store, dataset: str | int) -> list[MatchPictures]:
+def read_picture_geometries(store: Store, dataset: str | int) -> list[MatchPictureGeometry]:
     """What main cameras' pictures of a dataset's matches are taken to be.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return read_match_pictures(session, require_dataset_id(session, dataset))
+        return read_match_picture_geometries(session, require_dataset_id(session, dataset))
 
 
 def estimate_picture_geometries(
@@ -96,7 +96,7 @@ def estimate_picture_geometries(
     executor: Executor | None = None,
     progress: ReportProgress | None = None,
     only: Collection[str] | None = None,
-) -> list[MatchPictureState]:
+) -> list[MatchPictureGeometryState]:
     """What the lines of each match's main cameras say of their pictures; saves nothing.
 
     Args:
@@ -123,7 +123,7 @@ def estimate_picture_geometries(
 
 
 def choose_requested_geometries(
-    chosen: Iterable[MatchPictureState], *, accept: bool = False, as_taken: bool = False
+    chosen: Iterable[MatchPictureGeometryState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
     """What somebody wants the pictures of matches to be, by match.
 
@@ -159,14 +159,14 @@ def set_picture_geometries(
     """
     found = require_dataset_with_matches(session, dataset, [*wanted])
     return sum(
-        _set_picture_of_groups(
+        _set_picture_geometry_of_groups(
             session, found.id, list_groups_of_match(session, found.id, match), picture, actor
         )
         for match, picture in wanted.items()
     )
 
 
-def _set_picture_of_groups(
+def _set_picture_geometry_of_groups(
     session: Session,
     dataset_id: int,
     ids: Sequence[int],
@@ -216,11 +216,11 @@ def _iterate_main_camera_views(
                     yield stored.group, view
 
 
-def _run_picture_task(task: _PictureGeometryTask) -> MatchPictureState:
+def _run_picture_task(task: _PictureGeometryTask) -> MatchPictureGeometryState:
     """Of one match; runs in a worker."""
     used = max(set(task.used), key=task.used.count) if task.used else None
     try:
         found = estimate_match_picture(task.frames, task.policy)
     except GeometryError as error:
-        return MatchPictureState(task.match, len(task.frames), used, None, error.message)
-    return MatchPictureState(task.match, len(task.frames), used, found, None)
+        return MatchPictureGeometryState(task.match, len(task.frames), used, None, error.message)
+    return MatchPictureGeometryState(task.match, len(task.frames), used, found, None)

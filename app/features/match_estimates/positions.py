@@ -25,10 +25,10 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.jobs.queries import Job
 from app.features.match_estimates.queries import (
     POSITION,
-    MatchPositions,
+    MatchCameraPositions,
     find_last_position_sharing,
-    read_match_positions,
-    read_position_inputs,
+    read_match_camera_positions,
+    read_position_input_digests,
 )
 from app.features.solutions.queries import read_calibrations
 from app.progress import ReportProgress
@@ -41,8 +41,8 @@ from app.solving.calibrate import calibrate_station, compute_calibration_key
 from app.solving.match_position import (
     FrameCameraPlace,
     FrameCameraPlaces,
-    find_camera_place,
-    find_pan,
+    find_main_camera_pan,
+    find_main_camera_place,
 )
 from app.workers.executors import run_tasks
 
@@ -52,7 +52,7 @@ _DIGITS = 4
 
 
 @dataclass(frozen=True)
-class PositionState:
+class SharedPositionState:
     """The shared position of one match.
 
     Attributes:
@@ -85,7 +85,7 @@ class DatasetPositions:
     dataset_id: int
     dataset: str
     used: bool
-    items: tuple[PositionState, ...]
+    items: tuple[SharedPositionState, ...]
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def share_positions(
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
-            then = read_position_inputs(session, found.id, task.match).get(task.match)
+            then = read_position_input_digests(session, found.id, task.match).get(task.match)
             body = {"match": task.match, "inputs": task.inputs, "before": then}
             _save_position_edits(session, found.id, edits, actor, body)
         if progress is not None:
@@ -254,23 +254,23 @@ def _save_position_edits(
 
 def _read_positions(session: Session, dataset: str | int) -> DatasetPositions:
     found = read_dataset_head(session, dataset)
-    policy, then = found.policy.calibration, read_position_inputs(session, found.id)
+    policy, then = found.policy.calibration, read_position_input_digests(session, found.id)
     items = tuple(
         _make_position_state(item, then.get(item.match), policy)
-        for item in read_match_positions(session, found.id)
+        for item in read_match_camera_positions(session, found.id)
         if item.views
     )
     return DatasetPositions(found.id, found.name, policy.share_position, items)
 
 
 def _make_position_state(
-    item: MatchPositions, then: str | None, policy: CalibrationPolicy
-) -> PositionState:
+    item: MatchCameraPositions, then: str | None, policy: CalibrationPolicy
+) -> SharedPositionState:
     x = y = z = sigma = 0.0
     if item.positions:
         x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
         sigma = float(np.median([at.sigma for at in item.positions]))
-    found = PositionState(
+    found = SharedPositionState(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
@@ -283,7 +283,7 @@ def _make_position_state(
     return replace(found, sentence=_describe_state(found))
 
 
-def _describe_state(state: PositionState) -> str:
+def _describe_state(state: SharedPositionState) -> str:
     if state.current is None:
         return f"none of {state.views} pictures of the main camera uses a shared position"
     verb = "use" if state.used else "keep"
@@ -298,7 +298,7 @@ def _describe_state(state: PositionState) -> str:
     return kept if state.current else f"{kept}; {changed}: share it again"
 
 
-def _inputs_digest(item: MatchPositions, policy: CalibrationPolicy) -> str:
+def _inputs_digest(item: MatchCameraPositions, policy: CalibrationPolicy) -> str:
     """Key of what is estimated: all that it is computed from."""
     # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
     values = asdict(replace(policy, share_position=True))
@@ -308,22 +308,24 @@ def _inputs_digest(item: MatchPositions, policy: CalibrationPolicy) -> str:
 
 def _list_matches_to_share(
     session: Session, dataset: DatasetHead, matches: Collection[str] | None
-) -> list[tuple[MatchPositions, str]]:
+) -> list[tuple[MatchCameraPositions, str]]:
     """Matches to share in, each with the key of what it will be shared from."""
     policy = dataset.policy.calibration
-    known = {item.match: item for item in read_match_positions(session, dataset.id) if item.views}
+    known = {
+        item.match: item for item in read_match_camera_positions(session, dataset.id) if item.views
+    }
     for match in matches or ():
         if match not in known:
             raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
     if matches is not None:
         return [(known[match], _inputs_digest(known[match], policy)) for match in matches]
-    then = read_position_inputs(session, dataset.id)
+    then = read_position_input_digests(session, dataset.id)
     keyed = [(item, _inputs_digest(item, policy)) for item in known.values()]
     return [(item, inputs) for item, inputs in keyed if then.get(item.match) != inputs]
 
 
 def _make_task(
-    store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy
+    store: Store, chosen: tuple[MatchCameraPositions, str], policy: CalibrationPolicy
 ) -> _PositionTask:
     item, inputs = chosen
     pictures: list[_MainCameraPicture] = []
@@ -359,7 +361,7 @@ def _run_position_task(
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without_frame(next(row))
-        pan = None if calibration is None else find_pan(calibration)
+        pan = None if calibration is None else find_main_camera_pan(calibration)
         near = None if pan is None else others.position_prior(pan)
         at = {}
         if near is not None:
@@ -385,7 +387,7 @@ def _calibrate_pictures_alone(
         if alone.source != "lines":
             yield picture, None, None
             continue
-        yield picture, alone, find_camera_place(alone, station.size)
+        yield picture, alone, find_main_camera_place(alone, station.size)
 
 
 def _round_position(values: np.ndarray) -> tuple[float, float, float]:

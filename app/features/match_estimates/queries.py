@@ -77,7 +77,7 @@ def find_noise_factor(
 
 
 @dataclass(frozen=True)
-class MatchPictures:
+class MatchPictureGeometry:
     """The pictures of a match's main camera as they are in use.
 
     Attributes:
@@ -93,7 +93,7 @@ class MatchPictures:
     mixed: bool
 
 
-def read_match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
+def read_match_picture_geometries(session: Session, dataset_id: int) -> list[MatchPictureGeometry]:
     """Every match of a dataset whose main camera has lines, by name."""
     group, station, count = GroupModel, StationModel, func.count()
     statement = (
@@ -114,14 +114,17 @@ def read_match_pictures(session: Session, dataset_id: int) -> list[MatchPictures
     for match, picture, frames in session.execute(statement):
         found.setdefault(match, []).append((picture, frames))
     return [
-        MatchPictures(
-            match, sum(frames for _, frames in rows), _picture_from_text(rows[0][0]), len(rows) > 1
+        MatchPictureGeometry(
+            match,
+            sum(frames for _, frames in rows),
+            _picture_geometry_from_text(rows[0][0]),
+            len(rows) > 1,
         )
         for match, rows in found.items()
     ]
 
 
-def _picture_from_text(text: str | None) -> PictureGeometry | None:
+def _picture_geometry_from_text(text: str | None) -> PictureGeometry | None:
     if text is None:
         return None
     with translate_shape_errors_to_damage():
@@ -133,7 +136,7 @@ POSITION = "position"
 
 
 @dataclass
-class MatchPositions:
+class MatchCameraPositions:
     """The pictures of a match's main camera.
 
     Attributes:
@@ -155,7 +158,7 @@ class MatchPositions:
         return digest_json(sorted(self.parts))
 
 
-def read_match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
+def read_match_camera_positions(session: Session, dataset_id: int) -> list[MatchCameraPositions]:
     """Every match of a dataset, by name; the main camera is that of each group's first view."""
     group = GroupModel
     statement = (
@@ -173,9 +176,9 @@ def read_match_positions(session: Session, dataset_id: int) -> list[MatchPositio
         )
         .order_by(group.match, group.id)
     )  # fmt: skip
-    found: dict[str, MatchPositions] = {}
+    found: dict[str, MatchCameraPositions] = {}
     for row in session.execute(statement):
-        item = found.setdefault(row.match, MatchPositions(row.match))
+        item = found.setdefault(row.match, MatchCameraPositions(row.match))
         item.groups.append(row.id)
         item.views += row.has_lines
         item.parts.append([row.pitch_length, row.pitch_width, row.digest])
@@ -190,7 +193,7 @@ def parse_positions_column(text: str) -> Mapping[str, SharedPosition]:
         return positions_from_json(parse_json_column(text))
 
 
-def read_position_inputs(
+def read_position_input_digests(
     session: Session, dataset_id: int, match: str | None = None
 ) -> dict[str, str | None]:
     """What the positions of each match are estimated from, where any were ever given.

@@ -13,8 +13,8 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, undo_rig_adjustment
 from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
-from app.features.match_estimates.positions import PositionState, get_main_camera_positions
-from app.features.match_estimates.queries import MatchPictures
+from app.features.match_estimates.positions import SharedPositionState, get_main_camera_positions
+from app.features.match_estimates.queries import MatchPictureGeometry
 from app.features.policies import noise as noises
 from app.features.policies.noise import ThresholdAdvice
 from app.features.policies.service import read_policy
@@ -39,11 +39,11 @@ pictures_router = APIRouter(
 )
 
 
-class MatchPicturesDocument(ListDocument[MatchPictures]):
+class MatchPictureGeometriesDocument(ListDocument[MatchPictureGeometry]):
     """The pictures of a dataset's matches, by name of the match."""
 
 
-class MatchRequest(BaseModel):
+class MatchSelection(BaseModel):
     """Which matches a job is to look at."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
@@ -53,7 +53,7 @@ class MatchRequest(BaseModel):
     )
 
 
-class MatchPictureChange(BaseModel):
+class MatchPictureGeometryChange(BaseModel):
     """Say what was done to the pictures of a match's main camera."""
 
     model_config = ConfigDict(
@@ -66,7 +66,7 @@ class MatchPictureChange(BaseModel):
     )
 
 
-class SharedPositionsDocument(ListDocument[PositionState]):
+class SharedPositionsDocument(ListDocument[SharedPositionState]):
     """The shared positions of a dataset's matches, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
@@ -168,7 +168,7 @@ class NoiseDocument(Document):
 @positions_router.get("", operation_id="listPositions", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
+def list_main_camera_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
     return SharedPositionsDocument.model_validate(get_main_camera_positions(store, dataset))
 
@@ -179,7 +179,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def share_positions(
-    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Estimate where main cameras stand and give each picture what its match's others say of it.
 
@@ -250,7 +250,7 @@ def take_rig_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> 
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
-def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
+def get_noise(dataset: DatasetPath, services: AppServices) -> noises.NoiseReport:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
     Changes nothing: to judge by the estimates, `POST` here, or send `values` alone to the dataset's
@@ -271,11 +271,11 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     found, store = services.noises.read(dataset), services.store
     state = read_policy(store, found.dataset_id)
 
-    def apply_noise_estimates(session: Session) -> None:
+    def reset_noise(session: Session) -> None:
         noises.adopt_estimated_noise_in_session(session, found, state, actor)
 
     return change_and_return_solve_job(
-        services.jobs, store, found.dataset_id, apply_noise_estimates, actor=actor
+        services.jobs, store, found.dataset_id, reset_noise, actor=actor
     )
 
 
@@ -289,20 +289,24 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
     The policy stays as it is.
     """
 
-    def apply_noise_estimates(session: Session) -> None:
+    def reset_noise(session: Session) -> None:
         noises.reset_noise_factors(session, dataset, actor=actor)
 
     return change_and_return_solve_job(
-        services.jobs, services.store, dataset, apply_noise_estimates, actor=actor
+        services.jobs, services.store, dataset, reset_noise, actor=actor
     )
 
 
 @pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesDocument:
+def list_match_picture_geometries(
+    dataset: DatasetPath, store: AppStore
+) -> MatchPictureGeometriesDocument:
     """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
-    return MatchPicturesDocument.model_validate({"items": read_picture_geometries(store, dataset)})
+    return MatchPictureGeometriesDocument.model_validate(
+        {"items": read_picture_geometries(store, dataset)}
+    )
 
 
 @pictures_router.post(
@@ -310,8 +314,8 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def estimate_match_pictures(
-    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
+def estimate_match_picture_geometries(
+    dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Look at up to thirty frames of each match together; changes nothing.
 
@@ -326,8 +330,8 @@ def estimate_match_pictures(
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def set_match_picture(
-    dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
+def set_match_picture_geometry(
+    dataset: DatasetPath, change: MatchPictureGeometryChange, services: AppServices, actor: Actor
 ) -> Job:
     """Say what was done to the pictures of a match's main camera; the job solves its groups.
 

@@ -13,7 +13,10 @@ from app.db.session import Session
 from app.features.comments.queries import NotificationModel
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import find_next_row_id
-from app.features.people.visibility_queries import Visibility, visible_in_all_datasets_condition
+from app.features.people.visibility_queries import (
+    Visibility,
+    visible_groups_across_datasets_condition,
+)
 from app.json_text import Moment
 
 
@@ -115,7 +118,7 @@ def _visibility_conditions(
     where = [NotificationModel.person_id == person_id, NotificationModel.at >= since]
     # What is of no dataset was told to them, and is theirs.
     seen = visibility.condition(NotificationModel.dataset_id, literal(visibility.name))
-    where += visible_in_all_datasets_condition(
+    where += visible_groups_across_datasets_condition(
         NotificationModel.dataset_id, NotificationModel.group_id
     )
     return where if seen is None else [*where, seen]

@@ -83,19 +83,19 @@ def read_notifications(
 ) -> NotificationPage:
     """What somebody was told in the last 90 days, of what they see at this moment."""
     with store.read() as session:
-        return _read_state(session, login, limit, before)
+        return _read_notification_page(session, login, limit, before)
 
 
 def mark_as_read(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationPage:
     """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
         mark_read(session, login.person_id, login.visibility, ids, now())
-        bell = _read_state(session, login)
+        bell = _read_notification_page(session, login)
         session.respond(bell)
         return bell
 
 
-def _read_state(
+def _read_notification_page(
     session: Session, login: Login, limit: int = 50, before: int | None = None
 ) -> NotificationPage:
     mine = (login.person_id, login.visibility, _oldest_shown_time())

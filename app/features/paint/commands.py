@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from app.features.match_estimates.commands import print_sentences
+from app.features.match_estimates.commands import print_match_states
 from app.soccer.choices import ProposalOutcome
 from app.terminal.options import Json, Workers, get_current_actor, parse_size, read_settings
 from app.terminal.server import open_store
@@ -86,7 +86,7 @@ def paint(
                     workers=workers,
                     progress=progress,
                 )
-    print_sentences(filter_by_match(found.items, match), json_)
+    print_match_states(filter_by_match(found.items, match), json_)
 
 
 @commands.command()

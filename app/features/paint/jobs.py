@@ -9,7 +9,7 @@ from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.jobs.job_run import JobProgress, make_counts_reporter
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.jobs import MatchJob, MatchJobContext
+from app.features.match_estimates.jobs import MatchJobContext, MatchJobType
 from app.features.paint.proposals import forget_proposals, propose_cameras_for_views
 from app.features.paint.service import (
     read_paint_of_pictures,
@@ -41,7 +41,7 @@ def _run_paint_job(call: MatchJobContext, progress: JobProgress) -> Json:
     return {name: sum(getattr(item, name) for item in found.items) for name in REPORTED}
 
 
-PAINT = MatchJob(
+PAINT = MatchJobType(
     "paint",
     "Read the paint of the pictures of {}",
     _run_paint_job,
@@ -74,6 +74,6 @@ def _run_proposal_job(call: MatchJobContext, progress: JobProgress) -> Json:
     return asdict(run)
 
 
-PROPOSALS = MatchJob(
+PROPOSALS = MatchJobType(
     "proposals", "Propose cameras for views of {} that have none", _run_proposal_job
 )

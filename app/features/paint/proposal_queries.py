@@ -106,7 +106,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     """Whether a view is one to look at: of a static camera that is the first with a picture.
 
     Args:
-        lost: Ids of the views to look at whose lines determine no camera (``list_views_without_camera_from_lines``).
+        lost: Ids of the views to look at whose lines determine no camera (``list_views_with_undetermined_lines``).
     """
     view, station = aliased(ViewModel), aliased(StationModel)
     # One look at all of them: asked view by view, a camera of many views would cost their square.
@@ -121,7 +121,7 @@ def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     return or_(bare, ViewModel.id.in_(select_from_number_list(sorted(lost))))
 
 
-def list_views_without_camera_from_lines(
+def list_views_with_undetermined_lines(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> set[int]:
     """Ids of views with a picture and lines that determine no camera, as they are solved now.
@@ -175,7 +175,7 @@ def list_views_to_propose_for(
         dataset_id: The dataset.
         matches: By name; None: all.
     """
-    lost = list_views_without_camera_from_lines(session, dataset_id, matches)
+    lost = list_views_with_undetermined_lines(session, dataset_id, matches)
     statement = (
         select(ViewModel.group_id, ViewModel.id)
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
@@ -195,7 +195,7 @@ def count_proposals_by_match(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[MatchProposalCounts]:
     """How far each match of a dataset is, or each of these, by name."""
-    lost = list_views_without_camera_from_lines(session, dataset_id, matches)
+    lost = list_views_with_undetermined_lines(session, dataset_id, matches)
     is_candidate, outcome = _needs_proposal(lost), ProposalModel.outcome
     # What was said of a view as it was before says nothing of it now.
     looked = and_(is_candidate, _is_open_proposal())

@@ -65,7 +65,7 @@ class DatasetProposalCounts:
 
 
 @dataclass(frozen=True)
-class ProposalRun:
+class ProposalRunReport:
     """What one run did.
 
     Attributes:
@@ -84,7 +84,7 @@ class ProposalRun:
     changed: int = 0
     missing: int = 0
 
-    def add_view(self, task: ProposalTask, found: Proposal | None) -> ProposalRun:
+    def add_view(self, task: ProposalTask, found: Proposal | None) -> ProposalRunReport:
         """With one view more."""
         if found is None:
             return replace(self, views=self.views + 1, left=self.left + 1)
@@ -132,7 +132,7 @@ def propose_cameras_for_views(
     workers: int | None = None,
     progress: ReportProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
-) -> ProposalRun:
+) -> ProposalRunReport:
     """Look at the pictures of all views that have neither a given camera nor one of their lines.
 
     Lines that determine no camera stay; what is proposed beside them are other markings. Which those
@@ -154,7 +154,7 @@ def propose_cameras_for_views(
         found = require_dataset_with_matches(session, dataset, matches)
         pending = list_views_to_propose_for(session, found.id, matches)
     count, total = workers or store.settings.image_workers, sum(len(views) for _, views in pending)
-    run = ProposalRun()
+    run = ProposalRunReport()
     with (
         closing(VideoIndexer(store.settings)) as videos,
         closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["proposals"])) as pool,

@@ -132,7 +132,7 @@ class MatchPaintCounts:
     reasons: Mapping[str | None, int]
 
 
-def read_match_paint(session: Session, dataset_id: int) -> list[MatchPaintCounts]:
+def count_paint_by_match(session: Session, dataset_id: int) -> list[MatchPaintCounts]:
     """What was read of the pictures of each match of a dataset, by name."""
     group = GroupModel
     statement = (

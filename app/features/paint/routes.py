@@ -29,7 +29,7 @@ from app.features.jobs.schemas import (
     describe_job_response_for_openapi,
     make_job_response,
 )
-from app.features.match_estimates.routes import MatchRequest
+from app.features.match_estimates.routes import MatchSelection
 from app.features.paint.jobs import PAINT, PROPOSALS, cancel_and_forget_proposals
 from app.features.paint.proposal_queries import MatchProposalCounts, Proposal
 from app.features.paint.proposals import get_group_proposals, get_proposal_counts
@@ -144,7 +144,7 @@ class DatasetProposalCountsDocument(ListDocument[MatchProposalCounts]):
     """What was proposed for the views of a dataset, by name of the match."""
 
 
-class DatasetProposalsRequest(MatchRequest):
+class DatasetProposalsRequest(MatchSelection):
     """Look for cameras to propose."""
 
     dry_run: StrictBool = Field(default=False, description="Count, and look at nothing.")
@@ -204,7 +204,7 @@ def list_paint_summaries(dataset: DatasetPath, store: AppStore) -> DatasetPaintD
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def request_paint_reading(
-    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Read the paint of pictures and give it to their groups, which are solved again.
 

@@ -34,9 +34,9 @@ from app.features.jobs.queries import Job
 from app.features.paint.queries import (
     PAINT,
     MatchPaintCounts,
+    count_paint_by_match,
     find_last_paint_run_entries,
     insert_paint_readings,
-    read_match_paint,
     read_paint_readings,
 )
 from app.features.paint.tripod import solve_match_tripods
@@ -110,7 +110,7 @@ def summarize_paint_readings(store: Store, dataset: str | int) -> DatasetPaint:
     """
     with store.read() as session:
         found = require_dataset_with_matches(session, dataset)
-        matches = read_match_paint(session, found.id)
+        matches = count_paint_by_match(session, found.id)
         old = _count_outdated_readings(session, found, matches)
     items = tuple(
         _make_paint_state(item, None if old is None else old[item.match]) for item in matches
@@ -344,7 +344,9 @@ def has_pictures_to_read_paint_from(store: Store, dataset: str | int) -> bool:
     """
     with store.read() as session:
         number = require_dataset_id(session, dataset)
-        return any(item.views > item.without_picture for item in read_match_paint(session, number))
+        return any(
+            item.views > item.without_picture for item in count_paint_by_match(session, number)
+        )
 
 
 def _count_outdated_readings(

@@ -9,9 +9,9 @@ from app.features.datasets.service import DatasetHead
 from app.features.groups.edit import SetPaintReadings
 from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.paint.queries import PAINT, insert_paint_readings, read_match_paint
+from app.features.paint.queries import PAINT, count_paint_by_match, insert_paint_readings
 from app.soccer.paint_evidence import PaintReading
-from app.solving.match_tripod import solve_match_tripod
+from app.solving.match_tripod import add_match_tripod_to_readings
 
 
 def solve_match_tripods(
@@ -34,7 +34,9 @@ def solve_match_tripods(
     """
     with store.read() as session:
         items = [
-            item for item in read_match_paint(session, dataset.id) if item.match and item.painted
+            item
+            for item in count_paint_by_match(session, dataset.id)
+            if item.match and item.painted
         ]
     for item in items:
         if matches is not None and item.match not in matches:
@@ -42,7 +44,7 @@ def solve_match_tripods(
         with store.read() as session:
             groups = {it.id: it.group for it in read_groups(session, item.painted).values()}
         before = {number: group.paint.get(group.views[0].key) for number, group in groups.items()}
-        after = solve_match_tripod(groups, dataset.policy.calibration)
+        after = add_match_tripod_to_readings(groups, dataset.policy.calibration)
         changed = {number: read for number, read in after.items() if read != before[number]}
         if not changed:
             continue

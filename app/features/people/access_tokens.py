@@ -29,7 +29,7 @@ from app.features.people.login_queries import (
     list_access_tokens,
     update_access_token_last_use,
 )
-from app.features.people.logins import LEADING, Login, TokenUse, dataset_roles_from_rights
+from app.features.people.logins import LEADING, Login, UsedToken, dataset_roles_from_rights
 from app.features.people.queries import find_person_by_id, rights_from_row
 from app.features.people.roles import Role, Scope, log_account_event
 
@@ -178,7 +178,7 @@ class AccessTokens:
         if row.dataset_id is not None:
             roles = roles.restrict_to_dataset(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
-        use = TokenUse(row.name, _parse_scopes(row), fresh=row.used is None)
+        use = UsedToken(row.name, _parse_scopes(row), fresh=row.used is None)
         return Login(row.id, row.person_id, row.person, roles, seen, use)
 
     def should_log_use(self, login: Login) -> bool:

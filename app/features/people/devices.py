@@ -19,7 +19,7 @@ from typing import Protocol
 import pyotp
 from cryptography.fernet import Fernet
 
-from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, get_installation_key
+from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, get_or_make_secret_key
 from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.features.people.links import hash_token
@@ -76,7 +76,7 @@ class DeviceTokens:
         return hashlib.sha256(_normalize_name(name)).hexdigest()[:12]
 
     def _compute_signature(self, name: str, issued: str, nonce: str) -> str:
-        key = get_installation_key(self._store.settings, DEVICES)
+        key = get_or_make_secret_key(self._store.settings, DEVICES)
         with self._store.read_for_one_statement() as session:
             person = find_person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
@@ -204,7 +204,7 @@ class StoredPendingActions:
         return hash_token(f"{self._kind}/{asker}")
 
     def _encryption_key(self) -> Fernet:
-        return Fernet(urlsafe_b64encode(get_installation_key(self._store.settings, BEGUN)))
+        return Fernet(urlsafe_b64encode(get_or_make_secret_key(self._store.settings, BEGUN)))
 
 
 def make_pending_action_store(
@@ -272,7 +272,7 @@ def make_totp(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
     """The secret of a person, of what the database and of what the home alone knows."""
     text = f"{person_id} {salt}".encode()
     digest = hmac.new(
-        get_installation_key(store.settings, SECOND_FACTOR), text, hashlib.sha256
+        get_or_make_secret_key(store.settings, SECOND_FACTOR), text, hashlib.sha256
     ).digest()
     return pyotp.TOTP(base64.b32encode(digest[:20]).decode(), interval=SECONDS)
 

@@ -34,10 +34,10 @@ from app.http.cursor import paged
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, OwnedKind, may, open_to_all
 from app.http.problem import responses
-from app.http.route import Route, SecretRoute
+from app.http.route import Route, UnstoredResponseRoute
 from app.http.team import AppTeam
 
-passkeys_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
+passkeys_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 OWN_PASSKEYS = "/session/passkeys"
 log = structlog.get_logger("touchline.access")
 
@@ -150,7 +150,7 @@ def log_in_with_passkey(
     return make_session_document(team.logins.find(token), store)
 
 
-second_factors_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
+second_factors_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 team_router = APIRouter(tags=["sessions"], route_class=Route)
 OWN_FACTOR = "/session/second-factor"
 
@@ -226,7 +226,7 @@ def put_team_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettin
     return wanted
 
 
-tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=SecretRoute)
+tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=UnstoredResponseRoute)
 
 
 @tokens_router.get("", operation_id="listTokens", responses=responses(401, 409))

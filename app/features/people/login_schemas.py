@@ -163,7 +163,7 @@ class SignOnStarted(Document):
     )
 
 
-class SignOnAnswer(BaseModel):
+class SignOnCallback(BaseModel):
     """What the provider has added to the address of the page `/login`."""
 
     model_config = ConfigDict(
@@ -185,7 +185,7 @@ class SignOnAnswer(BaseModel):
     )
 
 
-class SignOnEnd(Document):
+class SignOnFinished(Document):
     """Who is logged in now, and the page to show."""
 
     session: SessionDocument

@@ -74,7 +74,7 @@ class LoginMethod(StrEnum):
 
 
 @dataclass(frozen=True)
-class TokenUse:
+class UsedToken:
     """The token with which a script asks.
 
     Attributes:
@@ -95,7 +95,7 @@ class Login:
     name: str
     roles: DatasetRoles
     seen: datetime
-    token: TokenUse | None = None
+    token: UsedToken | None = None
     must_enrol: bool = False
     """They need a second factor, and have none: they may do nothing before they have."""
     way: LoginMethod | None = None

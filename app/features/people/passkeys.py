@@ -44,7 +44,7 @@ from app.features.people.queries import count_recovery_codes, find_person_by_id,
 from app.features.people.roles import log_account_event
 from app.features.people.second_factor import (
     ISSUER,
-    handle_removed_factor,
+    drop_codes_if_last_factor_removed,
     hash_recovery_codes,
     make_recovery_codes,
     require_password,
@@ -198,7 +198,7 @@ class Passkeys:
             name = delete_passkey(session, passkey_id, login.person_id)
             if name is None:
                 raise NotFoundError(f"you have no passkey {passkey_id}")
-            handle_removed_factor(session, login)
+            drop_codes_if_last_factor_removed(session, login)
             log_account_event(
                 session, login.name, login.name, "no passkey", login.role, passkey=name
             )
@@ -242,12 +242,12 @@ class Passkeys:
         if row is None or person is None:
             raise NotLoggedInError(REFUSED, hint=AGAIN)
 
-        def require_valid_signature(session: Session) -> None:
+        def verify_signature_and_record_use(session: Session) -> None:
             # Read again: another login with it may have counted meanwhile, or it was taken away.
             found = find_passkey(session, row.credential)
             if found is None or found.person_id != row.person_id:
                 raise NotLoggedInError(REFUSED, hint=AGAIN)
-            count = _verify_sign_count(found, credential, challenge, site)
+            count = _verify_signature_and_get_count(found, credential, challenge, site)
             update_passkey_use(session, found.id, count, format_utc_time(self._clock()))
 
         return self._logins.begin(
@@ -256,7 +256,7 @@ class Passkeys:
             browser,
             address,
             before,
-            require_valid_signature,
+            verify_signature_and_record_use,
             LoginMethod.PASSKEY,
         )
 
@@ -281,7 +281,7 @@ class Passkeys:
             raise InputError(REFUSED, hint="Begin again.", pointer="/credential") from error
 
 
-def _verify_sign_count(
+def _verify_signature_and_get_count(
     row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite
 ) -> int:
     """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""

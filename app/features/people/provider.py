@@ -141,7 +141,7 @@ _FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 @dataclass(frozen=True)
-class LoginRequest:
+class ProviderLoginRequest:
     """What was asked of the provider for one login.
 
     Attributes:
@@ -181,7 +181,7 @@ class Provider:
         self._description: _CachedResponse | None = None
         self._keys: _CachedResponse | None = None
 
-    def make_login_url(self, request: LoginRequest) -> str:
+    def make_login_url(self, request: ProviderLoginRequest) -> str:
         """Where a browser goes to log in.
 
         Raises:
@@ -196,7 +196,7 @@ class Provider:
         )
         return str(address)
 
-    def fetch_claims(self, request: LoginRequest, code: str) -> Mapping[str, Any]:
+    def fetch_claims(self, request: ProviderLoginRequest, code: str) -> Mapping[str, Any]:
         """What the provider says of who has logged in; ``code`` is what their browser brought back.
 
         Raises:
@@ -215,7 +215,7 @@ class Provider:
         self._read_discovery_document()
         return f"{self._rules.issuer} answers, with {len(self._fetch_keys().keys)} keys"
 
-    def _exchange_code_for_token(self, request: LoginRequest, code: str) -> str:
+    def _exchange_code_for_token(self, request: ProviderLoginRequest, code: str) -> str:
         there = self._read_discovery_document()
         body = prepare_token_request(
             "authorization_code",
@@ -237,7 +237,7 @@ class Provider:
             raise self._refused_login_error()
         return token
 
-    def _verify_claims(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
+    def _verify_claims(self, token: str, request: ProviderLoginRequest) -> Mapping[str, Any]:
         """The claims of an ID token that is good."""
         try:
             try:
@@ -266,7 +266,7 @@ class Provider:
             raise self._refused_login_error() from error
         return dict(claims)
 
-    def _make_oauth_client(self, request: LoginRequest) -> OAuth2Client:
+    def _make_oauth_client(self, request: ProviderLoginRequest) -> OAuth2Client:
         return OAuth2Client(
             None,
             client_id=self._rules.client_id,

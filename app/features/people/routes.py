@@ -34,10 +34,10 @@ from app.http.cursor import paged
 from app.http.deps import AppStore, DatasetPath, DryRun, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.route import Route, SecretRoute
+from app.http.route import Route, UnstoredResponseRoute
 from app.http.team import AppTeam, TeamLogin
 
-users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRoute)
+users_router = APIRouter(prefix="/users", tags=["users"], route_class=UnstoredResponseRoute)
 
 
 def _user_with_link(person: Person, row: InvitationOutcome) -> UserWithLink:

@@ -12,7 +12,7 @@ from app.features.maintenance.service import Banner
 from app.features.people.invitations import MOST, InvitationOutcome
 from app.features.people.logins import LoginMethod
 from app.features.people.roles import Action, Role
-from app.features.people.service import Person, SingleRole
+from app.features.people.service import Person, SingleDatasetRole
 from app.http.documents import Document, ListDocument
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -146,7 +146,9 @@ class SessionDocument(Document):
         default=None, description="The notice that everybody is shown; null: there is none."
     )
     may: list[Action] = Field(description="What the role lets them do.")
-    datasets: list[SingleRole] = Field(default=[], description="Where they are something else.")
+    datasets: list[SingleDatasetRole] = Field(
+        default=[], description="Where they are something else."
+    )
     allows: dict[Role, list[Action]] = Field(default={}, description="What each role allows.")
 
 

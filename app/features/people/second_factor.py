@@ -154,7 +154,7 @@ class SecondFactors:
         require_password(self._store, login, password, self._clock())
         with self._store.write() as session:
             if delete_second_factor(session, login.person_id):
-                handle_removed_factor(session, login)
+                drop_codes_if_last_factor_removed(session, login)
                 log_account_event(session, login.name, login.name, "no second factor", login.role)
 
     def clear(self, person_id: int, *, actor: str) -> None:
@@ -207,7 +207,7 @@ def hash_recovery_codes(codes: list[str]) -> list[str]:
     return [hash_token(normalize_code(one)) for one in codes]
 
 
-def handle_removed_factor(session: Session, login: Login) -> None:
+def drop_codes_if_last_factor_removed(session: Session, login: Login) -> None:
     """What follows when one of somebody's second factors was taken away.
 
     Raises:

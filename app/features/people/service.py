@@ -76,7 +76,7 @@ class Person:
     """How many tokens of scripts they have."""
     sign_on: str | None = None
     """Their account at the provider of single sign-on, as people know it; None: they have none."""
-    datasets: tuple[SingleRole, ...] = ()
+    datasets: tuple[SingleDatasetRole, ...] = ()
     """In which datasets they are something else than ``role``."""
 
     @property
@@ -292,7 +292,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class SingleRole:
+class SingleDatasetRole:
     """What a person is in one dataset.
 
     Attributes:
@@ -315,18 +315,18 @@ def list_members(store: Store, dataset: str | int) -> list[Member]:
         return _read_members(session, _require_dataset(session, dataset))
 
 
-def read_roles_in_single_datasets(session: Session) -> dict[int, list[SingleRole]]:
+def read_roles_in_single_datasets(session: Session) -> dict[int, list[SingleDatasetRole]]:
     """The roles in single datasets of everybody, by the id of the person; none of their practice."""
-    found: dict[int, list[SingleRole]] = {}
+    found: dict[int, list[SingleDatasetRole]] = {}
     for row in list_dataset_roles(session):
         if row.dataset_id > COPIES:
             continue
-        one = SingleRole(row.dataset_id, row.dataset, Role(row.role))
+        one = SingleDatasetRole(row.dataset_id, row.dataset, Role(row.role))
         found.setdefault(row.person_id, []).append(one)
     return found
 
 
-def read_single_roles(store: Store, roles: DatasetRoles) -> list[SingleRole]:
+def read_visible_dataset_roles(store: Store, roles: DatasetRoles) -> list[SingleDatasetRole]:
     """The roles of one person in the single datasets that they see, by name of the dataset."""
     if not roles.single:
         return []
@@ -337,7 +337,7 @@ def read_single_roles(store: Store, roles: DatasetRoles) -> list[SingleRole]:
         for key, role in roles.single.items()
         if role is not Role.NONE and key not in copies
     }
-    found = [SingleRole(key, names[key], role) for key, role in seen.items() if key in names]
+    found = [SingleDatasetRole(key, names[key], role) for key, role in seen.items() if key in names]
     return sorted(found, key=lambda one: one.dataset)
 
 

@@ -16,9 +16,9 @@ from app.features.people import links
 from app.features.people.links import LinkHolder
 from app.features.people.login_schemas import (
     OwnLoginMethods,
-    SignOnAnswer,
     SignOnBegin,
-    SignOnEnd,
+    SignOnCallback,
+    SignOnFinished,
     SignOnStarted,
 )
 from app.features.people.logins import Login
@@ -34,7 +34,7 @@ from app.features.people.schemas import (
     PasswordOnly,
     SessionDocument,
 )
-from app.features.people.service import read_single_roles
+from app.features.people.service import read_visible_dataset_roles
 from app.features.people.sign_on_rules import read_login_ways, unlink_identity, unlink_person
 from app.http.access import get_current_login
 from app.http.cursor import paged
@@ -43,16 +43,16 @@ from app.http.headers import read_bearer_token
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
-from app.http.route import SecretRoute
+from app.http.route import UnstoredResponseRoute
 from app.http.team import AppTeam, TeamLogin
 from app.soccer.actors import LOCAL_USER
 
-router = APIRouter(tags=["sessions"], route_class=SecretRoute)
+router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 log = structlog.get_logger("touchline.access")
 
 
 ALLOWS = {role: [action for action in Action if role_allows(role, action)] for role in Role}
-sign_on_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
+sign_on_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 
 
 async def get_login(request: Request) -> Login:
@@ -85,7 +85,7 @@ def make_session_document(login: Login | None, store: Store) -> SessionDocument:
         enrol=login.must_enrol,
         way=login.way,
         may=allows[login.role],
-        datasets=read_single_roles(store, login.roles),
+        datasets=read_visible_dataset_roles(store, login.roles),
         allows=allows,
     )
 
@@ -293,8 +293,8 @@ def begin_sign_on(
 @open_to_all
 @limit(TRANSFER)
 def finish_sign_on(
-    body: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
-) -> SignOnEnd:
+    body: SignOnCallback, request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SignOnFinished:
     """Log in with what the provider has answered, or link the account where that was begun.
 
     Whoever has a second factor is asked for its code by a 401 whose pointer is `/factor`, unless the
@@ -320,11 +320,11 @@ def finish_sign_on(
         raise
     response.set_cookie(**team.cookies.make_sign_on_cookie(None))
     if entered.token is None:
-        return SignOnEnd(
+        return SignOnFinished(
             session=make_session_document(team.find_login(request), store), to=entered.to
         )
     response.set_cookie(**team.cookies.make_session_cookie(entered.token))
-    return SignOnEnd(
+    return SignOnFinished(
         session=make_session_document(team.logins.find(entered.token), store), to=entered.to
     )
 

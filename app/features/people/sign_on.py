@@ -27,7 +27,7 @@ from app.features.people.login_queries import (
     update_identity_use,
 )
 from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, LoginMethod, LoginSessions
-from app.features.people.provider import LoginRequest, Provider
+from app.features.people.provider import Provider, ProviderLoginRequest
 from app.features.people.queries import (
     find_person_by_id,
     find_person_by_name,
@@ -62,7 +62,7 @@ class _PendingLogin:
     """
 
     browser: str
-    asked: LoginRequest
+    asked: ProviderLoginRequest
     to: str
     link: str | None = None
     name: str | None = None
@@ -77,7 +77,7 @@ class _PendingLogin:
     def from_json_bytes(text: bytes) -> _PendingLogin:
         """What ``text`` made."""
         values = json.loads(text)
-        return _PendingLogin(**{**values, "asked": LoginRequest(**values["asked"])})
+        return _PendingLogin(**{**values, "asked": ProviderLoginRequest(**values["asked"])})
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class SignOn:
             # In a transaction of its own, which another that writes would wait for.
             on_code(self._read_person_name(person_id))
 
-        def require_linked_account(session: Session) -> None:
+        def require_account_and_record_use(session: Session) -> None:
             # Read again: the account may have been taken away from them since.
             if not _has_identity(session, self.rules, claims, person_id):
                 raise NotLoggedInError(
@@ -223,7 +223,7 @@ class SignOn:
                 browser,
                 address,
                 before,
-                require_linked_account,
+                require_account_and_record_use,
                 LoginMethod.SIGN_ON,
                 vouched=vouched,
             )
@@ -236,7 +236,7 @@ class SignOn:
         return SignOnResult(token, begun.to)
 
     def _begin_login(self, asker: str, redirect: str, to: str, **more: Any) -> str:
-        request = LoginRequest(
+        request = ProviderLoginRequest(
             redirect, make_random_token(), make_random_token(), secrets.token_urlsafe(48)
         )
         address = self._provider.make_login_url(request)

@@ -134,7 +134,7 @@ def read_rules(settings: Settings) -> SignOnRules | None:
     issuer, client = settings.sso_issuer or "", settings.sso_client_id or ""
     if not (issuer and client and secret):
         absent = [
-            _make_variable_name(name)
+            _make_environment_variable_name(name)
             for name, value in (
                 ("issuer", issuer),
                 ("client_id", client),
@@ -213,7 +213,7 @@ def _read_client_secret(settings: Settings) -> str:
             "the client's secret is given twice: by TOUCHLINE_SSO_CLIENT_SECRET and by"
             " TOUCHLINE_SSO_CLIENT_SECRET_FILE"
         )
-    return read_private_file(path, _make_variable_name("client_secret_file"))
+    return read_private_file(path, _make_environment_variable_name("client_secret_file"))
 
 
 def _find_verified_email_domain(claims: Mapping[str, Any]) -> str | None:
@@ -229,7 +229,7 @@ def _claim_to_texts(claim: object) -> list[str]:
     return [one for one in claim if isinstance(one, str)] if isinstance(claim, list) else []
 
 
-def _make_variable_name(name: str) -> str:
+def _make_environment_variable_name(name: str) -> str:
     return f"TOUCHLINE_{_PREFIX}{name}".upper()
 
 

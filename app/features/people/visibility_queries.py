@@ -81,7 +81,7 @@ def hides_groups_from_reader() -> bool:
     return reader is not None and bool(reader.batches)
 
 
-def sees_all_work(dataset_id: int) -> bool:
+def sees_independent_work(dataset_id: int) -> bool:
     """Whether whoever asks may know what people made of groups independently."""
     reader = READER.get()
     return reader is None or reader.judges(dataset_id)
@@ -95,7 +95,7 @@ def visible_groups_condition(dataset_id: int, group: Any) -> list[ColumnElement[
     return [not_(reader.hidden_group_condition(dataset_id, group))]
 
 
-def visible_in_all_datasets_condition(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
+def visible_groups_across_datasets_condition(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
     """The same of groups of several datasets, by the columns of both ids; also where there is no group."""
     reader = READER.get()
     if reader is None:

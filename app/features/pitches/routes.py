@@ -152,7 +152,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
 @pitches_router.post("", operation_id="estimatePitches", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+def request_pitch_estimation(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
 
     The job solves what is stale, too: it is the one that follows an import.

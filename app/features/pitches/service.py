@@ -37,7 +37,7 @@ from app.features.queue.refresh_queries import refresh_queue
 from app.progress import ReportProgress
 from app.soccer.codec import digest_json
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy, calibration_values_to_digest
+from app.soccer.policy import CalibrationPolicy, collect_digested_calibration_values
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchSizeFrameLines, estimate_pitch
 from app.workers.executors import run_tasks
@@ -348,7 +348,7 @@ def _inputs_digest(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
     # Where the camera stands has no part in it, nor has paint: every frame's lines say it.
     own = replace(policy, share_position=False, source="lines")
-    return digest_json([SOLVER_VERSION, calibration_values_to_digest(own), lines])
+    return digest_json([SOLVER_VERSION, collect_digested_calibration_values(own), lines])
 
 
 def _make_task(

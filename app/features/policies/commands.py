@@ -70,7 +70,7 @@ def set_(
         state = change_policy(store, dataset, chosen, if_match=None, actor=get_current_actor())
         stale = len(list_stale_groups(store, state.dataset_id))
     values = {
-        **_policy_header(state.dataset, state.policy),
+        **_policy_identity_values(state.dataset, state.policy),
         "version": state.version,
         "to_solve": stale,
     }
@@ -89,7 +89,7 @@ def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
         for item in state.history
     ]
     values = {"values": policy_to_values(state.policy), "history": history}
-    head = {**_policy_header(state.dataset, state.policy), "version": state.version}
+    head = {**_policy_identity_values(state.dataset, state.policy), "version": state.version}
     return policy_to_yaml(state.policy), {**head, **values}
 
 
@@ -116,7 +116,7 @@ def read_policy_option(text: str) -> Policy:
         raise InputError(f"{path}: {error.message}", hint=error.hint) from error
 
 
-def _policy_header(dataset: str, policy: Policy) -> dict[str, str]:
+def _policy_identity_values(dataset: str, policy: Policy) -> dict[str, str]:
     return {"dataset": dataset, "name": policy.name, "hash": policy.hash}
 
 

@@ -98,7 +98,7 @@ class ThresholdAdvice:
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseReport:
     """What the residuals of a dataset say about its noise.
 
     Attributes:
@@ -141,7 +141,7 @@ class Noise:
         return _differ_noticeably(self.factors, self.used)
 
 
-def read_noise(store: Store, dataset: str | int) -> Noise:
+def estimate_dataset_noise(store: Store, dataset: str | int) -> NoiseReport:
     """The noise that the present solutions of a dataset show; changes nothing.
 
     Raises:
@@ -157,7 +157,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     with store.read() as session:
         used = read_noise_factors(session, state.dataset_id)
     advice = _make_advice(noise, state.policy)
-    return Noise(
+    return NoiseReport(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
         groups=groups,
@@ -213,7 +213,7 @@ def update_policy_noise(store: Store, dataset: str | int, actor: str) -> bool:
     return True
 
 
-def adopt_estimated_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
+def adopt_estimated_noise(store: Store, noise: NoiseReport, *, actor: str) -> PolicyState:
     """Judge the dataset with the noise that was estimated, of it and of its cameras and people.
 
     Raises:
@@ -228,7 +228,7 @@ def adopt_estimated_noise(store: Store, noise: Noise, *, actor: str) -> PolicySt
 
 
 def adopt_estimated_noise_in_session(
-    session: Session, noise: Noise, state: PolicyState, actor: str
+    session: Session, noise: NoiseReport, state: PolicyState, actor: str
 ) -> None:
     """``adopt_estimated_noise`` within a write session; where nothing is new nothing changes.
 
@@ -405,10 +405,10 @@ class NoiseCache:
     def __init__(self, store: Store):
         self._store = store
         self._lock = Lock()
-        self._kept: OrderedDict[int, tuple[tuple[int, int, str, str], Noise]] = OrderedDict()
+        self._kept: OrderedDict[int, tuple[tuple[int, int, str, str], NoiseReport]] = OrderedDict()
 
-    def read(self, dataset: str | int) -> Noise:
-        """``read_noise`` of the present state.
+    def read(self, dataset: str | int) -> NoiseReport:
+        """``estimate_dataset_noise`` of the present state.
 
         Raises:
             NotFoundError: There is no such dataset.
@@ -423,7 +423,7 @@ class NoiseCache:
             if kept is not None and kept[0] == mark:
                 self._kept.move_to_end(state.dataset_id)
                 return kept[1]
-        noise = read_noise(self._store, state.dataset_id)
+        noise = estimate_dataset_noise(self._store, state.dataset_id)
         with self._lock:
             self._kept[state.dataset_id] = mark, noise
             self._kept.move_to_end(state.dataset_id)

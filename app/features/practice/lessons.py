@@ -73,11 +73,11 @@ LESSONS = (
 
 def make_practice_scenes() -> list[Scene]:
     """The scenes of all lessons, in their order."""
-    stage = make_practice_stage()
+    stage = make_practice_match()
     return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
 
 
-def make_practice_stage() -> MatchSetup:
+def make_practice_match() -> MatchSetup:
     """The match that all lessons are from."""
     return make_match_setup(0, MATCH_GROUPS, SEED)
 

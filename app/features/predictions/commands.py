@@ -252,7 +252,7 @@ def detect(
         opened = OnnxModel.open(model, category=category, side=side, threads=threads)
     if opened is None or recording is not None:
         place = dataset, recording or "", frames
-        _detect_in_recording(place, opened or source, name or source.stem, min_score, json_)
+        _detect_or_import_boxes(place, opened or source, name or source.stem, min_score, json_)
         return
     with open_store() as store, show_progress("Detecting") as progress:
         request = DetectRequest(name or source.stem, query, missing, min_score)
@@ -271,7 +271,7 @@ def detect(
     )
 
 
-def _detect_in_recording(
+def _detect_or_import_boxes(
     place: tuple[str, str, str | None],
     source: OnnxModel | Path,
     name: str,

@@ -41,7 +41,7 @@ from app.features.predictions.queries import (
     delete_evaluation,
     find_evaluation,
     list_evaluations_of_dataset,
-    read_figure,
+    read_chart,
     read_predicted_tracks,
 )
 from app.features.predictions.queries import StoredEvaluation as StoredEvaluation
@@ -151,7 +151,7 @@ def parse_tables(values: Iterable[Json]) -> list[Table]:
     return [from_json(Table, value) for value in values]
 
 
-def get_figure(store: Store, evaluation_id: int, name: str) -> Chart:
+def get_chart(store: Store, evaluation_id: int, name: str) -> Chart:
     """One figure of a run.
 
     Raises:
@@ -159,7 +159,7 @@ def get_figure(store: Store, evaluation_id: int, name: str) -> Chart:
     """
     with store.read() as session:
         known = read_evaluation(session, evaluation_id).figures
-        value = read_figure(session, evaluation_id, name)
+        value = read_chart(session, evaluation_id, name)
     if value is None:
         raise NotFoundError(
             f'evaluation {evaluation_id} has no figure "{name}"',
@@ -270,7 +270,7 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
     """
     tables = {f"{table.name}.csv": table for table in parse_run_tables(evaluation)}
     # Its three files come one after the other.
-    figure = lru_cache(maxsize=1)(partial(get_figure, store, evaluation.id))
+    figure = lru_cache(maxsize=1)(partial(get_chart, store, evaluation.id))
 
     def write_figure_file(kind: str, name: str, file: Path) -> None:
         if kind == "tables":

@@ -214,7 +214,7 @@ class ComparisonDocument(Document):
         )
 
 
-def _make_file_responses(description: str, document: type[object], *others: str) -> Responses:
+def _describe_file_responses(description: str, document: type[object], *others: str) -> Responses:
     """What a route answers that gives a document as JSON, and as files of other types."""
     content: dict[str, object] = {}
     for kind in others:
@@ -223,10 +223,10 @@ def _make_file_responses(description: str, document: type[object], *others: str)
     return {200: {"description": description, "model": document, "content": content}}
 
 
-FIGURE_FILES = _make_file_responses(
+FIGURE_FILES = _describe_file_responses(
     "The figure: its values as JSON or CSV, or drawn as PNG.", Chart, CSV_FILE, PNG_FILE
 )
-TABLE_FILES = _make_file_responses(
+TABLE_FILES = _describe_file_responses(
     "The table: as JSON, or as CSV with intervals and denominators.", Table, CSV_FILE
 )
 
@@ -306,7 +306,7 @@ def get_figure(
     store: AppStore,
 ) -> Response:
     """One figure of an evaluation; 404 where the evaluation has no such figure."""
-    found = review.get_figure(store, evaluation, str(figure))
+    found = review.get_chart(store, evaluation, str(figure))
     name = f"touchline-{evaluation}-{figure}.{ending}"
     if ending == "json":
         return make_document_response(found)

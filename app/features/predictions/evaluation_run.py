@@ -11,7 +11,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.evaluation.evaluate import EvaluationInputs, EvaluationOptions, evaluate
-from app.evaluation.frame import Detection, Frame
+from app.evaluation.frame import Detection, GroundTruthFrame
 from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.view_queries import StoredView, list_dataset_views
@@ -90,7 +90,9 @@ class AcceptedTruthCounts:
     of: int
 
     @staticmethod
-    def count(frames: Sequence[Frame], boxes: str, name: str | None) -> AcceptedTruthCounts:
+    def count(
+        frames: Sequence[GroundTruthFrame], boxes: str, name: str | None
+    ) -> AcceptedTruthCounts:
         """Count over frames that have a box of that kind; ``name`` is that of the evaluated set."""
         judged = [frame.predicted_by for frame in frames if boxes in frame.boxes]
         return AcceptedTruthCounts(

@@ -9,7 +9,7 @@ from typing import get_args
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.errors import ConflictError, InputError
-from app.evaluation.frame import Frame
+from app.evaluation.frame import GroundTruthFrame
 from app.features.datasets.service import DatasetHead
 from app.features.groups.state import read_states
 from app.features.groups.view_queries import find_group_and_view_ids
@@ -39,7 +39,7 @@ class EvaluationTruth:
         pins: JSON: version or digest, policy, solver and software version.
     """
 
-    frames: tuple[Frame, ...]
+    frames: tuple[GroundTruthFrame, ...]
     policy: Policy
     gone: int
     pins: Json
@@ -48,7 +48,7 @@ class EvaluationTruth:
 def read_version_truth(session: Session, version: Version, split: str | None) -> EvaluationTruth:
     """The frames of a frozen version, with the ids that its views have today."""
     rows = list(read_rows(session, version.id, members=True))
-    frames: list[Frame] = []
+    frames: list[GroundTruthFrame] = []
     gone = 0
     for start in range(0, len(rows), BATCH):
         frozen = read_frozen_groups(session, version, rows[start : start + BATCH])
@@ -82,7 +82,7 @@ def read_live_truth(
     candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
     require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
-    frames: list[Frame] = []
+    frames: list[GroundTruthFrame] = []
     hashes: list[list[str]] = []
     for start in range(0, len(ids), BATCH):
         for state in read_states(session, ids[start : start + BATCH]):
@@ -108,7 +108,7 @@ def iterate_group_frames(
     group_id: int,
     view_ids: Mapping[str, int],
     splits: Mapping[str, str] | None = None,
-) -> Iterator[Frame]:
+) -> Iterator[GroundTruthFrame]:
     """The frames of a solved group.
 
     The 3D ball, and the boxes that follow from it, belong to the views in a valid pair alone.
@@ -116,7 +116,7 @@ def iterate_group_frames(
     for view in group.views:
         solved = solution.view(view.key)
         inside = is_ball_3d_valid_in_view(solution, view)
-        yield Frame(
+        yield GroundTruthFrame(
             id=view_ids[view.key],
             group_id=group_id,
             group=group.key,
@@ -138,7 +138,7 @@ def iterate_group_frames(
 
 def _iterate_frozen_frames(
     item: FrozenGroup, present: tuple[int, Mapping[str, int]], count: int
-) -> Iterator[Frame]:
+) -> Iterator[GroundTruthFrame]:
     """Views that the dataset no longer has get ids below zero, each its own."""
     group_id, known = present
     ids = {

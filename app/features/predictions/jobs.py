@@ -71,7 +71,7 @@ def request_accept(
     )
 
 
-def resume_prediction_jobs(jobs: Jobs, store: Store) -> None:
+def register_prediction_jobs(jobs: Jobs, store: Store) -> None:
     """Let evaluations that an earlier server was at go on, and another process accept predictions
     than the one that was asked."""
 

@@ -315,7 +315,7 @@ def find_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation | 
     return None if row is None else _evaluation_from_row(row)
 
 
-def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
+def read_chart(session: Session, evaluation_id: int, name: str) -> Json | None:
     """One figure of a run, or None."""
     statement = select(EvaluationModel.figures).where(EvaluationModel.id == evaluation_id)
     packed = session.execute(statement).scalar_one_or_none()

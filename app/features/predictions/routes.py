@@ -27,7 +27,7 @@ from app.features.predictions.schemas import (
     AcceptBody,
     AcceptOutcome,
     GroupPredictionsDocument,
-    PredictionRequest,
+    PredictionFilesRequest,
     PredictionSetDocument,
     PredictionSetList,
     ViewPrediction,
@@ -84,7 +84,7 @@ def _make_added_response(found: review.PredictionSet) -> Response:
 )
 @respond_with(_make_added_response)
 def add_predictions(
-    dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: PredictionFilesRequest, services: AppServices, actor: Actor
 ) -> review.PredictionSet:
     """Read uploaded files into a new set of predictions, or find the set that they gave before.
 
@@ -215,7 +215,9 @@ def accept_prediction(
         return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
 
 
-def _resolve_prediction_files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
+def _resolve_prediction_files(
+    settings: Settings, request: PredictionFilesRequest
+) -> PredictionFiles:
     how = PredictionFiles(
         None,
         format=request.format,

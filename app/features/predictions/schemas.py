@@ -43,7 +43,7 @@ StoredBox = Annotated[
 """As it was predicted: x, y of the top-left corner, width, height; whatever the file said."""
 
 
-class PredictionRequest(BaseModel):
+class PredictionFilesRequest(BaseModel):
     """Files of predictions: ball boxes, cameras, or both."""
 
     model_config = ConfigDict(
@@ -86,7 +86,7 @@ class PredictionRequest(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _require_upload(self) -> PredictionRequest:
+    def _require_upload(self) -> PredictionFilesRequest:
         if self.upload is None and self.cameras_upload is None:
             raise ValueError("give an upload, a cameras_upload, or both")
         return self
@@ -244,7 +244,7 @@ class AcceptBody(BaseModel):
         return AcceptRequest(self.predictions, self.q, views, self.min_score, self.replace)
 
 
-class AcceptedView(Document):
+class ViewThatWouldGetBall(Document):
     """A view that would get a ball."""
 
     view: int = Field(validation_alias="view_id")
@@ -266,7 +266,7 @@ class AcceptOutcome(Document):
     changed: StrictInt = Field(description="Views that get a ball.")
     groups: int
     refused: dict[str, int]
-    sample: list[AcceptedView] = Field(description="The first views of a dry run.")
+    sample: list[ViewThatWouldGetBall] = Field(description="The first views of a dry run.")
 
     @staticmethod
     def of_plan(plan: AcceptPlan) -> AcceptOutcome:

@@ -74,7 +74,7 @@ def read_newest_entry_id(store: Store) -> int:
         return find_newest_entry_id(session)
 
 
-def find_newest_entry_and_solution(store: Store) -> tuple[int, int]:
+def find_newest_entry_and_solution_ids(store: Store) -> tuple[int, int]:
     """Ids of the log's last entry and of the last solution; 0 where there is none."""
     with store.read() as session:
         return find_newest_entry_id(session), find_newest_solution_id(session)

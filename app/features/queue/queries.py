@@ -31,8 +31,8 @@ from app.features.comments.queries import select_groups_with_mentions, select_gr
 from app.features.independent_annotations.queries import select_groups_with_annotations
 from app.features.paint.proposal_queries import select_groups_with_open_proposal
 from app.features.people.visibility_queries import (
+    visible_groups_across_datasets_condition,
     visible_groups_condition,
-    visible_in_all_datasets_condition,
 )
 from app.features.policies.queries import find_policy_change_time
 from app.features.queue.tables import QUEUE_NUMBERS, QUEUE_SCANNED, QueueModel
@@ -437,7 +437,7 @@ def read_columns_after(
     return session.execute(statement).all()
 
 
-def find_group_position(
+def find_dataset_and_sort_keys(
     session: Session, group_id: int, order: RowOrder
 ) -> tuple[int, list[Key]] | None:
     """The dataset of a group and its keys in an order; None where there is no such group."""
@@ -466,7 +466,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[State
         )
         .where(
             QueueModel.dataset_id.in_(dataset_ids),
-            *visible_in_all_datasets_condition(QueueModel.dataset_id, QueueModel.group_id),
+            *visible_groups_across_datasets_condition(QueueModel.dataset_id, QueueModel.group_id),
         )
         .group_by(QueueModel.dataset_id, QueueModel.status)
     )

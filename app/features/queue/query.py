@@ -286,7 +286,7 @@ def _comments_condition(term: _QueryTerm, value: str) -> Condition:
     return conditions.has_thread(choice)
 
 
-def _annotations_condition(term: _QueryTerm, value: str) -> Condition:
+def _independent_annotations_condition(term: _QueryTerm, value: str) -> Condition:
     """What people's own annotations of it came to."""
     choice = _require_choice(term, value)
     if choice in ("any", "none"):
@@ -308,7 +308,7 @@ def _view_condition(_term: _QueryTerm, value: str) -> Condition:
     return conditions.has_list_item("view_keys", value)
 
 
-def _match_condition(_term: _QueryTerm, value: str) -> Condition:
+def _match_name_condition(_term: _QueryTerm, value: str) -> Condition:
     return conditions.contains_text_condition("match", value)
 
 
@@ -338,8 +338,8 @@ _TESTS: dict[str, Callable[[_QueryTerm, str], Condition]] = {
     "proposal": _proposal_condition,
     "comments": _comments_condition,
     "mentions": _mentions_condition,
-    "annotations": _annotations_condition,
-    "match": _match_condition,
+    "annotations": _independent_annotations_condition,
+    "match": _match_name_condition,
     "label": _text_condition,
     "": _text_condition,
     **dict.fromkeys(("split", "key", "reviewer", "reason", "override"), _exact_text_condition),

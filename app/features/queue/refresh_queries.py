@@ -28,7 +28,7 @@ from app.features.datasets.tables import (
 from app.features.findings.queries import (
     GroupDismissals,
     findings_from_rows,
-    read_import_findings,
+    read_import_findings_and_dismissals,
     split_open_and_dismissed_kinds,
 )
 from app.features.groups.queries import StoredGroup
@@ -155,7 +155,7 @@ def _build_queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, An
         _read_newest_verdicts_by_group(session, ids),
     )
     (findings, dismissals), edited = (
-        read_import_findings(session, ids),
+        read_import_findings_and_dismissals(session, ids),
         filter_edited_groups(session, ids),
     )
     heads = _read_groups_with_summaries(session, ids)

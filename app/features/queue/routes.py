@@ -311,7 +311,7 @@ class StatisticsHistogram(Document, shows=Measure):
         )
 
 
-class SplitShare(Document):
+class SplitGroupCounts(Document):
     """Groups of a split."""
 
     split: str
@@ -327,7 +327,7 @@ class StatisticsDocument(Document):
     histograms: list[StatisticsHistogram]
     positions: BallPositionCounts
     matches: list[MatchSplitCounts]
-    splits: list[SplitShare]
+    splits: list[SplitGroupCounts]
 
 
 class TimelineDocument(BaseModel):

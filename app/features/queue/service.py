@@ -18,7 +18,7 @@ from app.features.agreement.queries import read_agreement_states
 from app.features.comments.queries import count_open_threads
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
-from app.features.queue.queries import GroupListing, Key, find_group_position, read_rows
+from app.features.queue.queries import GroupListing, Key, find_dataset_and_sort_keys, read_rows
 from app.features.queue.query import NUMBERS, Query, parse_query
 from app.geometry.arrays import FloatArray, IntArray
 from app.json_text import MAX_ID, json_text
@@ -40,7 +40,7 @@ def decode_cursor(query: Query, cursor: str) -> list[Key]:
         raise InputError(
             "the cursor is invalid; request the first page without a cursor", pointer="/cursor"
         ) from error
-    sound = all(map(_is_key, values))
+    sound = all(map(_is_valid_cursor_key, values))
     if name != _make_query_fingerprint(query) or len(values) != len(query.order.keys) or not sound:
         raise InputError(
             "this cursor belongs to another query; request the first page without a cursor",
@@ -57,7 +57,7 @@ def _make_query_fingerprint(query: Query) -> str:
     return f"{order} {query.digest}"
 
 
-def _is_key(value: Any) -> bool:
+def _is_valid_cursor_key(value: Any) -> bool:
     """Whether the database can compare with a value: no NaN, no Infinity, no endless integer."""
     if value is None or isinstance(value, str):
         return True
@@ -155,7 +155,7 @@ class Neighbours:
 
 
 @dataclass(frozen=True)
-class MatchingGroups:
+class MatchingGroupIds:
     """Ids of groups in order, out of ``total`` that match.
 
     Attributes:
@@ -223,7 +223,7 @@ def list_groups(
 
 def list_ids(
     store: Store, dataset_id: int, query: str = "", limit: int = MAX_IDS, start: int = 0
-) -> MatchingGroups:
+) -> MatchingGroupIds:
     """The ids alone of the groups that match, in order, from a position on.
 
     Raises:
@@ -234,7 +234,7 @@ def list_ids(
         listing = GroupListing(session, dataset_id, parsed.conditions)
         total = listing.count()
         ids = listing.ids_from(parsed.order, start, limit, total)
-    return MatchingGroups(tuple(ids), total)
+    return MatchingGroupIds(tuple(ids), total)
 
 
 def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
@@ -248,7 +248,7 @@ def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
     parsed = parse_query(query)
     order = parsed.order
     with store.read() as session:
-        place = find_group_position(session, group_id, order)
+        place = find_dataset_and_sort_keys(session, group_id, order)
         if place is None:
             raise NotFoundError.group(group_id)
         dataset_id, keys = place

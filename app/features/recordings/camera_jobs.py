@@ -122,6 +122,6 @@ def run_camera_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     }
 
 
-def resume_camera_jobs(jobs: Jobs, store: Store) -> None:
+def register_camera_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at begin again."""
     jobs.register_resume(KIND, partial(run_camera_job, jobs, store))

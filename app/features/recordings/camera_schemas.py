@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.schemas import PitchSize
-from app.features.recordings.cameras import CameraSummary
+from app.features.recordings.cameras import CameraTrackingSummary
 from app.http.documents import Document, ListDocument
 from app.json_text import MAX_ID
 from app.soccer.pitch import Pitch
@@ -66,7 +66,7 @@ class EstimatedPitch(BaseModel):
     )
 
 
-class CameraSummaryDocument(Document, shows=CameraSummary):
+class CameraTrackingSummaryDocument(Document, shows=CameraTrackingSummary):
     """What became of the frames of a stretch."""
 
     frames: int = Field(description="How many frames there are.")
@@ -94,8 +94,8 @@ class CamerasDocument(Document):
     recording: int = Field(description="Id of the recording.")
     first: int = Field(description="Number of its first frame, from 0.")
     last: int = Field(description="Number of its last frame.")
-    summary: CameraSummaryDocument = Field(description="What became of its frames.")
-    before: CameraSummaryDocument | None = Field(
+    summary: CameraTrackingSummaryDocument = Field(description="What became of its frames.")
+    before: CameraTrackingSummaryDocument | None = Field(
         description="The same of the cameras that these took the place of."
     )
     revision: int = Field(description="How often the stretch was tracked.")

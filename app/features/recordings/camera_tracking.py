@@ -20,7 +20,7 @@ from app.features.datasets.service import get_dataset_head
 from app.features.file_tools.track import count_outcomes, pitch_to_row
 from app.features.pitches.queries import read_edited_pitches
 from app.features.recordings.cameras import (
-    CameraSummary,
+    CameraTrackingSummary,
     ShotCameras,
     assign_tracked_cameras,
     cameras_file_path,
@@ -45,7 +45,7 @@ from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.tracking.camera_file import frame_cameras_to_bytes
 from app.tracking.clip import Clip
-from app.tracking.sides import are_on_opposite_side, turn_frame_camera
+from app.tracking.sides import are_on_opposite_side, move_camera_to_opposite_side
 from app.tracking.track import FrameCamera, track_clip
 from app.worker_process import WorkerLimits
 
@@ -59,7 +59,7 @@ MOST_FRAMES = 15_000
 class TrackedStretch:
     """What the process that tracks returns: a camera of each frame, and which lines were of no use.
 
-    ``turned`` and ``pitch``: as of ``CameraSummary``.
+    ``turned`` and ``pitch``: as of ``CameraTrackingSummary``.
     """
 
     frames: list[FrameCamera]
@@ -153,7 +153,7 @@ def _keep_turned_side(
     before = read_cameras_of_frames(store, recording, range(first, last + 1))
     if not are_on_opposite_side(tracked.frames, before):
         return tracked
-    frames = [turn_frame_camera(frame) for frame in tracked.frames]
+    frames = [move_camera_to_opposite_side(frame) for frame in tracked.frames]
     return TrackedStretch(frames, tracked.unusable, True, _rotate_pitch_half_turn(tracked.pitch))
 
 
@@ -189,7 +189,9 @@ def rotate_cameras_half_turn(
     found = require_cameras_turnable(store, recording_id, frame, turned)
     if found.summary.turned == turned:
         return found, 0
-    frames = [turn_frame_camera(one) for one in read_cameras(store.settings, found.digest)]
+    frames = [
+        move_camera_to_opposite_side(one) for one in read_cameras(store.settings, found.digest)
+    ]
     return save_cameras(
         store,
         get_recording(store, recording_id),
@@ -387,11 +389,11 @@ def _split_cameras_outside_stretch(
     ]
 
 
-def _summarize_cameras(tracked: TrackedStretch, annotated: Sequence[int]) -> CameraSummary:
+def _summarize_cameras(tracked: TrackedStretch, annotated: Sequence[int]) -> CameraTrackingSummary:
     counts = count_outcomes([{"outcome": frame.outcome} for frame in tracked.frames])
     measured = [frame for frame in tracked.frames if frame.error_px is not None]
     worst = max(measured, key=lambda frame: frame.error_px or 0.0, default=None)
-    return CameraSummary(
+    return CameraTrackingSummary(
         **counts,
         worst_frame=None if worst is None else worst.number,
         worst_px=None if worst is None else worst.error_px,

@@ -36,7 +36,7 @@ from app.tracking.track import FrameCamera
 
 
 @dataclass(frozen=True)
-class CameraSummary:
+class CameraTrackingSummary:
     """What became of the frames of a stretch.
 
     Attributes:
@@ -80,8 +80,8 @@ class ShotCameras:
     recording: int
     first: int
     last: int
-    summary: CameraSummary
-    before: CameraSummary | None
+    summary: CameraTrackingSummary
+    before: CameraTrackingSummary | None
     revision: int
     stale: bool
     drawn: tuple[int, ...]
@@ -157,10 +157,10 @@ def _build_shot_cameras(row: Any, sha256: str | None, drawn: Sequence[int]) -> S
         recording=int(row.recording_id),
         first=row.first,
         last=row.last,
-        summary=CameraSummary(**parse_json_column(row.summary)),
+        summary=CameraTrackingSummary(**parse_json_column(row.summary)),
         before=None
         if row.before_summary is None
-        else CameraSummary(**parse_json_column(row.before_summary)),
+        else CameraTrackingSummary(**parse_json_column(row.before_summary)),
         revision=row.revision,
         stale=row.sha256 != sha256,
         drawn=tuple(frame for frame in drawn if row.first <= frame <= row.last),

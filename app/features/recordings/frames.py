@@ -43,7 +43,7 @@ KEPT_BYTES, READY_BYTES = 72 * 2**20, 24 * 2**20
 process stays below 400 MB."""
 
 
-class RecordingFrames:
+class RecordingFrameDecoder:
     """Gives frames of recordings as JPEG."""
 
     def __init__(self, settings: Settings):

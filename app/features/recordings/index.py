@@ -29,7 +29,7 @@ from app.media.frames import make_picture_error
 from app.progress import ReportProgress
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
 from app.video.indexing import index_recording
-from app.video.shots import find_shots_of_indexed
+from app.video.shots import find_shots_of_indexed_recording
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
 
 LIMITS = WorkerLimits(memory=1536 * 2**20, processor=6 * 3600.0, silence=600.0)
@@ -140,7 +140,7 @@ def _detect_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[st
     def send_progress(done: int, total: int | None = None, sentence: str = "") -> None:
         send((done, total, sentence))
 
-    found = find_shots_of_indexed(path, index, send_progress).shots
+    found = find_shots_of_indexed_recording(path, index, send_progress).shots
     return [
         {
             "first": one.first,
@@ -179,7 +179,7 @@ def _missing_index_error() -> ConflictError:
     return ConflictError("the index of this recording cannot be read", hint="Index it again.")
 
 
-def has_index(store: Store, recording: Recording) -> bool:
+def has_usable_index(store: Store, recording: Recording) -> bool:
     """Whether the index of a recording fits its file, and this version can read it."""
     try:
         read_index_seconds(index_file_path(store.settings, recording.require_readable()))

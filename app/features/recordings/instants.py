@@ -20,7 +20,7 @@ from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.imports.ingest import BATCH, ImportOrigin, IngestReport, import_group_batch
+from app.features.imports.ingest import BATCH, ImportContext, IngestReport, import_group_chunk
 from app.features.recordings.cameras import SOURCE, read_cameras_of_frames
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import find_linked_frames
@@ -154,7 +154,7 @@ def make_groups_of_instants(
     replays = _find_linked_views(store, recording, numbers, there) if linked else _LinkedViews()
     wanted = [number for number in numbers if number not in there or number in replays.of]
     index = read_index(store.settings, recording.require_readable())
-    origin, report = ImportOrigin(recording.dataset_id, recording.name, actor), IngestReport()
+    origin, report = ImportContext(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
     tracked = read_cameras_of_frames(store, recording, wanted)
@@ -162,7 +162,7 @@ def make_groups_of_instants(
     groups = _build_groups(store, live, replays.of, there)
     while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
-            import_group_batch(session, origin, batch, report, set())
+            import_group_chunk(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]

@@ -23,7 +23,7 @@ from app.features.jobs.job_run import JobProgress, leave_work_to_next_server
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
-from app.features.recordings.index import has_index, index_recording_in_worker
+from app.features.recordings.index import has_usable_index, index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants, validate_instant_frames
 from app.features.recordings.service import (
     Recording,
@@ -107,19 +107,23 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
     name = recording.name
     progress(0, None, f"Reading {name}.")
 
-    def report_index_step(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_instants_taken(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
     with leave_work_to_next_server(progress):
-        if progress.job.request["shots"] and has_index(store, recording):
+        if progress.job.request["shots"] and has_usable_index(store, recording):
             actor = progress.job.actor
             detect_shots_again(
-                store, recording_id, actor=actor, progress=report_index_step, stop=progress.check
+                store,
+                recording_id,
+                actor=actor,
+                progress=report_instants_taken,
+                stop=progress.check,
             )
             found = get_recording(store, recording_id)
         else:
             found = index_recording_in_worker(
-                store, recording_id, progress=report_index_step, stop=progress.check
+                store, recording_id, progress=report_instants_taken, stop=progress.check
             )
     return {
         "recording": found.id,
@@ -183,7 +187,7 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     asked, actor = progress.job.request, progress.job.actor
     recording = get_recording(store, asked["recording"])
 
-    def report_index_step(done: int, total: int | None = None, _: str = "") -> None:
+    def report_instants_taken(done: int, total: int | None = None, _: str = "") -> None:
         progress(done, total, f"{plural(done, 'instant')} of {recording.name} taken.")
 
     with leave_work_to_next_server(progress):
@@ -194,7 +198,7 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
             linked=asked.get("linked", False),
             dry_run=asked.get("dry_run", False),
             actor=actor,
-            progress=report_index_step,
+            progress=report_instants_taken,
             stop=progress.check,
         )
     solve = proposals = None
@@ -246,7 +250,7 @@ def make_groups_in_worker(
     return asdict(taken)
 
 
-def resume_recording_jobs(jobs: Jobs, store: Store) -> None:
+def register_recording_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on; what is done stays as it is."""
     jobs.register_resume(INDEX, partial(run_index_job, store))
     jobs.register_resume(INSTANTS, partial(run_instants_job, jobs, store))

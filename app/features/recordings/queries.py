@@ -132,7 +132,7 @@ def delete_recording(session: Session, recording_id: int) -> None:
     session.execute(delete(RecordingModel).where(RecordingModel.id == recording_id))
 
 
-class FrameView(NamedTuple):
+class ViewShowingFrame(NamedTuple):
     """A view that shows a frame of a recording: number of the frame, id of its group, and its key."""
 
     number: int
@@ -150,7 +150,7 @@ def list_tracked_stretches(session: Session, recording_id: int) -> Sequence[Any]
     return session.execute(statement.order_by(model.first)).all()
 
 
-def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[FrameView]:
+def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[ViewShowingFrame]:
     """The views of a dataset that show a frame of a video, in any group: their pictures are kept below its sha256."""
     kept = ViewModel.media_path
     statement = (
@@ -164,7 +164,7 @@ def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[
     for path, group, key, has_lines in session.execute(statement):
         number = PurePath(path or "").stem
         if number.isascii() and number.isdigit():
-            found.append(FrameView(int(number), group, key, has_lines))
+            found.append(ViewShowingFrame(int(number), group, key, has_lines))
     return found
 
 
@@ -227,7 +227,9 @@ def delete_ball_run(session: Session, run_id: int) -> None:
     session.execute(delete(BallRunModel).where(BallRunModel.id == run_id))
 
 
-def read_predicted_boxes(session: Session, views: Sequence[FrameView]) -> dict[int, list[Any]]:
+def read_predicted_boxes(
+    session: Session, views: Sequence[ViewShowingFrame]
+) -> dict[int, list[Any]]:
     """Boxes that detectors predicted in views, by number of the frame that a view shows."""
     numbers = {(view.group, view.key): view.number for view in views}
     model = PredictionModel

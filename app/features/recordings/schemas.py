@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.imports.schemas import ImportPlace
+from app.features.imports.schemas import UploadOrFolder
 from app.features.recordings.instants import MOST_AT_ONCE
 from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClockReading
 from app.features.recordings.shots import MAX_SHOTS, RecordingShots, Shot
@@ -31,7 +31,7 @@ class NewRecording(BaseModel):
     dataset: Annotated[str, Field(min_length=1, max_length=200)] = Field(
         description="Name; a dataset is made where there is none of that name."
     )
-    source: ImportPlace
+    source: UploadOrFolder
 
 
 class RecordingDocument(Document):

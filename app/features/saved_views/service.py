@@ -8,7 +8,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import strip_and_check_title
-from app.features.people.visibility_queries import sees_all_work
+from app.features.people.visibility_queries import sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
 from app.features.queue.queries import GroupListing
 from app.features.queue.query import parse_query
@@ -117,7 +117,7 @@ def _read_visible_view(session: Session, view_id: int) -> SavedView:
 
 def _is_visible(row: SavedViewModel) -> bool:
     """Whether whoever asks may know of a view: its number of groups answers its query."""
-    return sees_all_work(row.dataset_id) or not query_reveals_hidden_work(row.query)
+    return sees_independent_work(row.dataset_id) or not query_reveals_hidden_work(row.query)
 
 
 def _count_matching_groups(session: Session, row: SavedViewModel) -> int:

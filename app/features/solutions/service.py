@@ -52,7 +52,7 @@ from app.solving.solve import (
     differs_only_in_smaller_tau,
     has_unchanged_pairs,
     rethreshold_solution,
-    solve_with_facts,
+    solve_and_collect_facts,
 )
 from app.wording import plural
 from app.workers.executors import run_tasks
@@ -132,7 +132,7 @@ def solve_and_encode(
     group: Group, policy: Policy, known: Mapping[str, Calibration]
 ) -> tuple[Solution, EncodedSolution]:
     """The solution of a group, and its bytes; calibrations that are known are not encoded again."""
-    solution, facts = solve_with_facts(group, policy, known)
+    solution, facts = solve_and_collect_facts(group, policy, known)
     return solution, encode_solution(group, solution, known, facts_to_bytes(facts))
 
 

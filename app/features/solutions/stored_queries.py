@@ -144,7 +144,7 @@ _SOLUTIONS = (
 )
 
 
-def iterate_solution_batches(session: Session) -> Iterator[Sequence[Any]]:
+def iterate_solution_row_chunks(session: Session) -> Iterator[Sequence[Any]]:
     """Rows of every solution of this solver, each with its dataset's policy and whether it is the
     one that fits its group as it is (``current``)."""
     after = 0

@@ -11,14 +11,14 @@ from pydantic import BaseModel, Field
 
 from app.db.idempotency import without_pending_response
 from app.errors import NotFoundError
-from app.features.groups.edit import SetStationCalibration, SetStationLines
+from app.features.groups.edit import SetStationCalibrationSource, SetStationLines
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
 from app.features.groups.schemas import (
     DatasetReference,
     GroupDocument,
     LineDocuments,
     LinesEdit,
-    StationCalibrationEdit,
+    StationCalibrationSourceEdit,
     lines_to_document,
     make_group_response,
 )
@@ -150,14 +150,14 @@ def patch_lines(
 @respond_with(make_group_response)
 def patch_station(
     station: Id,
-    change: StationCalibrationEdit,
+    change: StationCalibrationSourceEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
     group: GroupOfStation = None,
 ) -> GroupState:
     """Choose whether the given calibration counts or the lines; If-Match as for lines."""
-    edited = partial(submit_station_edit, edit=SetStationCalibration(change.calibration))
+    edited = partial(submit_station_edit, edit=SetStationCalibrationSource(change.calibration))
     return _change_station(services, station, group, edited, if_match, actor)
 
 

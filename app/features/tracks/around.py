@@ -17,15 +17,18 @@ from app.features.tracks.codec import TrackInputs, make_partial_track
 from app.features.tracks.findings import map_groups_by_frame
 from app.features.tracks.making import read_export_records
 from app.features.tracks.queries import (
-    TrackGroup,
-    find_group_location,
+    GroupForTracking,
+    find_dataset_match_and_key,
     find_track_row,
     list_group_keys_of_match,
     list_track_rows,
     read_group_states_by_match,
     read_groups_by_match,
 )
-from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
+from app.features.tracks.run_measurements import (
+    collect_accepted_run_observations,
+    list_accepted_runs,
+)
 from app.features.tracks.service import TrackedFrames
 from app.features.tracks.stored import (
     Track,
@@ -66,7 +69,7 @@ def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        place = find_group_location(session, group_id)
+        place = find_dataset_match_and_key(session, group_id)
         if place is None:
             raise NotFoundError.group(group_id)
         frame = parse_frame_number(place.key)
@@ -79,7 +82,7 @@ def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
             return []
         head = read_dataset_head(session, place.dataset_id)
         groups = read_group_states_by_match(session, head.id, [place.match]).get(place.match, [])
-        runs = list_followed_runs(session, head.id).get(place.match, ())
+        runs = list_accepted_runs(session, head.id).get(place.match, ())
         return [
             TrackOfGroup(build_track_from_row(row, head.policy, groups, runs), frame)
             for row in rows
@@ -132,11 +135,11 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
         groups = read_groups_by_match(session, head.id, [row.match], ids).get(row.match, [])
         near = map_groups_by_frame(groups, first, last)
         records = _read_cached_records(session, list(near.values()), head.policy.hash)
-        runs = list_followed_runs(session, head.id).get(row.match, [])
+        runs = list_accepted_runs(session, head.id).get(row.match, [])
         close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
         followed = {
             match: [one for one in items if first <= one.frame <= last]
-            for match, items in collect_followed_observations(
+            for match, items in collect_accepted_run_observations(
                 session, store.settings, close, head.policy
             ).items()
         }
@@ -153,7 +156,7 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
 
 
 def _read_cached_records(
-    session: Session, groups: Sequence[TrackGroup], policy: str
+    session: Session, groups: Sequence[GroupForTracking], policy: str
 ) -> list[ExportRecord]:
     """Groups with their solutions; those that were read before for a frame near by are not read again."""
     key_of = {group.key: (group.id, group.source, group.state, policy) for group in groups}

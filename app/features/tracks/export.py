@@ -17,7 +17,7 @@ from app.features.tracks.codec import (
     make_track,
     track_from_json,
 )
-from app.features.tracks.run_measurements import FollowedObservation
+from app.features.tracks.run_measurements import AcceptedRunObservation
 from app.features.tracks.stretches import (
     RATE,
     Shots,
@@ -82,7 +82,7 @@ class TrackSource:
     everything: bool = False
     try_only: bool = False
     facts: list[dict[str, Any]] = field(default_factory=list)
-    followed: Mapping[str, Sequence[FollowedObservation]] = field(default_factory=dict)
+    followed: Mapping[str, Sequence[AcceptedRunObservation]] = field(default_factory=dict)
 
     def make_track_records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
         """The tracks of groups, in the order of their keys.

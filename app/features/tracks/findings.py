@@ -22,7 +22,7 @@ from app.features.tracks.codec import (
     track_from_json,
 )
 from app.features.tracks.queries import (
-    TrackGroup,
+    GroupForTracking,
     list_track_rows,
     read_groups_by_match,
     read_track_bodies,
@@ -110,7 +110,7 @@ def refresh_track_notices(store: Store, dataset_id: int, matches: Collection[str
 def make_track_notices(
     session: Session,
     match: str,
-    groups: Mapping[int, TrackGroup],
+    groups: Mapping[int, GroupForTracking],
     track: tuple[BallTrack, TrackInputs] | None,
 ) -> TrackNotices:
     """What one track says of its groups.
@@ -160,8 +160,8 @@ def _read_notices(session: Session, dataset_id: int, matches: Collection[str]) -
 
 
 def map_groups_by_frame(
-    groups: Iterable[TrackGroup], first: int, last: int
-) -> dict[int, TrackGroup]:
+    groups: Iterable[GroupForTracking], first: int, last: int
+) -> dict[int, GroupForTracking]:
     """The group of each frame of a stretch that has one."""
     numbered = ((parse_frame_number(group.key), group) for group in groups)
     return {
@@ -175,7 +175,7 @@ def _count_contradicted(row: Any) -> int:
 
 
 def _make_ball_notices(
-    session: Session, beside: Sequence[ContradictingBall], groups: Mapping[int, TrackGroup]
+    session: Session, beside: Sequence[ContradictingBall], groups: Mapping[int, GroupForTracking]
 ) -> list[UnexplainedBall]:
     ids = sorted({groups[item.frame].id for item in beside if item.frame in groups})
     stored: dict[int, StoredGroup] = {}

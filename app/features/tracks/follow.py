@@ -21,12 +21,12 @@ from app.features.groups.state import GroupState, read_etags, read_states
 from app.features.groups.view_queries import StoredView, find_view, list_views_of_camera
 from app.features.people.visibility_queries import COPIES
 from app.features.recordings.follow import BallFollower
-from app.features.tracks.queries import find_group_location
+from app.features.tracks.queries import find_dataset_match_and_key
 from app.features.tracks.stretches import UNSURE, parse_frame_number
 from app.geometry.camera import Camera
-from app.media.camera_frames import CameraFrames, Image, ViewFrame, map_frames_by_number
+from app.media.camera_frames import CameraFrameReader, Image, ViewFrame, map_frames_by_number
 from app.media.frames import make_picture_error
-from app.soccer.annotation import BallAnnotation, make_followed_source
+from app.soccer.annotation import BallAnnotation, format_followed_from_group
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Media
 from app.soccer.solution import ViewSolution
@@ -429,7 +429,7 @@ class FollowedEditCounts:
 
 def accept_followed_balls(store: Store, found: FollowedViews, *, actor: str) -> FollowedEditCounts:
     """Make the followed balls that are not uncertain those of their views."""
-    source = make_followed_source(found.group)
+    source = format_followed_from_group(found.group)
 
     def make_view_edits(one: FollowedView) -> ViewEdits:
         annotation = BallAnnotation(box=one.ball.box, predicted_by=source)
@@ -449,7 +449,7 @@ def remove_followed_balls(store: Store, view_id: int, *, actor: str) -> Followed
     """
     with store.read() as session:
         view, dataset = _require_view(session, view_id)
-        source = make_followed_source(view.group)
+        source = format_followed_from_group(view.group)
         others = list_views_of_camera(session, dataset, view.match, view.station_id)
         mine = [one for one in others if [ball.predicted_by for ball in one.balls] == [source]]
         etags = read_etags(session, [one.group_id for one in mine])
@@ -475,7 +475,7 @@ def _require_view(session: Session, view_id: int) -> tuple[StoredView, int]:
     view = find_view(session, view_id)
     if view is None:
         raise NotFoundError(f"there is no view {view_id}")
-    place = find_group_location(session, view.group_id)
+    place = find_dataset_match_and_key(session, view.group_id)
     assert place is not None
     return view, int(place.dataset_id)
 
@@ -485,7 +485,7 @@ def follow_ball_in_sequence(
 ) -> FollowedSequence:
     """The work of the process."""
     media = map_frames_by_number(asked.views, settings)
-    frames = CameraFrames(media, flipped, asked.size, settings)
+    frames = CameraFrameReader(media, flipped, asked.size, settings)
     click = asked.click
     _require_near_frame(media, click.frame)
     numbers = _fill_frame_gaps(sorted(media))

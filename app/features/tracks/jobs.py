@@ -10,7 +10,7 @@ from app.db.database_worker import ServerProxy
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.jobs.job_run import JobProgress, make_counts_reporter, run_job_in_worker
-from app.features.match_estimates.jobs import MatchJob, MatchJobContext
+from app.features.match_estimates.jobs import MatchJobContext, MatchJobType
 from app.features.tracks.service import make_tracks
 
 
@@ -41,4 +41,4 @@ def _run_track_job(call: MatchJobContext, progress: JobProgress) -> Json:
     )
 
 
-TRACKS = MatchJob("ball", "Track the ball of {}", _run_track_job)
+TRACKS = MatchJobType("ball", "Track the ball of {}", _run_track_job)

@@ -43,7 +43,7 @@ from app.features.recordings.links import (
     save_link_time_map,
 )
 from app.features.recordings.service import Recording, find_group_ids_by_frame, get_recording
-from app.features.tracks.service import list_tracks, read_track
+from app.features.tracks.service import list_tracks, read_track_detail
 from app.formats.report import ReaderReport
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
@@ -145,7 +145,7 @@ def run_link_by_ball_job(store: Store, progress: JobProgress) -> Json:
     return asdict(found)
 
 
-def resume_link_by_ball_jobs(jobs: Jobs, store: Store) -> None:
+def register_link_by_ball_jobs(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at begin again."""
     jobs.register_resume(KIND, partial(run_link_by_ball_job, store))
 
@@ -272,7 +272,7 @@ def read_tracked_ball_positions(
         if track.match != recording.name or not overlaps or track.stale or track.summary.reason:
             continue
         try:
-            detail = read_track(store, track.id)
+            detail = read_track_detail(store, track.id)
         except NotFoundError:
             # Deleted since it was listed.
             continue

@@ -27,7 +27,7 @@ from app.features.tracks.codec import (
 )
 from app.features.tracks.findings import TRIES, refresh_track_notices
 from app.features.tracks.queries import (
-    TrackGroup,
+    GroupForTracking,
     delete_tracks,
     find_track_row,
     insert_track,
@@ -37,7 +37,10 @@ from app.features.tracks.queries import (
     read_track_bodies,
     update_track,
 )
-from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
+from app.features.tracks.run_measurements import (
+    collect_accepted_run_observations,
+    list_accepted_runs,
+)
 from app.features.tracks.stored import (
     UNJUDGED,
     TrackSummary,
@@ -96,8 +99,8 @@ def make_tracks(
         found = read_dataset_head(session, dataset)
         shots = read_recording_shots(session, found.id)
         groups = read_groups_by_match(session, found.id, matches)
-        runs = list_followed_runs(session, found.id)
-        followed = collect_followed_observations(
+        runs = list_accepted_runs(session, found.id)
+        followed = collect_accepted_run_observations(
             session,
             store.settings,
             {match: items for match, items in runs.items() if match in groups},
@@ -133,7 +136,9 @@ def make_tracks(
     return made
 
 
-def read_export_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+def read_export_records(
+    session: Session, groups: Sequence[GroupForTracking]
+) -> Iterator[ExportRecord]:
     """Groups with their solutions; those that people rejected measure nothing."""
     ids = [group.id for group in groups if not group.rejected]
     for start in range(0, len(ids), BATCH):
@@ -144,7 +149,7 @@ def read_export_records(session: Session, groups: Sequence[TrackGroup]) -> Itera
             yield ExportRecord(one.group, solutions.get(one.id))
 
 
-def _has_frame_times(session: Session, groups: Sequence[TrackGroup]) -> bool:
+def _has_frame_times(session: Session, groups: Sequence[GroupForTracking]) -> bool:
     """Whether a match's groups follow each other in time, by the first of them."""
     first = next(iter(read_export_records(session, groups[:1])), None)
     return first is None or find_group_instant(first.group) is not None

@@ -19,7 +19,7 @@ from app.features.tracks.tables import TrackModel
 _LARGE = ("inputs", "body", "patches")
 
 
-class TrackGroupState(NamedTuple):
+class GroupStateForTracking(NamedTuple):
     """A group as far as a track depends on it, of which there are thousands."""
 
     key: str
@@ -27,7 +27,7 @@ class TrackGroupState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TrackGroup:
+class GroupForTracking:
     """A group as far as its stretch asks.
 
     Attributes:
@@ -94,7 +94,7 @@ def list_accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def find_group_location(session: Session, group_id: int) -> Any | None:
+def find_dataset_match_and_key(session: Session, group_id: int) -> Any | None:
     """Dataset, match and key of a group; None where there is none."""
     columns = GroupModel.dataset_id, GroupModel.match, GroupModel.key
     return session.execute(select(*columns).where(GroupModel.id == group_id)).one_or_none()
@@ -163,7 +163,7 @@ def list_group_keys_of_match(session: Session, dataset_id: int, match: str) -> S
 
 def read_group_states_by_match(
     session: Session, dataset_id: int, matches: Collection[str]
-) -> dict[str, list[TrackGroupState]]:
+) -> dict[str, list[GroupStateForTracking]]:
     """What tracks of matches depend on, as ``read_groups_by_match`` has it, and nothing else: a third of its work."""
     statement = (
         select(
@@ -177,9 +177,9 @@ def read_group_states_by_match(
         .where(GroupModel.dataset_id == dataset_id, GroupModel.match.in_(list(matches)))
         .order_by(GroupModel.number)
     )
-    found: dict[str, list[TrackGroupState]] = {}
+    found: dict[str, list[GroupStateForTracking]] = {}
     for match, key, inputs, solved, status in session.execute(statement):
-        state = TrackGroupState(key, (inputs, bool(solved), status == "rejected"))
+        state = GroupStateForTracking(key, (inputs, bool(solved), status == "rejected"))
         found.setdefault(match, []).append(state)
     return found
 
@@ -189,7 +189,7 @@ def read_groups_by_match(
     dataset_id: int,
     matches: Collection[str] | None = None,
     ids: Collection[int] | None = None,
-) -> dict[str, list[TrackGroup]]:
+) -> dict[str, list[GroupForTracking]]:
     """The groups of matches, or of all, by match, in the order of the dataset; of those with some ids alone."""
     queue = QueueModel
     statement = (
@@ -205,7 +205,7 @@ def read_groups_by_match(
         statement = statement.where(GroupModel.match.in_(list(matches)))
     if ids is not None:
         statement = statement.where(GroupModel.id.in_(list(ids)))
-    found: dict[str, list[TrackGroup]] = {}
+    found: dict[str, list[GroupForTracking]] = {}
     for row in session.execute(statement):
         place = None
         if row.x_m is not None and row.y_m is not None and row.height_m is not None:
@@ -213,6 +213,6 @@ def read_groups_by_match(
         rejected = row.status == "rejected"
         state = row.inputs_hash, bool(row.solved), rejected
         source = row.source_hash, row.revision
-        group = TrackGroup(row.id, row.key, state, rejected, place, source)
+        group = GroupForTracking(row.id, row.key, state, rejected, place, source)
         found.setdefault(row.match, []).append(group)
     return found

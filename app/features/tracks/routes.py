@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
-from app.features.match_estimates.routes import MatchRequest
+from app.features.match_estimates.routes import MatchSelection
 from app.features.tracks import service as tracks
 from app.features.tracks.around import compute_track_excerpt, find_tracks_of_group
 from app.features.tracks.jobs import TRACKS
@@ -79,7 +79,7 @@ def list_tracks(
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def make_tracks(
-    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Track the ball over the stretches of a match, or of all: static rigs, and shots of recordings.
 
@@ -117,7 +117,7 @@ def get_track_frames(
     ] = None,
 ) -> TrackFrames:
     """The frames of a track in columns, with its events and with the balls that contradict it."""
-    detail = tracks.read_track(store, track)
+    detail = tracks.read_track_detail(store, track)
     start = max(first, detail.track.first)
     end = min(detail.track.last if last is None else last, start + MOST_FRAMES - 1)
     found = TrackFrames.of(detail, start, end)

@@ -39,7 +39,7 @@ from app.tracking.track import FrameCamera
 
 
 @dataclass(frozen=True)
-class FollowedRun:
+class AcceptedRun:
     """An accepted run that shows the ball of a match.
 
     Attributes:
@@ -61,7 +61,7 @@ class FollowedRun:
 
 
 @dataclass(frozen=True)
-class FollowedObservation:
+class AcceptedRunObservation:
     """A ball of an accepted run.
 
     Attributes:
@@ -84,7 +84,7 @@ def format_linked_view_name(recording: str, link: int) -> str:
     return f"{recording} link {link}"
 
 
-def list_followed_runs(session: Session, dataset_id: int) -> dict[str, list[FollowedRun]]:
+def list_accepted_runs(session: Session, dataset_id: int) -> dict[str, list[AcceptedRun]]:
     """The accepted runs of a dataset by the match whose ball they show: recordings name their matches."""
     rows = list_accepted_run_rows(session, dataset_id)
     shots = read_recording_shots(session, dataset_id) if rows else {}
@@ -96,7 +96,7 @@ def list_followed_runs(session: Session, dataset_id: int) -> dict[str, list[Foll
         number: [row for row in list_link_rows(session, number) if row.replay_id == number]
         for number in cameras
     }
-    found: dict[str, list[FollowedRun]] = {}
+    found: dict[str, list[AcceptedRun]] = {}
     for row in rows:
         stretches = cameras[row.recording_id]
         mine = tuple(one for one in stretches if one[1] <= row.last and row.first <= one[2])
@@ -105,29 +105,29 @@ def list_followed_runs(session: Session, dataset_id: int) -> dict[str, list[Foll
         said = (row.id, row.revision, *(digest for digest, *_ in mine))
         inside = (shot for shot in shots.get(row.name, ()) if shot[0] <= row.first <= shot[1])
         first, last = next(inside, (row.first, row.last))
-        live = FollowedRun(first, last, said, row, None, None, mine)
+        live = AcceptedRun(first, last, said, row, None, None, mine)
         found.setdefault(row.name, []).append(live)
         for other in links[row.recording_id]:
             link = build_link_from_row(other)
             overlaps = row.first <= link.replay.last and link.replay.first <= row.last
             if overlaps and link.map.outcome == "linked":
                 ends, state = (link.live.first, link.live.last), (*said, link.id, link.etag)
-                again = FollowedRun(*ends, state, row, link, other, mine)
+                again = AcceptedRun(*ends, state, row, link, other, mine)
                 found.setdefault(link.live.name, []).append(again)
     return found
 
 
-def list_run_states(runs: Sequence[FollowedRun], first: int, last: int) -> list[list[Any]]:
+def list_run_states(runs: Sequence[AcceptedRun], first: int, last: int) -> list[list[Any]]:
     """What a track from one frame to another depends on of runs: those of its shot."""
     return [list(run.state) for run in runs if run.first <= last and first <= run.last]
 
 
-def collect_followed_observations(
+def collect_accepted_run_observations(
     session: Session,
     settings: Settings,
-    runs: Mapping[str, Sequence[FollowedRun]],
+    runs: Mapping[str, Sequence[AcceptedRun]],
     policy: Policy,
-) -> dict[str, list[FollowedObservation]]:
+) -> dict[str, list[AcceptedRunObservation]]:
     """The balls of accepted runs in frames that no group has, by match, each frame of a view once.
 
     Args:
@@ -137,7 +137,7 @@ def collect_followed_observations(
         policy: Says how noisy clicks are.
     """
     grouped: dict[str, set[int]] = {}
-    found: dict[str, list[FollowedObservation]] = {}
+    found: dict[str, list[AcceptedRunObservation]] = {}
     for match, items in runs.items():
         seen: set[tuple[str, int]] = set()
         for run in items:
@@ -163,11 +163,11 @@ def _list_stretch_cameras(session: Session, recording_id: int) -> list[tuple[str
 
 def _iterate_observations(
     settings: Settings,
-    run: FollowedRun,
+    run: AcceptedRun,
     trusted: Mapping[int, FollowedBall],
     grouped: set[int],
     policy: Policy,
-) -> Iterator[tuple[int, FollowedObservation]]:
+) -> Iterator[tuple[int, AcceptedRunObservation]]:
     """The balls of a run in frames of its recording that no group has."""
     link, row = run.link, run.row
     numbers = range(run.first, run.last + 1) if link is None else link.replay.frames
@@ -207,7 +207,7 @@ def _iterate_observations(
             continue
         ball = _make_observation(view, balls[number], frame, policy)
         at = float(of_shot[near])
-        yield number, FollowedObservation(run.first + near, at, time, view, ball)
+        yield number, AcceptedRunObservation(run.first + near, at, time, view, ball)
 
 
 def _make_observation(

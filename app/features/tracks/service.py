@@ -36,8 +36,8 @@ from app.features.tracks.findings import (
 from app.features.tracks.making import MadeTracks as MadeTracks
 from app.features.tracks.making import make_tracks as make_tracks
 from app.features.tracks.queries import (
+    GroupForTracking,
     TrackBody,
-    TrackGroup,
     find_track_row,
     list_track_rows,
     read_group_states_by_match,
@@ -46,7 +46,10 @@ from app.features.tracks.queries import (
     read_track_bodies,
     update_track,
 )
-from app.features.tracks.run_measurements import collect_followed_observations, list_followed_runs
+from app.features.tracks.run_measurements import (
+    collect_accepted_run_observations,
+    list_accepted_runs,
+)
 from app.features.tracks.stored import (
     UNJUDGED,
     build_track_from_row,
@@ -78,7 +81,7 @@ class TrackedFrames:
     etag: str
     ball: BallTrack
     inputs: TrackInputs
-    groups: Mapping[int, TrackGroup]
+    groups: Mapping[int, GroupForTracking]
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def list_tracks(store: Store, dataset: str | int) -> list[Track]:
             if rows
             else {}
         )
-        runs = list_followed_runs(session, found.id) if rows else {}
+        runs = list_accepted_runs(session, found.id) if rows else {}
         return [
             build_track_from_row(
                 row, found.policy, groups.get(row.match, ()), runs.get(row.match, ())
@@ -132,7 +135,7 @@ def get_track(store: Store, track_id: int) -> Track:
         return _read_track_and_groups(session, track_id)[0]
 
 
-def read_track(store: Store, track_id: int) -> TrackDetail:
+def read_track_detail(store: Store, track_id: int) -> TrackDetail:
     """A track with its frames.
 
     Raises:
@@ -221,7 +224,7 @@ def collect_accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str,
     groups = (
         read_group_states_by_match(session, dataset.id, {row.match for row in rows}) if rows else {}
     )
-    runs = list_followed_runs(session, dataset.id) if rows else {}
+    runs = list_accepted_runs(session, dataset.id) if rows else {}
     found = {}
     for row in rows:
         of_match = groups.get(row.match, ()), runs.get(row.match, ())
@@ -268,19 +271,19 @@ def make_track_source(
         track = None if body is None else _build_ball_track(body, said)[1]
         place = row.key, row.match, row.first, row.last
         known.append(StoredStretchTrack(*place, row.digest, track, row.verdict, said))
-    followed = collect_followed_observations(
-        session, settings, list_followed_runs(session, dataset_id), policy
+    followed = collect_accepted_run_observations(
+        session, settings, list_accepted_runs(session, dataset_id), policy
     )
     return TrackSource(dataset, policy, shots, known, followed=followed)
 
 
-def _read_track_and_groups(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
+def _read_track_and_groups(session: Session, track_id: int) -> tuple[Track, list[GroupForTracking]]:
     row = find_track_row(session, track_id)
     if row is None:
         raise NotFoundError(f"there is no track {track_id}")
     found = read_dataset_head(session, int(row.dataset_id))
     groups = read_groups_by_match(session, found.id, [row.match]).get(row.match, [])
-    runs = list_followed_runs(session, found.id).get(row.match, ())
+    runs = list_accepted_runs(session, found.id).get(row.match, ())
     return build_track_from_row(row, found.policy, groups, runs), groups
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
-from app.features.tracks.queries import TrackGroup, TrackGroupState
-from app.features.tracks.run_measurements import FollowedRun, list_run_states
+from app.features.tracks.queries import GroupForTracking, GroupStateForTracking
+from app.features.tracks.run_measurements import AcceptedRun, list_run_states
 from app.features.tracks.stretches import StoredStretch, parse_frame_number
 from app.soccer.codec import digest_json
 from app.soccer.policy import Policy
@@ -123,8 +123,8 @@ def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
 def build_track_from_row(
     row: Any,
     policy: Policy,
-    groups: Iterable[TrackGroup | TrackGroupState],
-    runs: Sequence[FollowedRun] = (),
+    groups: Iterable[GroupForTracking | GroupStateForTracking],
+    runs: Sequence[AcceptedRun] = (),
 ) -> Track:
     """A row of the table without what is large, with the groups and accepted ball runs of its match."""
     return Track(
@@ -168,9 +168,9 @@ def parse_corrections(row: Any) -> tuple[EventCorrection, ...]:
 
 def compute_track_stamp(
     policy: Policy,
-    groups: Iterable[TrackGroup | TrackGroupState],
+    groups: Iterable[GroupForTracking | GroupStateForTracking],
     place: StoredStretch,
-    runs: Sequence[FollowedRun] = (),
+    runs: Sequence[AcceptedRun] = (),
 ) -> str:
     """A digest of what a stretch's track depends on, without computing it.
 

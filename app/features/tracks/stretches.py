@@ -16,14 +16,14 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from app.errors import InputError
-from app.features.tracks.run_measurements import FollowedObservation, format_linked_view_name
+from app.features.tracks.run_measurements import AcceptedRunObservation, format_linked_view_name
 from app.formats.export_record import ExportRecord
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.solving.ball_covariance import ray_covariances
+from app.solving.ball_covariance import observation_pixel_covariances
 from app.solving.triangulate import BallObservation, collect_clicked_balls
 from app.tracking.ball_track import BallMeasurements
 
@@ -153,7 +153,7 @@ class _GroupMeasurements:
 
 
 @dataclass
-class _MatchRows:
+class _MatchMeasurements:
     recorded: bool
     rows: list[_GroupMeasurements] = field(default_factory=list)
 
@@ -162,7 +162,7 @@ def gather_stretches(
     records: Iterable[ExportRecord],
     policy: Policy,
     shots: Shots | None = None,
-    followed: Mapping[str, Sequence[FollowedObservation]] | None = None,
+    followed: Mapping[str, Sequence[AcceptedRunObservation]] | None = None,
 ) -> list[Stretch]:
     """The stretches of groups, by match and time; groups that say no time are in none.
 
@@ -173,21 +173,21 @@ def gather_stretches(
         followed: Balls of accepted runs in frames that are of no group, by match: of the frames of a stretch,
             and beyond its groups of those of its shot.
     """
-    matches: dict[str, _MatchRows] = {}
+    matches: dict[str, _MatchMeasurements] = {}
     known: dict[bytes, Camera] = {}
     for record in records:
         found = find_group_instant(record.group)
         if found is None:
             continue
         instant, recorded = found
-        match = matches.setdefault(record.group.match, _MatchRows(recorded))
+        match = matches.setdefault(record.group.match, _MatchMeasurements(recorded))
         match.rows.append(_measure_group(record, instant, known))
     stretches = []
     for name, match in sorted(matches.items()):
         match.rows.sort(key=lambda row: row.instant.frame)
         of_match = (shots or {}).get(name)
         for rows in _split_into_stretches(match, of_match):
-            key, beside = name, list[FollowedObservation]()
+            key, beside = name, list[AcceptedRunObservation]()
             if match.recorded:
                 first, last = rows[0].instant.frame, rows[-1].instant.frame
                 first, last = _find_shot_at_frame(first, of_match) or (first, last)
@@ -304,7 +304,7 @@ def _camera_to_bytes(camera: Camera) -> bytes:
 
 
 def _split_into_stretches(
-    match: _MatchRows, shots: Sequence[tuple[int, int]] | None
+    match: _MatchMeasurements, shots: Sequence[tuple[int, int]] | None
 ) -> list[list[_GroupMeasurements]]:
     """Rows that belong together: a whole rig, or the shots of a recording."""
     parts: list[list[_GroupMeasurements]] = []
@@ -343,8 +343,8 @@ def _build_stretch(
     key: str,
     name: str,
     rows: Sequence[_GroupMeasurements],
-    beside: Sequence[FollowedObservation],
-    match: _MatchRows,
+    beside: Sequence[AcceptedRunObservation],
+    match: _MatchMeasurements,
     policy: Policy,
 ) -> Stretch:
     shown = {one.frame: one.frame_time for one in beside}
@@ -381,7 +381,7 @@ def _build_stretch(
 
 
 def _build_measurements(
-    rows: Sequence[_GroupMeasurements], beside: Sequence[FollowedObservation], policy: Policy
+    rows: Sequence[_GroupMeasurements], beside: Sequence[AcceptedRunObservation], policy: Policy
 ) -> BallMeasurements:
     found = [
         (row.instant.frame, name, time, item, row.point)
@@ -395,7 +395,11 @@ def _build_measurements(
     found, rays = [found[row] for row in good], rays[good]
     observations = [item for *_, item, _ in found]
     points = _estimate_ball_positions(observations, rays, [place for *_, place in found])
-    spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
+    spread = (
+        observation_pixel_covariances(observations, points, policy)
+        if found
+        else np.zeros((0, 2, 2))
+    )
     sizes = np.array([item.diameter_px or np.nan for item in observations])
     share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
     return BallMeasurements(

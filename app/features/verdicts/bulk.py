@@ -18,7 +18,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.independent_annotations.queries import list_closed_copies
-from app.features.people.visibility_queries import COPIES, sees_all_work
+from app.features.people.visibility_queries import COPIES, sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
 from app.features.queue.queries import GroupListing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
@@ -29,13 +29,13 @@ from app.features.verdicts.queries import (
     StoredBulkVerdict,
     StoredVerdict,
     append_span,
-    find_batch,
+    find_bulk_verdict,
     find_next_verdict_id,
-    insert_batch,
+    insert_bulk_verdict,
     insert_verdicts_and_end_work,
-    read_batches,
+    read_bulk_verdicts,
     split_spans,
-    update_batch,
+    update_bulk_verdict,
 )
 from app.features.verdicts.service import Verdict, check_verdict
 from app.soccer.finding import makes_ball_unusable
@@ -66,7 +66,7 @@ class RefusedGroups:
 
 
 @dataclass(frozen=True)
-class SampleGroup:
+class AffectedGroup:
     """A group that would change, with the number and label that the queue shows."""
 
     id: int
@@ -88,11 +88,11 @@ class BulkPlan:
     matches: int
     would_change: int
     refused: tuple[RefusedGroups, ...]
-    sample: tuple[SampleGroup, ...]
+    sample: tuple[AffectedGroup, ...]
 
 
 @dataclass(frozen=True)
-class BatchReport:
+class BulkVerdictReport:
     """What a bulk verdict did; ``batch`` is None when there was nothing to do."""
 
     batch: int | None
@@ -126,7 +126,7 @@ def plan_verdicts(
         rows = GroupListing(session, dataset_id, conditions).columns(ASKED, by_number=True)
         sorted_out = select_groups_for_verdict(session, dataset_id, rows, verdict)
     sample = [
-        SampleGroup(row.group_id, row.key, row.number, row.label)
+        AffectedGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
     ]
     return BulkPlan(len(rows), len(sorted_out.change), sorted_out.refused, tuple(sample))
@@ -142,7 +142,7 @@ def give_verdicts(
     *,
     actor: str,
     expected: int | None = None,
-) -> BatchReport:
+) -> BulkVerdictReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
@@ -167,7 +167,7 @@ def give_verdicts(
     """
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
-    run = BatchRun(dataset_id, query, verdict, actor)
+    run = BulkVerdictRun(dataset_id, query, verdict, actor)
     with store.read() as session:
         begun = run.resume(session)
         rows = GroupListing(session, dataset_id, conditions).columns(ASKED, by_number=True)
@@ -176,7 +176,7 @@ def give_verdicts(
         _require_expected_count(found, expected)
         left, refused = found.change, found.refused
         if not left:
-            return BatchReport(None, 0, refused)
+            return BulkVerdictReport(None, 0, refused)
     else:
         left = _filter_remaining_rows(found.change, begun)
         refused = tuple(RefusedGroups(*item) for item in begun["refused"])
@@ -196,7 +196,7 @@ def give_verdicts(
                 run.save_remaining(session, {"after": here, "until": end, "refused": counts})
             else:
                 run.log_completion(session)
-                report = BatchReport(run.batch, run.changed, refused)
+                report = BulkVerdictReport(run.batch, run.changed, refused)
                 session.respond(report)
     return report
 
@@ -221,7 +221,7 @@ def _require_expected_count(found: VerdictSelection, expected: int | None) -> No
         )
 
 
-def list_batches(
+def list_bulk_verdicts(
     store: Store, dataset_id: int, limit: int = 20, before: int | None = None
 ) -> list[StoredBulkVerdict]:
     """The newest bulk verdicts of a dataset, the newest first.
@@ -237,11 +237,11 @@ def list_batches(
     """
     found: list[StoredBulkVerdict] = []
     with store.read() as session:
-        while some := read_batches(session, dataset_id, limit, before):
+        while some := read_bulk_verdicts(session, dataset_id, limit, before):
             found += [
                 one
                 for one in some
-                if sees_all_work(dataset_id) or not query_reveals_hidden_work(one.query)
+                if sees_independent_work(dataset_id) or not query_reveals_hidden_work(one.query)
             ]
             if len(some) < limit or len(found) >= limit:
                 break
@@ -307,7 +307,7 @@ def _has_verdict(row: Any, verdict: Verdict) -> bool:
     return bool(same and verdict.note is None)
 
 
-class BatchRun:
+class BulkVerdictRun:
     """A batch while it is given, chunk by chunk.
 
     Args:
@@ -375,7 +375,7 @@ class BatchRun:
         body |= asdict(self._verdict) | self._again
         entry = NewLogEntry("verdict_batch", self._actor, at, body, self._dataset_id)
         (log_id,) = append_entries(session, [entry])
-        update_batch(session, self.batch, log_id=log_id)
+        update_bulk_verdict(session, self.batch, log_id=log_id)
 
     def _stored_batch(self, session: Session) -> StoredBulkVerdict | None:
         """The batch as it is stored, which others may go on with or take back; None before it is.
@@ -385,7 +385,7 @@ class BatchRun:
         """
         if self.batch is None:
             return None
-        given = find_batch(session, self.batch)
+        given = find_bulk_verdict(session, self.batch)
         if given is None or given.is_taken_back:
             raise ConflictError(
                 "the verdicts of this request were undone meanwhile",
@@ -396,10 +396,12 @@ class BatchRun:
     def _save_batch(self, session: Session, at: str, spans: Spans) -> None:
         values: dict[str, Any] = {"changed": self.changed, "spans": spans}
         if self.batch is not None:
-            update_batch(session, self.batch, **values)
+            update_bulk_verdict(session, self.batch, **values)
             return
         values |= {"dataset_id": self._dataset_id, "at": at, "actor": self._actor}
-        self.batch = insert_batch(session, query=self._query, **asdict(self._verdict), **values)
+        self.batch = insert_bulk_verdict(
+            session, query=self._query, **asdict(self._verdict), **values
+        )
 
 
 def _make_verdicts(

@@ -14,7 +14,7 @@ from app.features.queue.queries import read_columns
 from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.bulk import (
     ASKED,
-    BatchRun,
+    BulkVerdictRun,
     RefusedGroups,
     save_verdicts,
     select_groups_for_verdict,
@@ -25,13 +25,13 @@ from app.features.verdicts.queries import (
     StoredBulkVerdict,
     StoredVerdict,
     append_span,
-    find_batch,
+    find_bulk_verdict,
     find_next_verdict_id,
-    list_groups_judged_between,
-    list_groups_with_newest_verdict_between,
-    read_judged_inputs,
+    list_groups_of_verdict_range,
+    list_groups_with_newest_verdict_in_range,
+    read_judged_inputs_hashes,
     read_verdicts,
-    update_batch,
+    update_bulk_verdict,
 )
 from app.features.verdicts.service import check_verdict
 
@@ -50,7 +50,7 @@ class UndoReport:
     kept: int
 
 
-def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
+def undo_bulk_verdict(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     """Give every group of a batch the verdict back that it had before.
 
     A group that somebody has judged since keeps that verdict.
@@ -60,7 +60,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
         ConflictError: It was taken back before.
     """
     with store.read() as session:
-        before = read_batch(session, batch_id).undo_spans or ()
+        before = read_bulk_verdict(session, batch_id).undo_spans or ()
         restored = _count_groups(session, before)
     known, number = _count_verdicts(before), 0
     while True:
@@ -70,7 +70,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore_chunk(session, batch, *left[0], actor) if left else []
             spans = append_span(batch.undo_spans or (), [item.id for item in verdicts])
-            update_batch(session, batch_id, undo_spans=spans)
+            update_bulk_verdict(session, batch_id, undo_spans=spans)
             restored += len({item.group_id for item in verdicts})
             known += len(verdicts)
             number += 1
@@ -86,7 +86,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
 
 def _count_groups(session: Session, spans: Spans) -> int:
     """Of how many groups these verdicts are."""
-    return len({group for span in spans for group in list_groups_judged_between(session, *span)})
+    return len({group for span in spans for group in list_groups_of_verdict_range(session, *span)})
 
 
 def _count_verdicts(spans: Spans) -> int:
@@ -100,7 +100,7 @@ def _read_active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
         NotFoundError: There is no such batch.
         ConflictError: It was taken back before.
     """
-    batch = read_batch(session, batch_id)
+    batch = read_bulk_verdict(session, batch_id)
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has undone this batch already")
     return batch
@@ -111,18 +111,18 @@ def _mark_batch_taken_back(
 ) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
-    update_batch(session, batch.id, undone=at, undone_by=actor)
+    update_bulk_verdict(session, batch.id, undone=at, undone_by=actor)
     entry = NewLogEntry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
     append_entries(session, [entry])
 
 
-def read_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
+def read_bulk_verdict(session: Session, batch_id: int) -> StoredBulkVerdict:
     """A batch by its id.
 
     Raises:
         NotFoundError: There is no such batch.
     """
-    batch = find_batch(session, batch_id)
+    batch = find_bulk_verdict(session, batch_id)
     if batch is None:
         raise NotFoundError(f"there is no batch of verdicts {batch_id}")
     return batch
@@ -135,7 +135,7 @@ def _restore_chunk(
     at, number = now(), find_next_verdict_id(session)
     again: list[StoredVerdict] = []
     for verdicts in read_verdicts(
-        session, list_groups_judged_between(session, first, last)
+        session, list_groups_of_verdict_range(session, first, last)
     ).values():
         if first <= verdicts[0].id <= last:
             again += _make_restoring_verdicts(verdicts, batch.actor, at)
@@ -180,7 +180,7 @@ class RedoReport:
     refused: tuple[RefusedGroups, ...]
 
 
-def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
+def redo_bulk_verdict(store: Store, batch_id: int, *, actor: str) -> RedoReport:
     """Give the verdicts of a batch again after they were taken back.
 
     A group keeps what it has when somebody judged it after the batch was taken back, or edited
@@ -193,9 +193,9 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
             begun to.
     """
     with store.read() as session:
-        batch = read_batch(session, batch_id)
+        batch = read_bulk_verdict(session, batch_id)
         verdict = check_verdict(batch.state, batch.reason, batch.note)
-        run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
+        run = BulkVerdictRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
         begun = run.resume(session)
     spans = _read_undo_spans(batch) if begun is None else begun["left"]
     refused: Counter[str] = Counter({} if begun is None else begun["refused"])
@@ -210,7 +210,7 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
             run.save_chunk(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
-                update_batch(session, batch_id, redone=run.batch)
+                update_bulk_verdict(session, batch_id, redone=run.batch)
             if number < len(spans):
                 left = [list(span) for span in spans[number:]]
                 run.save_remaining(session, {"left": left, "refused": dict(refused)})
@@ -221,7 +221,9 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
     return report
 
 
-def _redo_report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
+def _redo_report(
+    batch: StoredBulkVerdict, run: BulkVerdictRun, refused: Counter[str]
+) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(RefusedGroups(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
@@ -242,10 +244,10 @@ def _read_undo_spans(batch: StoredBulkVerdict) -> Spans:
 
 def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
     """The batch that gives a batch again and is not complete; None where nobody has begun."""
-    redone = read_batch(session, batch_id).redone
+    redone = read_bulk_verdict(session, batch_id).redone
     if redone is None:
         return None
-    again = read_batch(session, redone)
+    again = read_bulk_verdict(session, redone)
     if again.done or again.is_taken_back:
         raise ConflictError("the verdicts of this batch were redone already")
     if again.actor != actor:
@@ -258,9 +260,9 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
 
 def _list_unchanged_groups(session: Session, given: Spans, first: int, last: int) -> list[int]:
     """Groups of one chunk that nobody has judged since it was taken back, or edited."""
-    ids = list_groups_with_newest_verdict_between(session, first, last)
+    ids = list_groups_with_newest_verdict_in_range(session, first, last)
     judged: dict[int, str] = {}
     for start, end in given:
-        judged |= read_judged_inputs(session, start, end, ids)
+        judged |= read_judged_inputs_hashes(session, start, end, ids)
     keys = read_current_solution_keys(session, ids)
     return [group for group in ids if judged.get(group) == keys[group].inputs_hash]

@@ -83,13 +83,13 @@ def _verdicts_by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
     return verdicts
 
 
-def list_groups_judged_between(session: Session, first: int, last: int) -> list[int]:
+def list_groups_of_verdict_range(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups that the verdicts of a range of ids judge."""
     statement = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     return list(session.scalars(statement.order_by(VerdictModel.id)))
 
 
-def list_groups_with_newest_verdict_between(session: Session, first: int, last: int) -> list[int]:
+def list_groups_with_newest_verdict_in_range(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups whose newest verdict is one of a range of ids."""
     judged = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     newest = func.max(VerdictModel.id)
@@ -102,7 +102,7 @@ def list_groups_with_newest_verdict_between(session: Session, first: int, last: 
     return list(session.scalars(statement))
 
 
-def read_judged_inputs(
+def read_judged_inputs_hashes(
     session: Session, first: int, last: int, group_ids: Sequence[int]
 ) -> dict[int, str]:
     """Inputs hash that the verdicts of a range of ids judged, by the group's id."""
@@ -175,7 +175,7 @@ def find_newest_verdict_id(session: Session) -> int:
     return session.scalar(select(func.max(VerdictModel.id))) or 0
 
 
-def list_groups_judged_since(session: Session, dataset_id: int, after: int) -> list[int]:
+def list_groups_judged_after_verdict(session: Session, dataset_id: int, after: int) -> list[int]:
     """Ids of the groups of a dataset that somebody judged after a verdict, or took that back."""
     statement = (
         select(VerdictModel.group_id)
@@ -229,7 +229,7 @@ class StoredBulkVerdict:
         return self.undone is not None or self.undo_spans is not None
 
 
-def read_batches(
+def read_bulk_verdicts(
     session: Session, dataset_id: int, limit: int, before: int | None = None
 ) -> list[StoredBulkVerdict]:
     """The batches of a dataset, the newest first; only those before an id where there is one."""
@@ -240,20 +240,20 @@ def read_batches(
     return [_batch_from_row(row) for row in session.execute(statement.limit(limit))]
 
 
-def find_batch(session: Session, batch_id: int) -> StoredBulkVerdict | None:
+def find_bulk_verdict(session: Session, batch_id: int) -> StoredBulkVerdict | None:
     """A batch by its id."""
     row = session.execute(_BATCHES.where(VerdictBatchModel.id == batch_id)).one_or_none()
     return None if row is None else _batch_from_row(row)
 
 
-def insert_batch(session: Session, **values: Any) -> int:
+def insert_bulk_verdict(session: Session, **values: Any) -> int:
     """Insert a batch, from fields of ``StoredBulkVerdict`` but its id; returns its id."""
     identity = find_next_row_id(session, VerdictBatchModel)
     session.execute(insert(VerdictBatchModel), [{**_batch_columns(values), "id": identity}])
     return identity
 
 
-def update_batch(session: Session, batch_id: int, **values: Any) -> None:
+def update_bulk_verdict(session: Session, batch_id: int, **values: Any) -> None:
     """Change fields of a batch."""
     mine = VerdictBatchModel.id == batch_id
     session.execute(update(VerdictBatchModel).where(mine).values(_batch_columns(values)))

@@ -16,7 +16,7 @@ from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts.bulk import BatchReport, BulkPlan, RefusedGroups, SampleGroup
+from app.features.verdicts.bulk import AffectedGroup, BulkPlan, BulkVerdictReport, RefusedGroups
 from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import set_verdict
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
@@ -120,7 +120,7 @@ class BulkResult(Document):
     dry_run: bool
     matches: int | None = Field(description="Groups that the query finds; dry run only.")
     would_change: int | None = Field(description="Dry run only, like `sample`.")
-    sample: list[SampleGroup] | None
+    sample: list[AffectedGroup] | None
     batch: int | None = Field(
         description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
     )
@@ -133,14 +133,14 @@ class BulkResult(Document):
         return BulkResult(dry_run=True, batch=None, changed=0, **vars(plan))
 
     @staticmethod
-    def of_report(report: BatchReport) -> BulkResult:
+    def of_report(report: BulkVerdictReport) -> BulkResult:
         """The document of what was done."""
         return BulkResult(
             dry_run=False, matches=None, would_change=None, sample=None, **vars(report)
         )
 
 
-class BatchDocument(Document):
+class BulkVerdictDocument(Document):
     """A bulk verdict as it is remembered."""
 
     id: int
@@ -157,7 +157,7 @@ class BatchDocument(Document):
     redone: int | None = Field(description="The batch that gave it again after it was undone.")
 
 
-class BatchList(ListDocument[BatchDocument]):
+class BulkVerdictList(ListDocument[BulkVerdictDocument]):
     """Bulk verdicts, the newest first."""
 
 
@@ -234,7 +234,7 @@ def post_verdicts(
     store: AppStore,
     actor: Actor,
     dry_run: DryRun = False,
-) -> bulk.BatchReport | Response:
+) -> bulk.BulkVerdictReport | Response:
     """Judge every group that the query matches, as each of them is when its turn comes.
 
     Accepting a group that fails a gate needs a note; without one such groups are refused and
@@ -255,17 +255,17 @@ def post_verdicts(
     responses=responses(404),
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-def list_batches(
+def list_bulk_verdicts(
     dataset: DatasetPath,
     store: AppStore,
     limit: Annotated[int, Query(ge=1, le=MAX_ITEMS, description="Items a page.")] = 20,
     cursor: Cursor = None,
-) -> BatchList:
+) -> BulkVerdictList:
     """The newest bulk verdicts of a dataset."""
     found = dataset_id(store, dataset)
-    batches = bulk.list_batches(store, found, limit + 1, parse_cursor(cursor))
+    batches = bulk.list_bulk_verdicts(store, found, limit + 1, parse_cursor(cursor))
     more = str(batches[limit - 1].id) if len(batches) > limit else None
-    return BatchList(items=batches[:limit], next=more)
+    return BulkVerdictList(items=batches[:limit], next=more)
 
 
 @router.post(
@@ -277,13 +277,13 @@ def list_batches(
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)
-def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
+def redo_bulk_verdict(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
     taken back, or was given again already.
     """
-    return bulk_undo.redo_batch(store, batch, actor=actor)
+    return bulk_undo.redo_bulk_verdict(store, batch, actor=actor)
 
 
 @router.post(
@@ -295,9 +295,9 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)
-def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
+def undo_bulk_verdict(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 
     Groups that somebody has judged since keep that verdict.
     """
-    return bulk_undo.undo_batch(store, batch, actor=actor)
+    return bulk_undo.undo_bulk_verdict(store, batch, actor=actor)

@@ -13,7 +13,7 @@ from app.db.json_columns import Json, parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.versions.queries import iterate_annotation_rows
+from app.features.versions.queries import iterate_version_group_state_rows
 from app.features.versions.service import Version, read_version
 from app.soccer.codec import policy_to_json
 from app.wording import plural
@@ -103,7 +103,7 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     if older.dataset_id != newer.dataset_id:
         raise InputError("the two versions belong to two datasets", pointer="/against")
     before, after = (
-        {row.key: row for row in iterate_annotation_rows(session, item.id)}
+        {row.key: row for row in iterate_version_group_state_rows(session, item.id)}
         for item in (older, newer)
     )
     both = [key for key, row in after.items() if row.member and _is_member(before, key)]

@@ -22,7 +22,11 @@ from app.features.datasets.service import (
     read_dataset_head,
     require_valid_name,
 )
-from app.features.findings.queries import GroupDismissals, findings_from_rows, read_import_findings
+from app.features.findings.queries import (
+    GroupDismissals,
+    findings_from_rows,
+    read_import_findings_and_dismissals,
+)
 from app.features.groups.queries import read_groups
 from app.features.solutions.queries import (
     filter_stored_calibration_keys,
@@ -216,7 +220,7 @@ class _FreezeRun:
                 rows.append({**_build_version_row(item, position, dismissed), **member})
             if self._progress is not None:
                 self._progress(start + len(batch), len(self._candidates))
-        self._require_cameras()
+        self._require_view_of_test_camera()
         return rows
 
     def freeze_tracks(self) -> None:
@@ -256,7 +260,7 @@ class _FreezeRun:
             return {}
         stored = read_groups(self._session, ids)
         solutions = read_current_solution_bodies(self._session, ids, self._dataset.policy.hash)
-        noticed, dismissals = read_import_findings(self._session, ids)
+        noticed, dismissals = read_import_findings_and_dismissals(self._session, ids)
         texts: dict[str, str] = {}
         bodies: dict[str, bytes] = {}
         names: set[str] = set()
@@ -320,7 +324,7 @@ class _FreezeRun:
         bodies = read_calibration_bodies(self._session, gone) if gone else {}
         return {CALIBRATION + key: body for key, body in bodies.items()}
 
-    def _require_cameras(self) -> None:
+    def _require_view_of_test_camera(self) -> None:
         split = self._request.split
         if split.kind == "camera" and not self._cameras & set(split.test_cameras):
             names = ", ".join(split.test_cameras)

@@ -57,7 +57,7 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
     )
 
 
-def resume_version_jobs(jobs: Jobs, store: Store) -> None:
+def register_version_jobs(jobs: Jobs, store: Store) -> None:
     """Let freezing and verifying that an earlier server was at go on."""
 
     def resume_freeze(progress: JobProgress) -> Json:

@@ -82,7 +82,11 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
 
 
 def _candidate_from_row(row: CandidateRow, rule: str) -> Candidate:
-    why = _why_not_accepted(row) if rule == "accepted" else _why_not_passing(row)
+    why = (
+        _why_excluded_by_accepted_rule(row)
+        if rule == "accepted"
+        else _why_excluded_by_passing_rule(row)
+    )
     return Candidate(
         id=row.group_id,
         key=row.key,
@@ -106,18 +110,18 @@ def _verdict_to_json(row: CandidateRow) -> Json:
     }
 
 
-def _why_not_accepted(row: CandidateRow) -> str | None:
+def _why_excluded_by_accepted_rule(row: CandidateRow) -> str | None:
     if row.status != "accepted":
         return _why_rejected_or_deferred(row) or "unreviewed"
     if row.stale:
         return "changed after its verdict"
-    return _why_not_passed(row)
+    return _why_gates_fail(row)
 
 
-def _why_not_passing(row: CandidateRow) -> str | None:
+def _why_excluded_by_passing_rule(row: CandidateRow) -> str | None:
     if row.status in ("rejected", "deferred"):
         return _why_rejected_or_deferred(row)
-    return _why_not_passed(row)
+    return _why_gates_fail(row)
 
 
 def _why_rejected_or_deferred(row: CandidateRow) -> str | None:
@@ -126,7 +130,7 @@ def _why_rejected_or_deferred(row: CandidateRow) -> str | None:
     return "deferred" if row.status == "deferred" else None
 
 
-def _why_not_passed(row: CandidateRow) -> str | None:
+def _why_gates_fail(row: CandidateRow) -> str | None:
     if not row.solved:
         return UNSOLVED
     # An override speaks of the gate that failed then, of no other that fails now.
@@ -142,7 +146,7 @@ def make_version_manifest(store: Store, version_id: int) -> dict[str, Json]:
     """
     with store.read() as session:
         version = read_version(session, version_id)
-        verdicts, overrides = _read_verdicts(session, version_id)
+        verdicts, overrides = _read_verdict_counts_and_overrides(session, version_id)
         return {
             "dataset": version.dataset,
             "version": version.name,
@@ -184,13 +188,13 @@ def describe_frozen_version(session: Session, version: Version) -> dict[str, Jso
             "software_version": version.software_version,
             "counts": dict(version.counts),
             "changelog": read_changelog(session, version),
-            "rejected": list(_read_rejected(session, version.id)),
-            **_read_dismissed(session, version.id),
+            "rejected": list(_read_rejected_groups(session, version.id)),
+            **_read_dismissed_findings(session, version.id),
         }
     }
 
 
-def _read_dismissed(session: Session, version_id: int) -> dict[str, Json]:
+def _read_dismissed_findings(session: Session, version_id: int) -> dict[str, Json]:
     """Findings of its groups that people had checked; nothing of a version without any."""
     found = [
         {"group": key, **one}
@@ -200,13 +204,15 @@ def _read_dismissed(session: Session, version_id: int) -> dict[str, Json]:
     return {"dismissed": found} if found else {}
 
 
-def _read_rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
+def _read_rejected_groups(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
     for key, verdict in iterate_version_verdicts(session, version_id, member=False):
         if verdict is not None and verdict["state"].startswith("rejected"):
             yield {"group": key, "reason": verdict["reason"], "note": verdict["note"]}
 
 
-def _read_verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
+def _read_verdict_counts_and_overrides(
+    session: Session, version_id: int
+) -> tuple[dict[str, int], list[Json]]:
     counts: Counter[str] = Counter()
     overrides: list[Json] = []
     for key, stored in iterate_version_verdicts(session, version_id, member=True):

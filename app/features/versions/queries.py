@@ -158,7 +158,7 @@ class VersionRow(NamedTuple):
     dataset: str
 
 
-class AnnotationRow(NamedTuple):
+class VersionGroupStateRow(NamedTuple):
     """What was said of a group of a version, as its hash and its differences need it."""
 
     key: str
@@ -270,12 +270,14 @@ def read_page(
     return [_version_group_from_row(row) for row in session.execute(statement)]
 
 
-def iterate_annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow]:
+def iterate_version_group_state_rows(
+    session: Session, version_id: int
+) -> Iterator[VersionGroupStateRow]:
     """What was said of each group of a version, as its hash and its differences need it."""
     model = VersionGroupModel
     columns = (model.key, model.member, model.why, model.split, model.splits, model.verdict)
     statement = select(*columns, model.said, model.ball).where(model.version_id == version_id)
-    yield from session.rows(AnnotationRow, statement.order_by(model.position))
+    yield from session.rows(VersionGroupStateRow, statement.order_by(model.position))
 
 
 def iterate_version_verdicts(

@@ -36,7 +36,7 @@ from app.features.versions.diff import (
 from app.features.versions.freeze import MAX_LICENCE, FreezePlan, FreezeRequest, plan_freeze
 from app.features.versions.membership import make_version_manifest
 from app.features.versions.queries import Verification
-from app.features.versions.verify import VersionDifference
+from app.features.versions.verify import VerifyDifference
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
 from app.http.documents import Document, ListDocument, make_document_response, respond_with
@@ -122,7 +122,7 @@ class VerificationDocument(Document):
     groups: int | None = Field(description="Groups of the version; null where it failed.")
     equal: int | None = Field(description="Groups that came out as they were frozen.")
     different: int | None = Field(description="Values that came out differently.")
-    differences: list[VersionDifference] = Field(description="The first of these values.")
+    differences: list[VerifyDifference] = Field(description="The first of these values.")
 
     @model_validator(mode="before")
     @classmethod

@@ -39,7 +39,7 @@ from app.features.versions.queries import (
 from app.json_text import canonical_json_text, quote_text
 from app.soccer.codec import policy_from_json
 from app.soccer.group import Group
-from app.soccer.policy import Policy, values_to_digest
+from app.soccer.policy import Policy, collect_digested_values
 from app.soccer.solution import Solution
 from app.soccer.split import Split
 
@@ -310,7 +310,7 @@ def hash_version(
         rows: In order of ``position``, as the table has them.
         tracks: Keys of frozen tracks by stretch; a version without any has the hash that it always had.
     """
-    values = values_to_digest(policy)
+    values = collect_digested_values(policy)
     digest = hashlib.sha256()
     _add_to_digest(digest, [HASH_FORMAT, values, solver_version])
     for row in rows:

@@ -27,7 +27,7 @@ from app.features.versions.frozen_queries import (
 )
 from app.features.versions.queries import (
     VersionGroup,
-    iterate_annotation_rows,
+    iterate_version_group_state_rows,
     read_page,
     read_version_matches,
     save_verification,
@@ -61,7 +61,7 @@ _KEEP = "compute anew and freeze another version, or keep this one as it was fro
 
 
 @dataclass(frozen=True)
-class VersionDifference:
+class VerifyDifference:
     """Something that is not as it was frozen.
 
     Attributes:
@@ -91,7 +91,7 @@ class VerifyReport:
     solver_version: str
     equal: int = 0
     different: int = 0
-    differences: list[VersionDifference] = field(default_factory=list)
+    differences: list[VerifyDifference] = field(default_factory=list)
     older_tracks: dict[str, str] = field(default_factory=dict)
     solver_version_now: str = SOLVER_VERSION
 
@@ -136,7 +136,7 @@ class VerifyReport:
             f" version {TRACK_VERSION}: {_KEEP}."
         )
 
-    def add(self, found: Sequence[VersionDifference]) -> None:
+    def add(self, found: Sequence[VerifyDifference]) -> None:
         """Count differences, and keep the first."""
         self.different += len(found)
         self.differences += found[: max(NAMED - len(self.differences), 0)]
@@ -181,7 +181,7 @@ def verify_version(
         report = VerifyReport(
             version.name, version.hash, int(version.counts["groups"]), version.solver_version
         )
-        report.add(list(_find_version_differences(session, version)))
+        report.add(list(_find_version_hash_difference(session, version)))
         frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
         matches = read_version_matches(session, version.id)
     done = 0
@@ -232,22 +232,22 @@ def save_verify_failure(store: Store, version_id: int, problem: str, *, actor: s
         save_verification(store, version_id, actor=actor, problem=problem)
 
 
-def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
+def verify_task(task: VerifyTask) -> list[list[VerifyDifference]]:
     """The differences of each group of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.known.items()}
     return [list(islice(_find_group_differences(row, task, known), _A_GROUP)) for row in task.rows]
 
 
-def _find_version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
+def _find_version_hash_difference(session: Session, version: Version) -> Iterator[VerifyDifference]:
     """What of the version's own row does not follow from its groups."""
     names = ("key", "member", "split", "splits", "verdict", "said")
     rows = (
         {name: getattr(row, name) for name in names}
-        for row in iterate_annotation_rows(session, version.id)
+        for row in iterate_version_group_state_rows(session, version.id)
     )
     found = hash_version(version.policy, version.solver_version, rows, version.tracks)
     if found != version.hash:
-        yield VersionDifference(None, "hash", version.hash, found)
+        yield VerifyDifference(None, "hash", version.hash, found)
 
 
 def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | None) -> None:
@@ -255,7 +255,7 @@ def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | Non
     place = f"track {stretch}"
     if body is None or compute_content_key(key, body) != key:
         found = None if body is None else compute_content_key(key, body)
-        report.add([VersionDifference(None, place, key, found)])
+        report.add([VerifyDifference(None, place, key, found)])
         return
     value = decode_frozen_json(body)
     differences = list(_find_track_differences(place, value))
@@ -263,21 +263,21 @@ def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | Non
     if differences and made_by != TRACK_VERSION:
         report.older_tracks[stretch] = made_by
         then, now = f"made by version {made_by}", f"version {TRACK_VERSION} makes another one"
-        differences = [VersionDifference(None, place, then, now)]
+        differences = [VerifyDifference(None, place, then, now)]
     report.add(differences)
 
 
-def _find_track_differences(place: str, value: Mapping[str, Any]) -> Iterator[VersionDifference]:
+def _find_track_differences(place: str, value: Mapping[str, Any]) -> Iterator[VerifyDifference]:
     """What of a sound track comes out differently."""
     try:
         now = recompute_frozen_track(value)
     except Exception as error:
         # One broken track must not hide what the others say.
-        yield VersionDifference(None, place, None, f"{type(error).__name__}: {error}")
+        yield VerifyDifference(None, place, None, f"{type(error).__name__}: {error}")
         return
     for name, frozen in value["track"].items():
         if canonical_json_text(now[name]) != canonical_json_text(frozen):
-            yield VersionDifference(
+            yield VerifyDifference(
                 None, f"{place}.{name}", _shorten_value(frozen), _shorten_value(now[name])
             )
 
@@ -325,7 +325,7 @@ class _VerifyTasks:
         sound = (row for row in rows if not _list_missing_keys(row, frozen))
         annotations = (decode_frozen_json(frozen[row.said or ""]) for row in sound)
         known = self._calibrate_static_cameras(
-            [thaw_group(value, _parse_named_values(value, frozen)) for value in annotations]
+            [thaw_group(value, _decode_shared_values(value, frozen)) for value in annotations]
         )
         policy = self._version.policy
         return VerifyTask(rows, frozen, known, policy, self._splitter)
@@ -359,29 +359,29 @@ def _list_missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[s
     return sorted(wanted - frozen.keys())
 
 
-def _parse_named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+def _decode_shared_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
     return {key: decode_frozen_json(frozen[key]) for key in collect_shared_keys(annotations)}
 
 
 def _find_group_differences(
     row: VersionGroup, task: VerifyTask, known: Mapping[str, Calibration]
-) -> Iterator[VersionDifference]:
+) -> Iterator[VerifyDifference]:
     missing = _list_missing_keys(row, task.frozen)
     if missing:
-        yield from (VersionDifference(row.key, "missing", key, None) for key in missing)
+        yield from (VerifyDifference(row.key, "missing", key, None) for key in missing)
         return
     try:
         yield from _find_content_differences(row, task)
         annotations = decode_frozen_json(task.frozen[row.said or ""])
-        group = thaw_group(annotations, _parse_named_values(annotations, task.frozen))
+        group = thaw_group(annotations, _decode_shared_values(annotations, task.frozen))
         yield from _find_split_differences(row, group, task.splitter)
         yield from _find_solution_differences(row, group, task, known)
     except Exception as error:
         # One broken group must not hide what the others say.
-        yield VersionDifference(row.key, "error", None, f"{type(error).__name__}: {error}")
+        yield VerifyDifference(row.key, "error", None, f"{type(error).__name__}: {error}")
 
 
-def _find_content_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
+def _find_content_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VerifyDifference]:
     """Parts that are not what their key says."""
     annotations, solution = row.said or "", row.solution or ""
     for key in (
@@ -391,12 +391,12 @@ def _find_content_differences(row: VersionGroup, task: VerifyTask) -> Iterator[V
     ):
         found = compute_content_key(key, task.frozen[key])
         if found != key:
-            yield VersionDifference(row.key, "digest", key, found)
+            yield VerifyDifference(row.key, "digest", key, found)
 
 
 def _find_split_differences(
     row: VersionGroup, group: Group, splitter: Splitter
-) -> Iterator[VersionDifference]:
+) -> Iterator[VerifyDifference]:
     views = [view.key for view in group.views]
     split = splitter.split_of_group(group.match, group.split, views)
     for place, frozen, now in (
@@ -404,18 +404,18 @@ def _find_split_differences(
         ("splits", row.splits, splitter.splits_by_view(views)),
     ):
         if frozen != now:
-            yield VersionDifference(row.key, place, frozen, now)
+            yield VerifyDifference(row.key, place, frozen, now)
 
 
 def _find_solution_differences(
     row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
-) -> Iterator[VersionDifference]:
+) -> Iterator[VerifyDifference]:
     encoded = encode_solution(group, solve_group(group, task.policy, known))
     pairs = [("", task.frozen[row.solution or ""], encoded.body)]
     for key, body in sorted(encoded.calibrations.items()):
         frozen = task.frozen.get(CALIBRATION + key)
         if frozen is None:
-            yield VersionDifference(row.key, "calibration", None, key)
+            yield VerifyDifference(row.key, "calibration", None, key)
         else:
             pairs.append(("calibration.", frozen, body))
     for place, then, now in pairs:
@@ -424,7 +424,7 @@ def _find_solution_differences(
             yield from _find_unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
     point = decode_frozen_json(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
-        yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
+        yield VerifyDifference(row.key, "ball", row.ball, point and point["point"])
 
 
 def _parse_frozen(body: bytes) -> Json:
@@ -438,7 +438,7 @@ def _parse_frozen(body: bytes) -> Json:
 
 def _find_unequal_leaves(
     group: str, place: str, then: Json, now: Json
-) -> Iterator[VersionDifference]:
+) -> Iterator[VerifyDifference]:
     """Leaves at which two JSON values differ."""
     if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
         for name in then:
@@ -447,4 +447,4 @@ def _find_unequal_leaves(
         for index, (one, other) in enumerate(zip(then, now, strict=True)):
             yield from _find_unequal_leaves(group, f"{place}{index}.", one, other)
     elif repr(then) != repr(now):
-        yield VersionDifference(group, place.rstrip("."), then, now)
+        yield VerifyDifference(group, place.rstrip("."), then, now)

@@ -16,7 +16,7 @@ from typing import Any
 from standardwebhooks import Webhook
 
 from app.config import Settings
-from app.db.home import WEBHOOKS, get_installation_key
+from app.db.home import WEBHOOKS, get_or_make_secret_key
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.features.jobs.queries import DONE, FAILED
@@ -164,7 +164,7 @@ def derive_webhook_secret(settings: Settings, salt: str) -> str:
     Raises:
         StorageError: The disk refuses the key.
     """
-    made = hmac.digest(get_installation_key(settings, WEBHOOKS), salt.encode(), hashlib.sha256)
+    made = hmac.digest(get_or_make_secret_key(settings, WEBHOOKS), salt.encode(), hashlib.sha256)
     return f"whsec_{b64encode(made).decode()}"
 
 

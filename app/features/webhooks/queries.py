@@ -313,12 +313,14 @@ def queue_webhook_messages(
         return 0
     data: dict[str, Json] = {"dataset": read_dataset_name(session, dataset_id), "actor": actor}
     if batch_id is not None:
-        data["batch"] = read_batch_values(session, batch_id)
+        data["batch"] = read_message_values_of_batch(session, batch_id)
     body = canonical_json_text({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})
     return sum(insert_delivery(session, hook, f"msg_{hook}_{event}", kind, body) for hook in hooks)
 
 
-def queue_batch_messages(session: Session, batch_id: int, kind: str, *, actor: str, at: str) -> int:
+def queue_messages_about_batch(
+    session: Session, batch_id: int, kind: str, *, actor: str, at: str
+) -> int:
     """``queue_webhook_messages`` what became of a batch at a time; nothing where it is gone."""
     row = find_batch(session, batch_id)
     if row is None:
@@ -329,7 +331,7 @@ def queue_batch_messages(session: Session, batch_id: int, kind: str, *, actor: s
     )
 
 
-def read_batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
+def read_message_values_of_batch(session: Session, batch_id: int) -> dict[str, Any] | None:
     """What a message says of a batch; None where it is gone."""
     row = find_batch(session, batch_id)
     if row is None:

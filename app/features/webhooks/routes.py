@@ -16,7 +16,7 @@ from app.http.deps import Actor, AppStore, DatasetPath, Id
 from app.http.documents import Document, ListDocument
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.route import SecretRoute
+from app.http.route import UnstoredResponseRoute
 
 Url = Annotated[str, Field(min_length=1, max_length=LONGEST)]
 Kinds = Annotated[list[MessageKind], Field(min_length=1, max_length=len(CHOSEN))]
@@ -24,7 +24,7 @@ URL = "https://hooks.example.org/touchline"
 
 
 router = APIRouter(
-    prefix="/datasets/{dataset}/webhooks", tags=["webhooks"], route_class=SecretRoute
+    prefix="/datasets/{dataset}/webhooks", tags=["webhooks"], route_class=UnstoredResponseRoute
 )
 
 

@@ -17,7 +17,7 @@ from app.features.what_if.table import JAC_STEPS, YieldTable
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
-from app.solving.ball_covariance import MeanCovariance, major_axis_sigma
+from app.solving.ball_covariance import CovarianceOfMeanBall, major_axis_sigma
 from app.solving.chi_square import p_values
 from app.solving.facts import GroupFacts
 from app.solving.judgement import (
@@ -62,14 +62,16 @@ class BlockResults:
     judgement: Judgement
     sigma: FloatArray | None = None
     p_value: FloatArray | None = None
-    uncertainty: MeanCovariance | None = None
+    uncertainty: CovarianceOfMeanBall | None = None
     lock: Lock = field(default_factory=Lock, repr=False)
 
     @staticmethod
     def judge_facts(facts: GroupFacts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
-        uncertainty = MeanCovariance(facts)
-        judgement = judge_groups(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
+        uncertainty = CovarianceOfMeanBall(facts)
+        judgement = judge_groups(
+            facts, policy, uncertainty, _jac_at_policy_gamma(facts, jac, policy)
+        )
         found = BlockResults(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
             found.sigma = _mean_sigmas(facts, policy, judgement, uncertainty)
@@ -80,7 +82,7 @@ class BlockResults:
         with self.lock:
             if self.sigma is None:
                 self.sigma = _mean_sigmas(
-                    self.facts, self.policy, self.judgement, MeanCovariance(self.facts)
+                    self.facts, self.policy, self.judgement, CovarianceOfMeanBall(self.facts)
                 )
             if self.p_value is None:
                 self.p_value = _p_values(self.facts, self.policy, self.judgement)
@@ -97,7 +99,7 @@ class BlockResults:
     def judge_with_policy(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
         if _uses_click_noise(policy) and get_click_noise(policy) != get_click_noise(self.policy):
-            jac = _jac_at_threshold(self.facts, self.jac, policy)
+            jac = _jac_at_policy_gamma(self.facts, self.jac, policy)
             return judge_groups(self.facts, policy, self._get_uncertainty(), jac)
         return self._rejudge_changed_groups(policy)[0]
 
@@ -119,7 +121,7 @@ class BlockResults:
     ) -> tuple[Judgement, BoolArray, BlockResults | None]:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
-        jac = _jac_at_threshold(facts, self.jac, policy)
+        jac = _jac_at_policy_gamma(facts, self.jac, policy)
         view_failed, pair_failed = find_first_failed_gates(facts, jac, policy)
         new = np.zeros(facts.groups, bool)
         new[facts.view_group[np.flatnonzero(view_failed != known.view_failed)]] = True
@@ -131,7 +133,7 @@ class BlockResults:
             some = facts.part(new)
             views, pairs = new[facts.view_group], new[facts.pair_group]
             standing = view_failed[views], pair_failed[pairs]
-            uncertainty = MeanCovariance(some)
+            uncertainty = CovarianceOfMeanBall(some)
             found = judge_with_known_view_failures(
                 some, policy, uncertainty, jac[views], standing, first_alone=True
             )
@@ -146,7 +148,7 @@ class BlockResults:
         """Sigmas and p-values, where the policy asks for them."""
         with self.lock:
             if policy.max_sigma_m is not None and self.sigma is None:
-                uncertainty = self.uncertainty or MeanCovariance(self.facts)
+                uncertainty = self.uncertainty or CovarianceOfMeanBall(self.facts)
                 self.sigma = _mean_sigmas(self.facts, self.policy, self.judgement, uncertainty)
             if policy.min_p_value is not None and self.p_value is None:
                 self.p_value = _p_values(self.facts, self.policy, self.judgement)
@@ -155,10 +157,10 @@ class BlockResults:
             None if policy.min_p_value is None else self.p_value,
         )
 
-    def _get_uncertainty(self) -> MeanCovariance:
+    def _get_uncertainty(self) -> CovarianceOfMeanBall:
         with self.lock:
             if self.uncertainty is None:
-                self.uncertainty = MeanCovariance(self.facts)
+                self.uncertainty = CovarianceOfMeanBall(self.facts)
         return self.uncertainty
 
 
@@ -172,7 +174,7 @@ def _uses_click_noise(policy: Policy) -> bool:
     return policy.max_sigma_m is not None or policy.min_p_value is not None
 
 
-def _jac_at_threshold(facts: GroupFacts, jac: FloatArray, policy: Policy) -> FloatArray:
+def _jac_at_policy_gamma(facts: GroupFacts, jac: FloatArray, policy: Policy) -> FloatArray:
     gamma = policy.jac_gamma_percent
     if gamma in GAMMAS_PERCENT:
         known: FloatArray = jac[GAMMAS_PERCENT.index(gamma)]
@@ -181,7 +183,7 @@ def _jac_at_threshold(facts: GroupFacts, jac: FloatArray, policy: Policy) -> Flo
 
 
 def _mean_sigmas(
-    facts: GroupFacts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
+    facts: GroupFacts, policy: Policy, judgement: Judgement, uncertainty: CovarianceOfMeanBall
 ) -> FloatArray:
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
     point = judgement.point

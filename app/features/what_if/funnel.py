@@ -53,7 +53,7 @@ class ThresholdCurve:
 
 
 @dataclass(frozen=True)
-class YieldPart:
+class YieldBreakdownRow:
     """Groups of one split, one bin of distance or with one finding, and how many pass."""
 
     name: str
@@ -81,9 +81,9 @@ class Yield:
     funnel: tuple[FunnelStep, ...]
     given_not_measured: int
     curves: tuple[ThresholdCurve, ...]
-    splits: tuple[YieldPart, ...]
-    distances: tuple[YieldPart, ...]
-    findings: tuple[YieldPart, ...]
+    splits: tuple[YieldBreakdownRow, ...]
+    distances: tuple[YieldBreakdownRow, ...]
+    findings: tuple[YieldBreakdownRow, ...]
     leakage: tuple[SplitLeak, ...]
     gained: int
     lost: int
@@ -151,7 +151,7 @@ def _make_yield(
         splits=_yield_by_split(snapshot, total),
         distances=_yield_by_distance(snapshot, total),
         findings=tuple(
-            YieldPart(kind, groups, passing)
+            YieldBreakdownRow(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
         leakage=find_split_leaks(snapshot.counts_by_match_and_split),
@@ -181,21 +181,24 @@ def _funnel_steps(
     return tuple(steps)
 
 
-def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
+def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldBreakdownRow, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.counts_by_match_and_split.items():
         everyone[split] += groups
     return tuple(
-        YieldPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
+        YieldBreakdownRow(split, groups, total.splits[split])
+        for split, groups in sorted(everyone.items())
     )
 
 
-def _yield_by_distance(snapshot: TableSnapshot, total: GroupCounts) -> tuple[YieldPart, ...]:
+def _yield_by_distance(
+    snapshot: TableSnapshot, total: GroupCounts
+) -> tuple[YieldBreakdownRow, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved_count
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
-        YieldPart("", groups[bin_], passing[bin_], low, ends[bin_])
+        YieldBreakdownRow("", groups[bin_], passing[bin_], low, ends[bin_])
         for bin_, low in enumerate([*DISTANCES, None])
     )

@@ -64,7 +64,7 @@ class CalibrationThresholds(_optional_thresholds_model(CalibrationPolicy)):  # t
     """What a view's calibration depends on; only solving again tells what another value does."""
 
 
-class WhatIf(_optional_thresholds_model(Policy)):  # type: ignore[misc]
+class ThresholdsToTry(_optional_thresholds_model(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
     `null` switches a gate off (`min_agreement`, `min_parallax_degrees`,
@@ -199,7 +199,7 @@ def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
-def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> Yield:
+def try_policy(dataset: DatasetPath, values: ThresholdsToTry, services: AppServices) -> Yield:
     """What other thresholds would let through; nothing is saved and nothing solved.
 
     The numbers are those that solving under these thresholds would give. `needs_solving` names

@@ -33,7 +33,7 @@ from app.features.queue.statistics import (
     make_statistics,
     rows_to_statistics_columns,
 )
-from app.features.verdicts.queries import find_newest_verdict_id, list_groups_judged_since
+from app.features.verdicts.queries import find_newest_verdict_id, list_groups_judged_after_verdict
 from app.features.what_if.cache import map_arrays, write_arrays
 from app.features.what_if.service import AT_ONCE, read_policy
 from app.geometry.arrays import IntArray
@@ -136,25 +136,25 @@ class StatisticsCache:
 def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _DatasetColumns:
     """Every group."""
     ids, parts = [], []
-    for rows in _column_batches(session, dataset_id):
+    for rows in _iterate_row_chunks(session, dataset_id):
         ids.append(np.array([row[0] for row in rows], np.int64))
         parts.append(rows_to_statistics_columns([row[1:] for row in rows]))
     return _DatasetColumns(
         policy,
-        **_read_current_marks(session),
+        **_read_newest_ids(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
         counted=_join_columns(parts) if parts else rows_to_statistics_columns([]),
     )
 
 
-def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
+def _iterate_row_chunks(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
     after = 0
     while rows := read_columns_after(session, dataset_id, ("group_id", *COLUMNS), after, BATCH):
         yield rows
         after = rows[-1].group_id
 
 
-def _read_current_marks(session: Session) -> dict[str, Any]:
+def _read_newest_ids(session: Session) -> dict[str, Any]:
     number = find_newest_entry_id(session)
     return {
         "change": find_newest_change_id(session),
@@ -166,8 +166,8 @@ def _read_current_marks(session: Session) -> dict[str, Any]:
 def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
     """What has changed, read again; groups that are gone show in the number of those left."""
     changed = set(list_changed_group_ids(session, dataset_id, kept.change))
-    ids = sorted(changed | set(list_groups_judged_since(session, dataset_id, kept.verdict)))
-    moment = _read_current_marks(session)
+    ids = sorted(changed | set(list_groups_judged_after_verdict(session, dataset_id, kept.verdict)))
+    moment = _read_newest_ids(session)
     if not ids:
         return replace(kept, **moment)
     rows = [

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.frame import Detection, Frame, JudgedFrame
+from app.evaluation.frame import Detection, FrameWithDetections, GroundTruthFrame
 from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter
 from app.soccer.frames import Box, ImagePoint
 from tests.cameras import SIZE, looking
 
 DIAMETER = 0.226
-MakeFrame = Callable[..., Frame]
+MakeFrame = Callable[..., GroundTruthFrame]
 
 
 def camera_at(distance: float, distortion: float = 0.0) -> Camera:
@@ -34,14 +34,14 @@ def make_frame() -> MakeFrame:
         match: str = "m",
         point: tuple[float, float, float] = (0.0, 0.0, -0.113),
         distortion: float = 0.0,
-    ) -> Frame:
+    ) -> GroundTruthFrame:
         camera = camera_at(distance, distortion)
         x, y = camera.project(np.array([point]))[0]
         center = ImagePoint(float(x), float(y))
         diameter, _ = optimal_diameter(camera, np.array(center), np.array(point), DIAMETER)
         box = Box.square(center, diameter)
         loose = Box.square(center, diameter * 1.25)
-        return Frame(
+        return GroundTruthFrame(
             id=identity,
             group_id=identity,
             group=f"{match}/{identity}.png",
@@ -58,13 +58,13 @@ def make_frame() -> MakeFrame:
 
 
 @pytest.fixture
-def make_judged(make_frame: MakeFrame) -> Callable[..., JudgedFrame]:
+def make_judged(make_frame: MakeFrame) -> Callable[..., FrameWithDetections]:
     """Makes a judged frame from boxes with scores."""
 
     def make(
         truth: Box | None, *found: tuple[Box, float], identity: int = 1, match: str = "m"
-    ) -> JudgedFrame:
+    ) -> FrameWithDetections:
         detections = tuple(Detection(box, score) for box, score in found)
-        return JudgedFrame(make_frame(identity, match=match), truth, detections)
+        return FrameWithDetections(make_frame(identity, match=match), truth, detections)
 
     return make

@@ -23,7 +23,7 @@ from app.evaluation.average_precision import (
     mean_average_precision_over_ious,
     precision_recall_curve,
 )
-from app.evaluation.frame import Detection, JudgedFrame
+from app.evaluation.frame import Detection, FrameWithDetections
 from app.evaluation.localization import make_frame_result
 from app.evaluation.result import FrameResult
 from app.soccer.frames import Box
@@ -36,7 +36,7 @@ AWAY = Box(300, 300, 10, 10)
 
 
 @pytest.fixture
-def random_judged(make_frame) -> list[JudgedFrame]:
+def random_judged(make_frame) -> list[FrameWithDetections]:
     """Two hundred frames; some without a ball, many scores alike."""
     rng = np.random.default_rng(0)
     judged = []
@@ -49,11 +49,11 @@ def random_judged(make_frame) -> list[JudgedFrame]:
             width, height = (10 * rng.uniform(0.7, 1.4, 2)).tolist()
             found.append(Detection(Box(x, y, width, height), float(np.round(rng.random(), 1))))
         found.sort(key=lambda item: -item.score)
-        judged.append(JudgedFrame(make_frame(number + 1), truth, tuple(found)))
+        judged.append(FrameWithDetections(make_frame(number + 1), truth, tuple(found)))
     return judged
 
 
-def by_pycocotools(judged: list[JudgedFrame]) -> tuple[float, float]:
+def by_pycocotools(judged: list[FrameWithDetections]) -> tuple[float, float]:
     """AP at 0.5 and over all thresholds, by the reference."""
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval
@@ -229,8 +229,10 @@ class TestDetectionTable:
     def test_each_bin_is_an_evaluation_of_its_own(self, make_frame) -> None:
         near, far = make_frame(1, distance=25.0), make_frame(2, distance=85.0)
         judged = [
-            JudgedFrame(near, near.boxes["optimized"], (Detection(near.boxes["optimized"], 0.9),)),
-            JudgedFrame(far, far.boxes["optimized"], ()),
+            FrameWithDetections(
+                near, near.boxes["optimized"], (Detection(near.boxes["optimized"], 0.9),)
+            ),
+            FrameWithDetections(far, far.boxes["optimized"], ()),
         ]
         results = [make_frame_result(item, DIAMETER) for item in judged]
         table = make_detection_table_by_bin(judged, results, DISTANCE)

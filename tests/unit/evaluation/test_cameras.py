@@ -8,14 +8,14 @@ import pytest
 from app.evaluation.bootstrap import MatchResamples
 from app.evaluation.cameras import (
     FrameScore,
+    combine_frame_scores,
     make_cameras_table,
     make_jac_figure,
     measure_leave_one_out_errors,
     score_cameras,
     score_frame,
-    score_frames,
 )
-from app.evaluation.result import FrameRange
+from app.evaluation.result import FrameFieldRange
 from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS, Pitch
@@ -76,7 +76,7 @@ class TestCamerasTable:
         assert table.cell("predicted", "challenge").value == pytest.approx(0.5)
         assert table.cell("predicted", "jac_2").of == 2
         assert table.cell("predicted", "error_median_px").value == pytest.approx(0, abs=0.5)
-        assert table.row("predicted").frames == FrameRange("predicted_jac")
+        assert table.row("predicted").frames == FrameFieldRange("predicted_jac")
         assert "The list of frames has 1 of them" in table.note
 
 
@@ -102,17 +102,17 @@ class TestJacFigure:
 class TestScore:
     def test_a_frame_without_a_camera_counts_as_zero(self):
         good = FrameScore((1.0, 1.0, 1.0), 0.9, (1.0, 3.0))
-        total = score_frames([good, None])
+        total = combine_frame_scores([good, None])
         assert (total.frames, total.calibrated, total.completeness) == (2, 1, 0.5)
         assert total.jac == (0.5, 0.5, 0.5)
         assert (total.share, total.challenge) == (0.5, 0.45)
         assert total.error_median_px == 2.0
 
     def test_three_quarters_is_not_above_three_quarters(self):
-        assert score_frames([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
+        assert combine_frame_scores([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
 
     def test_without_frames_every_score_is_zero(self):
-        total = score_frames([])
+        total = combine_frame_scores([])
         assert (total.completeness, total.share, total.error_median_px) == (0.0, 0.0, None)
 
 

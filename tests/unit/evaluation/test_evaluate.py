@@ -13,7 +13,7 @@ from app.evaluation.evaluate import (
     make_boxes_table,
 )
 from app.evaluation.frame import Detection
-from app.evaluation.result import FrameRange
+from app.evaluation.result import FrameFieldRange
 from app.soccer.frames import Box
 from tests.unit.evaluation.conftest import camera_at
 
@@ -149,7 +149,7 @@ class TestBoxesTable:
         )
         table = result.table("boxes")
         opening = {row.name: row.frames for row in table.rows if row.frames}
-        assert opening == {"annotated": FrameRange("box_iou")}
+        assert opening == {"annotated": FrameFieldRange("box_iou")}
         kept = [item.box_iou for item in result.frames if item.box_iou is not None]
         assert kept == [pytest.approx(table.cell("annotated", "iou").value)]
 

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.frame import Detection, JudgedFrame
+from app.evaluation.frame import Detection, FrameWithDetections
 from app.evaluation.localization import make_frame_result, measure_position_error
 from app.soccer.frames import Box, ImagePoint
 from tests.unit.evaluation.conftest import DIAMETER, camera_at
 
 
-def judged(frame, *found: Detection) -> JudgedFrame:
-    return JudgedFrame(frame, frame.boxes["optimized"], found)
+def judged(frame, *found: Detection) -> FrameWithDetections:
+    return FrameWithDetections(frame, frame.boxes["optimized"], found)
 
 
 class TestPlaceError:
@@ -83,6 +83,6 @@ class TestMeasureFrame:
     def test_a_frame_without_ball_has_no_hit(self, make_frame) -> None:
         frame = replace(make_frame(), absent=True, point=None)
         found = make_frame_result(
-            JudgedFrame(frame, None, (Detection(Box(5, 5, 9, 9), 0.9),)), DIAMETER
+            FrameWithDetections(frame, None, (Detection(Box(5, 5, 9, 9), 0.9),)), DIAMETER
         )
         assert (found.ball, found.score, found.iou, found.hit_iou) == (False, 0.9, None, None)

@@ -20,7 +20,7 @@ from app.formats.safe_path import is_hidden, read_regular_file
 from app.formats.soccernet_v3 import MatchFrameFinder
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.trees import FolderTree, ZipTree, open_tree, open_tree_context
-from app.media.object_frames import ArchiveMembers
+from app.media.object_frames import ArchiveMemberReader
 
 MakeZip = Callable[..., Path]
 
@@ -173,7 +173,7 @@ class TestZipTree:
         assert (tree.names(), tree.read_bytes(name)) == ([name], b"one")
         media = tree.media(name)
         assert media.member is not None
-        assert ArchiveMembers().read(Path(media.path), media.member, 10) == b"one"
+        assert ArchiveMemberReader().read(Path(media.path), media.member, 10) == b"one"
         assert report.problems == []
 
     def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: ReaderReport) -> None:
@@ -332,7 +332,7 @@ class TestNamesThatAreNoText:
                         tree.read_bytes(member)
 
     def test_a_picture_of_such_a_zip_is_read(self, marked: Path) -> None:
-        with closing(ArchiveMembers()) as archives:
+        with closing(ArchiveMemberReader()) as archives:
             assert archives.read(marked, "b/1.json", 100) == b"one"
             with pytest.raises(ImageError, match="cannot be read"):
                 archives.read(marked, b"caf\xe9\xff.json".decode("cp437"), 100)

@@ -13,8 +13,8 @@ from app.formats.soccernet_v3_writer import labels_to_json
 from app.formats.view_state import (
     GroupAssembler,
     GroupHead,
-    PlacedView,
     RecordFieldReader,
+    ViewWithGroupHead,
     extras_from_json,
     group_head_to_json,
     view_to_json,
@@ -122,10 +122,10 @@ class TestExtras:
         assert list(written["actions"]) == [group.views[0].key]
 
 
-def placed(key: str, group: str = "g", position: int = 0, views: int = 2) -> PlacedView:
+def placed(key: str, group: str = "g", position: int = 0, views: int = 2) -> ViewWithGroupHead:
     head = GroupHead(group, "", "", "", Pitch(), views)
     station = Station("cam1", ImageSize(8, 8), shared=True)
-    return PlacedView(head, position, View(key, station))
+    return ViewWithGroupHead(head, position, View(key, station))
 
 
 class TestViewGroups:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from app.geometry.bundle import (
-    Rays,
+    RayPixels,
     bundle_equations,
     linearize,
     optimize_points,
@@ -23,7 +23,7 @@ TRUTH = np.array([parameters_from_camera(camera, HALF_DIAGONAL) for camera in CA
 POINTS = np.random.default_rng(3).uniform((-15, -12, -6), (15, 12, 0), (12, 3))
 
 
-def rays_of(noise_px: float = 0.0, views: int = 3, sigma: float = 1.0) -> Rays:
+def rays_of(noise_px: float = 0.0, views: int = 3, sigma: float = 1.0) -> RayPixels:
     generator = np.random.default_rng(5)
     camera, point = (part.ravel() for part in np.meshgrid(range(views), range(len(POINTS))))
     pixels = np.empty((len(camera), 2))
@@ -31,7 +31,9 @@ def rays_of(noise_px: float = 0.0, views: int = 3, sigma: float = 1.0) -> Rays:
         plain: Camera = camera_from_parameters(TRUTH[row], (0.0, 0.0), HALF_DIAGONAL)
         pixels[camera == row] = plain.project(POINTS[point[camera == row]])
     pixels += generator.normal(0, noise_px, pixels.shape)
-    return Rays(pixels, camera, point, np.full(len(camera), sigma), np.full(views, HALF_DIAGONAL))
+    return RayPixels(
+        pixels, camera, point, np.full(len(camera), sigma), np.full(views, HALF_DIAGONAL)
+    )
 
 
 class TestRays:
@@ -46,7 +48,7 @@ class TestRays:
     def test_of_two_cameras_leaves_out_points_that_one_does_not_show(self):
         rays = rays_of()
         hidden = (rays.camera == 1) & (rays.point == 4)
-        less = Rays(
+        less = RayPixels(
             rays.pixels[~hidden],
             rays.camera[~hidden],
             rays.point[~hidden],

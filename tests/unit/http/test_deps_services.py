@@ -13,7 +13,7 @@ from app import features
 from app.config import Settings
 from app.errors import BusyError
 from app.features.maintenance import upkeep as upkeep
-from app.features.match_estimates.jobs import MatchJob
+from app.features.match_estimates.jobs import MatchJobType
 from app.http import deps as module
 from app.http.deps import STOP_SECONDS, Services
 
@@ -79,7 +79,7 @@ class TestServices:
             value.kind
             for module in modules
             for value in vars(module).values()
-            if isinstance(value, MatchJob)
+            if isinstance(value, MatchJobType)
         }
         assert {"paint", "positions"} <= kinds <= made
 

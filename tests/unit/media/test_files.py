@@ -23,7 +23,7 @@ from app.media.files import (
     read_encoded_frame,
     read_media_size_and_crc,
 )
-from app.media.object_frames import ArchiveMembers
+from app.media.object_frames import ArchiveMemberReader
 from app.soccer.group import Media
 
 # Left half dark, right half bright: a flip is seen.
@@ -91,8 +91,8 @@ class TestFrameOfAZipInsideAZip:
         upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
         member = "league/Frames-v3.zip/v3_frames/7.png"
         with pytest.raises(TooLargeError):
-            ArchiveMembers().read(upload, member, len(PNG) - 1)
-        assert ArchiveMembers().read(upload, member, len(PNG)) == PNG
+            ArchiveMemberReader().read(upload, member, len(PNG) - 1)
+        assert ArchiveMemberReader().read(upload, member, len(PNG)) == PNG
 
     def test_a_third_level_is_not_opened(self, tmp_path, archive) -> None:
         inner = nested(tmp_path, archive, zipfile.ZIP_STORED)
@@ -100,13 +100,15 @@ class TestFrameOfAZipInsideAZip:
         with zipfile.ZipFile(outer, "w") as target:
             target.write(inner, "inner.zip")
         with pytest.raises(NotFoundError):
-            ArchiveMembers().read(outer, "inner.zip/league/Frames-v3.zip/v3_frames/7.png", 10**6)
+            ArchiveMemberReader().read(
+                outer, "inner.zip/league/Frames-v3.zip/v3_frames/7.png", 10**6
+            )
 
     def test_many_threads_read_one_archive_while_others_push_it_out(
         self, tmp_path, archive
     ) -> None:
         upload = nested(tmp_path, archive, zipfile.ZIP_DEFLATED)
-        archives, got = ArchiveMembers(most=1), []
+        archives, got = ArchiveMemberReader(most=1), []
 
         def read() -> None:
             for _ in range(20):
@@ -126,7 +128,7 @@ class TestFrameOfAZipInsideAZip:
         other = tmp_path / "other.zip"
         with zipfile.ZipFile(other, "w") as target:
             target.writestr("1.png", PNG)
-        archives, opened = ArchiveMembers(most=1), zipfile.ZipFile.open
+        archives, opened = ArchiveMemberReader(most=1), zipfile.ZipFile.open
 
         def late(self: zipfile.ZipFile, name: str) -> IO[bytes]:
             if name != "1.png":
@@ -140,7 +142,7 @@ class TestFrameOfAZipInsideAZip:
         archive.write_bytes(archive.read_bytes()[:-30])
         upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
         with pytest.raises(ImageError, match=r"upload\.zip/league/Frames-v3\.zip"):
-            ArchiveMembers().read(upload, "league/Frames-v3.zip/7.png", 10**6)
+            ArchiveMemberReader().read(upload, "league/Frames-v3.zip/7.png", 10**6)
 
 
 class TestReadFrame:
@@ -388,7 +390,7 @@ class TestMediaFacts:
 
 class TestArchives:
     def test_few_archives_stay_open_and_all_are_read(self, tmp_path) -> None:
-        archives = ArchiveMembers(most=2)
+        archives = ArchiveMemberReader(most=2)
         paths = []
         for number in range(5):
             path = tmp_path / f"{number}.zip"
@@ -408,7 +410,7 @@ class TestArchives:
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
             for name, body in bodies.items():
                 target.writestr(name, body)
-        archives, wrong = ArchiveMembers(), []
+        archives, wrong = ArchiveMemberReader(), []
 
         def work() -> None:
             wrong.extend(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.config import Settings
 from app.errors import ImageError, TooLargeError
-from app.media.images import MAX_SCANS, ImageHeader, check_scans, check_size, read_header
+from app.media.images import MAX_SCANS, ImageHeader, check_jpeg_scans, check_size, read_header
 
 PICTURE = np.random.default_rng(3).integers(0, 255, (37, 53, 3), dtype=np.uint8)
 WEBP_LOSSLESS = [cv2.IMWRITE_WEBP_QUALITY, 101]
@@ -124,9 +124,9 @@ class TestCheckSize:
 class TestCheckScans:
     def test_refuses_what_is_drawn_once_more_than_the_most(self) -> None:
         most, more = many_scans(MAX_SCANS), many_scans(MAX_SCANS + 1)
-        check_scans(most)
+        check_jpeg_scans(most)
         with pytest.raises(TooLargeError, match=r"^frame 7\.jpg is drawn in more than 100 scans"):
-            check_scans(more, "frame 7.jpg")
+            check_jpeg_scans(more, "frame 7.jpg")
         for data in (most, more):
             picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
             assert picture.shape == PICTURE.shape
@@ -135,7 +135,7 @@ class TestCheckScans:
         "option", [(), (cv2.IMWRITE_JPEG_PROGRESSIVE, 1), (cv2.IMWRITE_JPEG_RST_INTERVAL, 1)]
     )
     def test_takes_what_encoders_write(self, option: tuple[int, ...]) -> None:
-        check_scans(encoded(".jpg", cv2.IMWRITE_JPEG_QUALITY, 100, *option))
+        check_jpeg_scans(encoded(".jpg", cv2.IMWRITE_JPEG_QUALITY, 100, *option))
 
     @pytest.mark.parametrize(
         "between",
@@ -150,18 +150,18 @@ class TestCheckScans:
     )
     def test_counts_the_scans_behind_whatever_a_decoder_passes_over(self, between: bytes) -> None:
         scan = b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00" + between
-        check_scans(b"\xff\xd8" + scan * MAX_SCANS)
+        check_jpeg_scans(b"\xff\xd8" + scan * MAX_SCANS)
         with pytest.raises(TooLargeError):
-            check_scans(b"\xff\xd8" + scan * (MAX_SCANS + 1))
+            check_jpeg_scans(b"\xff\xd8" + scan * (MAX_SCANS + 1))
 
     @pytest.mark.parametrize("place", ["a comment", "behind the end"])
     def test_what_is_no_scan_counts_as_none(self, place: str) -> None:
         data, scans = encoded(".jpg"), b"\xff\xda\x00\x02" * (MAX_SCANS + 1)
         comment = b"\xff\xfe" + struct.pack(">H", len(scans) + 2) + scans
-        check_scans(
+        check_jpeg_scans(
             data[:2] + comment + data[2:] if place == "a comment" else data + bytes(2) + scans
         )
 
     @given(st.lists(st.sampled_from([b"\xff", b"\xda", b"\xd9", b"\xfe", b"\0", b"\x02"])))
     def test_any_bytes_come_to_an_end(self, parts: list[bytes]) -> None:
-        check_scans(b"\xff\xd8" + b"".join(parts))
+        check_jpeg_scans(b"\xff\xd8" + b"".join(parts))

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.frame_pitch import collect_pitch_size_evidence, find_agreed_pitch, group_by_position
+from app.paint.frame_pitch import (
+    collect_pitch_size_evidence,
+    find_differing_agreed_pitch,
+    group_by_position,
+)
 from app.paint.propose import propose_camera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -37,16 +41,16 @@ def frames(pitch: Pitch) -> list[PitchSizeFrameLines]:
 
 class TestPitchOf:
     def test_three_frames_show_a_shorter_pitch(self) -> None:
-        found = find_agreed_pitch(frames(SHORT), PITCH)
+        found = find_differing_agreed_pitch(frames(SHORT), PITCH)
         assert found is not None
         assert found.length == pytest.approx(100.5, abs=0.4)
         assert found.width == 68.0
 
     def test_the_pitch_in_use_is_left_alone(self) -> None:
-        assert find_agreed_pitch(frames(PITCH), PITCH) is None
+        assert find_differing_agreed_pitch(frames(PITCH), PITCH) is None
 
     def test_one_frame_decides_nothing(self) -> None:
-        assert find_agreed_pitch(frames(SHORT)[:1], PITCH) is None
+        assert find_differing_agreed_pitch(frames(SHORT)[:1], PITCH) is None
 
 
 class TestFilms:

@@ -17,13 +17,13 @@ from app.paint.evidence import (
     trace_visible_markings,
 )
 from app.paint.propose import (
+    FrameToSearch,
     RankedCamera,
-    SearchedFrame,
     explain_non_square_pixels,
     explain_uncertain_camera,
     measure_weakest_marking,
     propose_camera,
-    read_and_prepare_frame,
+    resize_and_prepare_frame,
     scale_snapped_camera,
 )
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
@@ -198,8 +198,8 @@ class TestPropose:
     ):
         height, width = frame.shape[:2]
         small = cv2.resize(frame, (400, 400 * height // width), interpolation=cv2.INTER_AREA)
-        read = read_and_prepare_frame(small)
-        assert isinstance(read, SearchedFrame) and read.image.shape[1] == 800
+        read = resize_and_prepare_frame(small)
+        assert isinstance(read, FrameToSearch) and read.image.shape[1] == 800
         found = propose_camera(np.asarray(small, np.uint8))
         assert found.outcome == "proposed"
         assert found.camera is not None and found.snapped is not None
@@ -227,8 +227,8 @@ class TestPropose:
     def test_three_lines_say_too_little_of_the_camera(self):
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
         names = ("Side line right", "Small rect. right main", "Small rect. right top")
-        frame = read_and_prepare_frame(lawn(marked(true, *names)))
-        assert isinstance(frame, SearchedFrame)
+        frame = resize_and_prepare_frame(lawn(marked(true, *names)))
+        assert isinstance(frame, FrameToSearch)
         snapped = snap_to_prepared_picture(
             frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy()
         )

@@ -17,11 +17,11 @@ from app.sample.film import (
     make_backdrop,
     render_picture,
 )
-from app.sample.fixture import make_fixture
+from app.sample.fixture import make_sample_match
 from app.sample.play import PEOPLE, Instant, make_play
 from app.soccer.pitch import Pitch
 
-LOOK = make_fixture(1, 5).look
+LOOK = make_sample_match(1, 5).look
 POSITION = np.array([-3.0, 62.0, -16.0])
 AIMS = np.array([[0.0, 0.0, 0.0], [30.0, -4.0, 0.0], [42.0, 6.0, 0.0]])
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from app.sample.fixture import group_counts_by_match, make_fixture, split_of_match
+from app.sample.fixture import group_counts_by_match, make_sample_match, split_of_match
 
 
 class TestGroupCounts:
@@ -21,15 +21,15 @@ class TestGroupCounts:
 
 class TestMakeFixture:
     def test_four_hundred_matches_have_folders_of_their_own(self):
-        folders = {make_fixture(index, 3).folder for index in range(400)}
+        folders = {make_sample_match(index, 3).folder for index in range(400)}
         assert len(folders) == 400
 
     def test_nobody_plays_against_themselves(self):
-        fixtures = [make_fixture(index, 3) for index in range(400)]
+        fixtures = [make_sample_match(index, 3) for index in range(400)]
         assert all(fixture.home != fixture.away for fixture in fixtures)
 
     def test_the_folder_is_spelt_as_soccernet_spells_it(self):
-        fixture = make_fixture(0, 3)
+        fixture = make_sample_match(0, 3)
         league, season, name = fixture.folder.split("/")
         assert league == "borealia_first-league"
         assert season == "2025-2026"
@@ -37,7 +37,7 @@ class TestMakeFixture:
         assert f" {fixture.home} {fixture.score[0]} - {fixture.score[1]} {fixture.away}" in name
 
     def test_the_teams_of_the_first_matches_wear_different_kits(self):
-        looks = [make_fixture(index, 3).look for index in range(8)]
+        looks = [make_sample_match(index, 3).look for index in range(8)]
         assert len({look.home for look in looks}) == 8
         assert all(look.home.shirt != look.away.shirt for look in looks)
 

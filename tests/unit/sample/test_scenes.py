@@ -9,7 +9,7 @@ from app.sample.scene import Scene
 from app.sample.scenes import (
     BOX_EXCESS,
     compute_true_ball_box,
-    find_visible_paths,
+    find_visible_marking_paths,
     make_match_scenes,
     simulate_loose_box,
 )
@@ -149,7 +149,7 @@ class TestClickLines:
 class TestVisiblePaths:
     def test_a_cut_marking_ends_on_the_border(self, clean_scenes: list[Scene]):
         camera = clean_scenes[0].truth.views[0].camera
-        paths = find_visible_paths(camera)
+        paths = find_visible_marking_paths(camera)
         seen = np.flatnonzero(paths.lengths > 5)
         assert len(seen) > 5
         for number in seen:
@@ -162,7 +162,7 @@ class TestVisiblePaths:
                 assert MARKINGS[number] == "Circle central" or min(at_end, abs(at_border)) < 0.1
 
     def test_half_of_the_length_is_half_of_the_way(self, clean_scenes: list[Scene]):
-        paths = find_visible_paths(clean_scenes[0].truth.views[0].camera)
+        paths = find_visible_marking_paths(clean_scenes[0].truth.views[0].camera)
         number = int(np.argmax(paths.lengths * [name not in CIRCLES for name in MARKINGS]))
         start, middle, end = paths.pixels_at(np.full(3, number), np.array([0.0, 0.5, 1.0]))
         # Distortion bends the line a little.

@@ -20,7 +20,7 @@ from app.solving.ball_3d import (
     is_plausible_position,
     judge_pairs,
 )
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.facts import collect_facts
 from app.solving.judgement import judge_groups
 from app.solving.solve import solve_group
@@ -76,7 +76,7 @@ def solved(*shifts: float, policy=PAPER):
         combinations(collect_ball_observations(views, calibrations), 2)
     )
     facts = collect_facts(views, calibrations, meetings)
-    spread = MeanCovariance(facts)
+    spread = CovarianceOfMeanBall(facts)
     judgement = judge_groups(facts, policy, spread)
     return judge_pairs(meetings, judgement), compute_mean_ball(
         KEYS, facts, judgement, spread, policy

@@ -16,9 +16,9 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.ball_covariance import (
     CLICK_DIAGONAL,
-    MeanCovariance,
+    CovarianceOfMeanBall,
     ball_click_variance,
-    calibration_covariance,
+    calibration_pixel_covariance,
     calibration_pixel_covariances,
     is_covariance_within,
     major_axis_sigma,
@@ -64,7 +64,7 @@ class TestCalibrationSpread:
         covariance = np.zeros((8, 8))
         covariance[3, 3] = 0.04
         calibration = Calibration("lines", camera, covariance=tuple(covariance.ravel()))
-        spread = calibration_covariance(calibration, SIZE, np.zeros(3))
+        spread = calibration_pixel_covariance(calibration, SIZE, np.zeros(3))
         # 20 cm at 20 m are 10 px for 1000 px a radian.
         assert np.allclose(spread, [[100.0, 0.0], [0.0, 0.0]])
         sight = BallObservation("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
@@ -81,7 +81,9 @@ class TestCalibrationSpread:
         assert np.allclose(pixel_covariance(sight, np.array(BALL), blurred), 50 * noise * np.eye(2))
 
     def test_of_a_given_camera_nothing_is_known(self):
-        assert not calibration_covariance(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
+        assert not calibration_pixel_covariance(
+            Calibration("given", MAIN), SIZE, np.array(BALL)
+        ).any()
 
 
 class TestPictureSpreads:
@@ -121,7 +123,7 @@ class TestPictureSpreads:
             np.array([self.pixel(at + step) - self.pixel(at - step) for step in steps]).T / 2e-6
         )
         expected = slopes @ whole @ slopes.T
-        found = calibration_covariance(self.calibration(whole), SIZE, np.array(BALL))
+        found = calibration_pixel_covariance(self.calibration(whole), SIZE, np.array(BALL))
         np.testing.assert_allclose(found, expected, rtol=1e-4)
 
     def test_facts_say_the_same_once_they_were_kept(self):
@@ -136,7 +138,7 @@ class TestPictureSpreads:
         points = np.array([BALL, BALL])
         spreads = calibration_pixel_covariances(found, np.arange(2), points)
         for at, one in enumerate((calibration, other)):
-            alone = calibration_covariance(one, SIZE, points[at])
+            alone = calibration_pixel_covariance(one, SIZE, points[at])
             np.testing.assert_allclose(spreads[at], alone, rtol=2e-3)
 
 
@@ -177,7 +179,7 @@ class TestMeanSpread:
     def covariance(self, *cameras: Camera, policy=PAPER) -> np.ndarray:
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = collect_facts_of_views(views, [Calibration("given", camera) for camera in cameras])
-        spread = MeanCovariance(facts)
+        spread = CovarianceOfMeanBall(facts)
         judgement = judge_groups(facts, policy, spread)
         return spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)[0]
 
@@ -245,13 +247,13 @@ class TestMeanSpread:
     @settings(max_examples=30, deadline=None)
     def test_results_kept_for_other_policies_change_no_bit(self, seeds):
         facts = join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(60)])
-        kept = MeanCovariance(facts)
+        kept = CovarianceOfMeanBall(facts)
         for seed in seeds:
             policy = replace(random_policy(seed), max_sigma_m=0.1)
             judgement, groups = judge_groups(facts, policy, kept), np.arange(facts.groups)
             there = groups[~np.isnan(judgement.point[:, 0])]
             asked = (judgement.valid, there, judgement.point[there], policy)
-            fresh = MeanCovariance(facts).covariances(*asked)
+            fresh = CovarianceOfMeanBall(facts).covariances(*asked)
             assert np.array_equal(kept.covariances(*asked), fresh, equal_nan=True)
 
     def test_a_group_of_thirteen_views_has_more_pairs_than_are_kept(self):
@@ -262,9 +264,9 @@ class TestMeanSpread:
         ]
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = collect_facts_of_views(views, [Calibration("given", camera) for camera in cameras])
-        kept, zero = MeanCovariance(facts), np.array([0])
+        kept, zero = CovarianceOfMeanBall(facts), np.array([0])
         for last in (70, 71):
             valid = np.arange(len(facts.pair_group)) <= last
             point = facts.pair_point[valid].mean(axis=0)[None]
-            fresh = MeanCovariance(facts).covariances(valid, zero, point, PAPER)
+            fresh = CovarianceOfMeanBall(facts).covariances(valid, zero, point, PAPER)
             assert np.array_equal(kept.covariances(valid, zero, point, PAPER), fresh)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.chi_square import (
     ChiSquareResiduals,
     chi_square_residuals,
@@ -107,7 +107,7 @@ class TestResidualsOf:
         parts = [collect_facts_of_views(*random_views(seed)) for seed in seeds]
 
         def residuals_at_ball(of: GroupFacts) -> ChiSquareResiduals:
-            judgement = judge_groups(of, policy, MeanCovariance(of))
+            judgement = judge_groups(of, policy, CovarianceOfMeanBall(of))
             return chi_square_residuals(
                 of, find_views_in_pairs(of, judgement.valid), judgement.point, policy
             )
@@ -217,7 +217,7 @@ class TestResidualsWithout:
     @settings(max_examples=25, deadline=None)
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
         of, policy = collect_facts_of_views(*random_views(seed)), random_policy(policy_seed)
-        judgement = judge_groups(of, policy, MeanCovariance(of))
+        judgement = judge_groups(of, policy, CovarianceOfMeanBall(of))
         used = find_views_in_pairs(of, judgement.valid)
         rows = compute_leave_one_out_chi_square(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()

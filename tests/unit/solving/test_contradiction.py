@@ -11,7 +11,7 @@ import pytest
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.contradiction import (
     LOW_P_VALUE,
     SPEEDS,
@@ -46,7 +46,7 @@ def torn(
     facts = collect_facts(
         views, calibrations, triangulate_observation_pairs(combinations(sights, 2))
     )
-    judgement = judge_groups(facts, policy, MeanCovariance(facts))
+    judgement = judge_groups(facts, policy, CovarianceOfMeanBall(facts))
     chi_square = compute_chi_square(keys, facts, judgement, policy)
     return chi_square, find_contradiction(chi_square, keys, facts, judgement, sights, policy)
 

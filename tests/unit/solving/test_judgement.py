@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.facts import GroupFacts, collect_facts_of_views, join_facts
 from app.solving.judgement import (
     PASSES,
@@ -27,7 +27,7 @@ from tests.unit.solving.random_groups import random_policy, random_views
 
 
 def judged(facts: GroupFacts, policy: Policy = PAPER) -> Judgement:
-    return judge_groups(facts, policy, MeanCovariance(facts))
+    return judge_groups(facts, policy, CovarianceOfMeanBall(facts))
 
 
 def facts(views: int = 2, **changes: object) -> GroupFacts:
@@ -123,7 +123,10 @@ class TestJudge:
         policy = random_policy(seed)
         found = join_facts([collect_facts_of_views(*random_views(seed)) for seed in seeds])
         jac = compute_view_jac(found, policy.jac_gamma_percent)
-        standing, uncertainty = find_first_failed_gates(found, jac, policy), MeanCovariance(found)
+        standing, uncertainty = (
+            find_first_failed_gates(found, jac, policy),
+            CovarianceOfMeanBall(found),
+        )
         told = judge_with_known_view_failures(
             found, policy, uncertainty, jac, standing, first_alone=True
         )

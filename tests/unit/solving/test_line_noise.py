@@ -9,7 +9,6 @@ from scipy.stats import chi2, f
 from app.solving.line_noise import (
     EXPECTED_PX,
     LinePrior,
-    calibrated_log_sigma,
     collect_line_evidence,
     compute_line_noise,
     estimate_line_noise,
@@ -17,6 +16,7 @@ from app.solving.line_noise import (
     interpolate_cost,
     jackknife_variance,
     log_sigma_posterior_variance,
+    log_sigma_with_95_percent_coverage,
     sigma_prior_cost,
 )
 from app.solving.observations import compute_point_weights
@@ -219,7 +219,7 @@ def test_a_sigma_of_few_numbers_is_as_much_wider_as_fishers_quantile_is(numbers:
     logs = np.linspace(-4, 4, 801)
     cost = numbers * (logs + np.exp(-2 * logs) / 2)
     exact = np.sqrt(f.ppf(0.95, 3, numbers) / f.ppf(0.95, 3, 1e9))
-    assert np.exp(calibrated_log_sigma(logs, cost)) == pytest.approx(exact, rel=0.01)
+    assert np.exp(log_sigma_with_95_percent_coverage(logs, cost)) == pytest.approx(exact, rel=0.01)
 
 
 def test_the_prior_counts_as_the_two_numbers_that_it_is_worth_and_a_scatter_as_it_is() -> None:

@@ -12,8 +12,8 @@ from app.solving.match_position import (
     FrameCameraPlace,
     FrameCameraPlaces,
     calibrate_with_match_position,
-    find_camera_place,
-    guess_matches,
+    find_main_camera_place,
+    guess_match_of_each_frame,
 )
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, PITCH, click
@@ -51,7 +51,9 @@ def few(seed, stand=STAND):
 
 def others(stand=STAND):
     frames = [frame(x, seed=seed, stand=stand) for seed, x in enumerate((-38, -30, 28, 34, 38, 40))]
-    places = [find_camera_place(calibrate(lines, PITCH, SIZE, POLICY), SIZE) for lines in frames]
+    places = [
+        find_main_camera_place(calibrate(lines, PITCH, SIZE, POLICY), SIZE) for lines in frames
+    ]
     return FrameCameraPlaces([found for found in places if found is not None])
 
 
@@ -62,12 +64,14 @@ def match():
 
 class TestPlaceOf:
     def test_a_main_camera_that_its_lines_determine_has_a_place(self):
-        found = find_camera_place(calibrate(frame(34.0), PITCH, SIZE, POLICY), SIZE)
+        found = find_main_camera_place(calibrate(frame(34.0), PITCH, SIZE, POLICY), SIZE)
         assert found.position == pytest.approx(STAND, abs=1.5)
         assert np.degrees(found.pan) == pytest.approx(29, abs=3)
 
     def test_a_replay_has_none(self):
-        assert find_camera_place(calibrate(click(BEHIND_GOAL), PITCH, SIZE, POLICY), SIZE) is None
+        assert (
+            find_main_camera_place(calibrate(click(BEHIND_GOAL), PITCH, SIZE, POLICY), SIZE) is None
+        )
 
 
 class TestPrior:
@@ -192,28 +196,31 @@ def turning(stand, count, seed=0, slope=2.0, sigma=0.4):
 
 class TestGuessMatches:
     def test_runs_of_frames_whose_places_agree_are_matches(self):
-        assert guess_matches([*turning(NEAR_STAND, 5), *turning(OTHER, 4, 1)]) == [0] * 5 + [1] * 4
+        assert (
+            guess_match_of_each_frame([*turning(NEAR_STAND, 5), *turning(OTHER, 4, 1)])
+            == [0] * 5 + [1] * 4
+        )
 
     def test_a_frame_that_says_nothing_goes_with_the_one_before(self):
         first, second = turning(NEAR_STAND, 3), turning(OTHER, 3, 1)
-        found = guess_matches([None, *first, None, *second, None])
+        found = guess_match_of_each_frame([None, *first, None, *second, None])
         assert found == [0, 0, 0, 0, 0, 1, 1, 1, 1]
 
     def test_a_camera_that_moves_with_its_pan_is_one_camera(self):
-        assert guess_matches(turning(NEAR_STAND, 12, slope=8.0)) == [0] * 12
+        assert guess_match_of_each_frame(turning(NEAR_STAND, 12, slope=8.0)) == [0] * 12
 
     def test_stadiums_that_are_nearly_alike_are_two(self):
         near = NEAR_STAND + np.array([0.0, 3.0, -1.0])
         frames = [*turning(NEAR_STAND, 12), *turning(near, 12, 1)]
-        assert guess_matches(frames) == [0] * 12 + [1] * 12
+        assert guess_match_of_each_frame(frames) == [0] * 12 + [1] * 12
 
     def test_one_odd_frame_does_not_end_a_match(self):
         frames = turning(NEAR_STAND, 8)
         frames[3] = FrameCameraPlace(
             NEAR_STAND + np.array([0.0, 15.0, -10.0]), frames[3].covariance, 0.5
         )
-        assert guess_matches(frames) == [0] * 8
+        assert guess_match_of_each_frame(frames) == [0] * 8
 
     def test_frames_that_say_nothing_are_each_their_own(self):
-        assert guess_matches([None, None]) == [0, 1]
-        assert guess_matches([]) == []
+        assert guess_match_of_each_frame([None, None]) == [0, 1]
+        assert guess_match_of_each_frame([]) == []

@@ -26,7 +26,7 @@ from app.solving.calibrate import (
     compute_paint_search_key,
     compute_view_calibration_key,
 )
-from app.solving.match_tripod import solve_match_tripod
+from app.solving.match_tripod import add_match_tripod_to_readings
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, click
 from tests.unit.solving.test_tripod_pitch import CENTER, HALF, WITHIN, laid, painted, posed
@@ -74,7 +74,7 @@ def off_and_covariance(group: Group, truth: np.ndarray) -> tuple[np.ndarray, np.
 
 def test_their_covariance_knows_how_far_the_plan_puts_them_off_and_no_camera_moves():
     truths, groups = match()
-    found = solve_match_tripod(groups, POLICY)
+    found = add_match_tripod_to_readings(groups, POLICY)
     assert found.keys() == groups.keys()
     off_plan = []
     for number, group in groups.items():
@@ -92,7 +92,7 @@ def test_their_covariance_knows_how_far_the_plan_puts_them_off_and_no_camera_mov
 def test_the_covariance_of_the_rays_of_a_ball_stays():
     """What all cameras of a match have in common says nothing of how their rays miss each other."""
     _, groups = match()
-    together = with_reading(groups[1], solve_match_tripod(groups, POLICY)[1])
+    together = with_reading(groups[1], add_match_tripod_to_readings(groups, POLICY)[1])
     found, alone = (calibrate_view(each, each.views[0], POLICY) for each in (together, groups[1]))
     assert found.covariance == alone.covariance
     assert found.pitch_covariance != alone.pitch_covariance
@@ -100,16 +100,16 @@ def test_the_covariance_of_the_rays_of_a_ball_stays():
 
 def test_what_they_knew_together_before_has_no_part_in_it():
     _, groups = match()
-    found = solve_match_tripod(groups, POLICY)
+    found = add_match_tripod_to_readings(groups, POLICY)
     again = {number: with_reading(group, found[number]) for number, group in groups.items()}
-    assert solve_match_tripod(again, POLICY) == found
+    assert add_match_tripod_to_readings(again, POLICY) == found
 
 
 def test_two_frames_know_nothing_together_and_lose_what_three_knew():
     _, groups = match()
-    found = solve_match_tripod(groups, POLICY)
+    found = add_match_tripod_to_readings(groups, POLICY)
     two = {number: with_reading(groups[number], found[number]) for number in (1, 2)}
-    assert [item.tripod for item in solve_match_tripod(two, POLICY).values()] == [
+    assert [item.tripod for item in add_match_tripod_to_readings(two, POLICY).values()] == [
         None,
         None,
     ]
@@ -122,7 +122,7 @@ def test_a_frame_of_another_camera_is_left_alone(like, axis, metres):
     truths, groups = match()
     elsewhere = truths[like].copy()
     elsewhere[axis] += metres
-    found = solve_match_tripod({**groups, 9: group_of(9, elsewhere)}, POLICY)
+    found = add_match_tripod_to_readings({**groups, 9: group_of(9, elsewhere)}, POLICY)
     assert found[9].tripod is None
     assert all(found[number].tripod is not None for number in groups)
 
@@ -130,12 +130,12 @@ def test_a_frame_of_another_camera_is_left_alone(like, axis, metres):
 def test_paint_that_was_read_for_other_lines_takes_no_part():
     _, groups = match()
     stale = with_reading(groups[1], replace(groups[1].paint["a"], sought_for="other"))
-    assert 1 not in solve_match_tripod({**groups, 1: stale}, POLICY)
+    assert 1 not in add_match_tripod_to_readings({**groups, 1: stale}, POLICY)
 
 
 def test_it_is_kept_as_json_to_the_last_bit_and_anything_else_is_refused():
     _, groups = match()
-    reading = solve_match_tripod(groups, POLICY)[1]
+    reading = add_match_tripod_to_readings(groups, POLICY)[1]
     assert reading_from_canonical_json(reading.canonical_json) == reading
     value = reading_to_json(reading)
     assert "tripod" not in reading_to_json(groups[1].paint["a"])

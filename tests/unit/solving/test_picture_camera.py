@@ -10,7 +10,7 @@ from app.soccer.picture import OPEN, PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import (
     calibrate,
-    calibrate_picture,
+    calibrate_altered_picture,
     calibrate_station,
     compute_calibration_key,
 )
@@ -80,7 +80,7 @@ class TestCalibratePicture:
     @pytest.mark.parametrize("camera", [MAIN, BEHIND_GOAL, OPPOSITE])
     @pytest.mark.parametrize("truth", [STRETCHED, CROPPED])
     def test_the_camera_stands_where_it_stood(self, truth, camera):
-        found = calibrate_picture(shown(truth, camera, 0.3), PITCH, SIZE, POLICY, OPEN)
+        found = calibrate_altered_picture(shown(truth, camera, 0.3), PITCH, SIZE, POLICY, OPEN)
         off = found.camera.position - camera.position
         covariance = np.reshape(found.covariance, (8, 8))[3:6, 3:6]
         assert off @ np.linalg.solve(covariance, off) < 16.3
@@ -88,15 +88,15 @@ class TestCalibratePicture:
         assert found.picture is None
 
     def test_a_picture_that_is_known_gives_the_camera_at_once(self):
-        found = calibrate_picture(shown(STRETCHED), PITCH, SIZE, POLICY, STRETCHED)
+        found = calibrate_altered_picture(shown(STRETCHED), PITCH, SIZE, POLICY, STRETCHED)
         np.testing.assert_allclose(found.camera.position, BEHIND_GOAL.position, atol=0.05)
         width, height = found.camera.focal_length
         assert width / height == pytest.approx(4 / 3)
 
     def test_its_covariance_grows_with_what_is_not_known_of_the_picture(self):
         lines = shown(CROPPED, noise_px=0.5)
-        known = calibrate_picture(lines, PITCH, SIZE, POLICY, CROPPED)
-        asked = calibrate_picture(lines, PITCH, SIZE, POLICY, OPEN)
+        known = calibrate_altered_picture(lines, PITCH, SIZE, POLICY, CROPPED)
+        asked = calibrate_altered_picture(lines, PITCH, SIZE, POLICY, OPEN)
         assert asked.position_sigma_m > 1.2 * known.position_sigma_m
 
     def test_a_wrong_label_is_found_in_a_stretched_picture(self):
@@ -105,7 +105,7 @@ class TestCalibratePicture:
             lines["Big rect. right main"],
             lines["Small rect. right main"],
         )
-        found = calibrate_picture(make_lines(lines), PITCH, SIZE, POLICY, OPEN)
+        found = calibrate_altered_picture(make_lines(lines), PITCH, SIZE, POLICY, OPEN)
         names = {suspect.marking for suspect in found.suspects}
         assert names == {"Small rect. right main", "Big rect. right main"}
         width, height = found.camera.focal_length
@@ -114,7 +114,7 @@ class TestCalibratePicture:
 
     def test_too_few_lines_say_so(self):
         few = dict(list(shown(STRETCHED).items())[:2])
-        found = calibrate_picture(make_lines(few), PITCH, SIZE, POLICY, OPEN)
+        found = calibrate_altered_picture(make_lines(few), PITCH, SIZE, POLICY, OPEN)
         assert found.camera is None
         assert "a camera needs" in found.reason
 

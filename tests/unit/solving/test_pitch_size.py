@@ -12,7 +12,7 @@ from app.solving.pitch_size import (
     PitchEstimate,
     PitchSizeFrameLines,
     eliminate_camera,
-    eliminate_own_numbers,
+    eliminate_frame_deviations,
     estimate_pitch,
     estimate_sigmas_of_shared_numbers,
     select_informative_frames,
@@ -162,7 +162,7 @@ class TestWithOwnNumbers:
     def test_variances_add_up(self, rows) -> None:
         share = eliminate_camera(rows.T @ np.ones(len(rows)), rows.T @ rows, 1.0)
         sigma = np.array([0.3, 2.0])
-        pull, told = eliminate_own_numbers(share, sigma)
+        pull, told = eliminate_frame_deviations(share, sigma)
         assert np.linalg.inv(told) == pytest.approx(np.linalg.inv(share[1]) + np.diag(sigma**2))
         # What the frame says the numbers are stays the same.
         assert np.linalg.solve(told, pull) == pytest.approx(np.linalg.solve(share[1], share[0]))

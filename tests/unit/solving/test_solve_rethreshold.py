@@ -13,8 +13,8 @@ from app.solving.solve import (
     differs_only_in_smaller_tau,
     has_unchanged_pairs,
     rethreshold_solution,
+    solve_and_collect_facts,
     solve_group,
-    solve_with_facts,
 )
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group, view
@@ -47,7 +47,7 @@ def apart(*pixels: float, given: bool = True) -> Group:
 
 def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None, Solution]:
     """Retold under a policy, and solved."""
-    then, facts = solve_with_facts(found, before, {})
+    then, facts = solve_and_collect_facts(found, before, {})
     now = solve_group(found, policy)
     if not has_unchanged_pairs(facts, before, policy)[0]:
         return None, now
@@ -64,7 +64,7 @@ class TestHasSmallerTau:
 
 class TestUndecided:
     def test_a_pair_between_the_two_taus_is_decided_anew(self):
-        facts: GroupFacts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
+        facts: GroupFacts = solve_and_collect_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
         error = facts.pair_errors.max() / SIZE.diagonal * 100
         assert not has_unchanged_pairs(facts, PAPER, with_tau(0.99 * error))[0]
         assert has_unchanged_pairs(facts, PAPER, with_tau(1.01 * error))[0]
@@ -98,12 +98,12 @@ class TestRetold:
         errors = [seen.ball.error_px / TAU_PX for seen in solution.views if seen.ball is not None]
         told, solved = again(of, PAPER, with_tau(0.99 * max(errors)))
         assert told is None or told == solved
-        then, facts = solve_with_facts(of, PAPER, {})
+        then, facts = solve_and_collect_facts(of, PAPER, {})
         least = with_tau(0.99 * max(errors))
         assert rethreshold_solution(then, facts.view_diagonal.tolist(), least) is None
 
     def test_leaves_turned_views_to_the_solver(self):
-        then, facts = solve_with_facts(apart(0.0, 0.0), PAPER, {})
+        then, facts = solve_and_collect_facts(apart(0.0, 0.0), PAPER, {})
         turned = replace(then, findings=(replace(PLAIN, kind="sides_swapped"), *then.findings))
         assert rethreshold_solution(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
 

@@ -24,7 +24,7 @@ from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import CROWN, INWARD, TERMS, compute_paint_shift
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import (
-    PaintSightings,
+    FrameWithPaint,
     TripodPitch,
     find_tripod_pitch,
     second_moment_about_plan,
@@ -54,7 +54,7 @@ def laid(crown: float = 0.0, inward: float = 0.0) -> FloatArray:
 
 def painted(
     truth: FloatArray, pitch: Pitch, values: FloatArray, rng: np.random.Generator
-) -> PaintSightings:
+) -> FrameWithPaint:
     """Paint of a frame, and the camera that lays the plan's markings on it."""
     camera = camera_from_parameters(truth, MAIN.principal_point, HALF)
     places, marking = [], []
@@ -77,18 +77,18 @@ def painted(
         parameters = parameters + problem.compute_step(
             parameters, offsets, strict=at >= ROUNDS - STRICT
         )
-    return PaintSightings(parameters, curves, sigmas)
+    return FrameWithPaint(parameters, curves, sigmas)
 
 
 def film(
     pitch: Pitch, values: FloatArray, seed: int = 1
-) -> tuple[list[FloatArray], list[PaintSightings]]:
+) -> tuple[list[FloatArray], list[FrameWithPaint]]:
     rng = np.random.default_rng(seed)
     truths = [posed(pan, 1 + 0.02 * at) for at, pan in enumerate(np.linspace(-22, 22, 8))]
     return truths, [painted(truth, pitch, values, rng) for truth in truths]
 
 
-def shown_by(frames: list[PaintSightings]) -> TripodPitch:
+def shown_by(frames: list[FrameWithPaint]) -> TripodPitch:
     found = find_tripod_pitch(frames, SIZE, PLAN, POLICY)
     assert found is not None
     return found

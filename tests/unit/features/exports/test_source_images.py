@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.config import Settings
-from app.features.exports.source import ExportImages
+from app.features.exports.source import ExportImageWriter
 from app.media.frames import make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -29,7 +29,7 @@ def placed(tmp_path: Path, picture: Path, flipped: bool) -> Path:
     settings = Settings(home=tmp_path / "home")
     station = Station("7.png", ImageSize(60, 40), flipped=flipped)
     group = Group("m/7.png", (View("7.png", station, media=Media(str(picture))),), "m")
-    images = ExportImages(
+    images = ExportImageWriter(
         tmp_path / "out",
         "link",
         lambda media, width, turn: make_picture(media, width, turn, settings),

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError
-from app.features.file_tools.matches import collect_shared_match_places, read_match_of_each_frame
+from app.features.file_tools.matches import (
+    collect_camera_places_of_other_frames,
+    read_match_of_each_frame,
+)
 from app.formats.sn_calibration import LineFile
 from app.solving.match_position import FrameCameraPlace
 from tests.cameras import SIZE
@@ -40,24 +43,28 @@ class TestSharesOf:
     def test_a_frame_takes_no_part_in_its_own_prior(self):
         four = files("1", "2", "3", "4")
         named = dict.fromkeys("1234", "cup")
-        (first, *_) = collect_shared_match_places(four, places(90.0, 60.0, 60.0, 60.0), named)
+        (first, *_) = collect_camera_places_of_other_frames(
+            four, places(90.0, 60.0, 60.0, 60.0), named
+        )
         assert first.match == "cup"
         assert first.others.position_prior(0.0).mean[1] == pytest.approx(60.0, abs=0.01)
 
     def test_the_places_of_a_match_are_held_once(self):
         four, named = files("1", "2", "3", "4"), dict.fromkeys("1234", "cup")
-        shares = collect_shared_match_places(four, [None, *places(90.0, 60.0, 60.0)], named)
+        shares = collect_camera_places_of_other_frames(
+            four, [None, *places(90.0, 60.0, 60.0)], named
+        )
         assert len({id(share.others._equations) for share in shares}) == 1
         assert len(shares[0].others._equations) == 3
 
     def test_matches_are_guessed_in_the_order_of_the_names(self):
         mixed = files("4", "1", "3", "2")
-        found = collect_shared_match_places(mixed, places(80.0, 60.0, 80.0, 60.0), None)
+        found = collect_camera_places_of_other_frames(mixed, places(80.0, 60.0, 80.0, 60.0), None)
         assert [share.match for share in found] == ["1", "0", "1", "0"]
 
     def test_a_frame_that_is_not_named_gets_nothing(self):
         four = files("1", "2", "3", "4", "5")
-        *_, last = collect_shared_match_places(
+        *_, last = collect_camera_places_of_other_frames(
             four, places(*[60.0] * 5), dict.fromkeys("1234", "cup")
         )
         assert last.others.position_prior(0.0) is None

@@ -4,8 +4,8 @@ from app.features.findings.queries import (
     add_group_findings,
     filter_groups_with_finding,
     find_station_finding,
-    list_group_findings,
-    replace_group_findings,
+    list_group_import_findings,
+    replace_group_import_findings,
     replace_station_finding,
 )
 
@@ -14,15 +14,15 @@ class TestGroupFindings:
     def test_they_come_in_the_order_in_which_they_were_noticed(self, filled) -> None:
         with filled.write() as session:
             add_group_findings(session, "upstream", [(1, "7.png", "b"), (1, None, "a")])
-            assert list_group_findings(session, 1) == [("7.png", "b"), (None, "a")]
+            assert list_group_import_findings(session, 1) == [("7.png", "b"), (None, "a")]
 
     def test_new_findings_replace_all_of_the_group(self, filled) -> None:
         with filled.write() as session:
             add_group_findings(session, "upstream", [(1, "7.png", "b")])
-            replace_group_findings(session, 1, "upstream", [("cam1", "c")])
-            assert list_group_findings(session, 1) == [("cam1", "c")]
-            replace_group_findings(session, 1, "upstream", [])
-            assert list_group_findings(session, 1) == []
+            replace_group_import_findings(session, 1, "upstream", [("cam1", "c")])
+            assert list_group_import_findings(session, 1) == [("cam1", "c")]
+            replace_group_import_findings(session, 1, "upstream", [])
+            assert list_group_import_findings(session, 1) == []
 
 
 class TestGroupsTold:

@@ -11,7 +11,7 @@ from app.features.groups.edit import (
     SetCalibrationSource,
     SetLines,
     SetPictureGeometry,
-    SetStationCalibration,
+    SetStationCalibrationSource,
     SetStationCamera,
     SetStationLines,
     SetViewInclusion,
@@ -42,7 +42,7 @@ EDITS = [
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),
     SetStationLines({"Circle central": None}, not_visible=("Circle central",)),
-    SetStationCalibration("lines"),
+    SetStationCalibrationSource("lines"),
     SetStationCamera(EVERY_COEFFICIENT, (0.25,) * 64),
     SetStationCamera(EVERY_COEFFICIENT, None, "lines"),
     SetStationCamera(None),

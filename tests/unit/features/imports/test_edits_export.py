@@ -13,7 +13,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
-from app.features.findings.queries import list_group_findings
+from app.features.findings.queries import list_group_import_findings
 from app.features.findings.service import FindingReference, set_dismissal
 from app.features.groups.edit import (
     SetLines,
@@ -478,7 +478,7 @@ class TestPitch:
         bring(sized, there)
         assert read_pitches(there, "demo").items[0].pitch == Pitch(101.0, 65.0)
         with there.read() as session:
-            ((view, sentence),) = list_group_findings(session, 1)
+            ((view, sentence),) = list_group_import_findings(session, 1)
         assert view is None
         assert "edited the pitch" in sentence
         before = entries(there)

@@ -39,8 +39,8 @@ from app.features.people.visibility_queries import COPIES, READER, RestrictedRea
 from app.features.policies.service import change_policy
 from app.features.queue.changes import read_new_changes
 from app.features.stations.service import load_station, submit_station_edit
-from app.features.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
-from app.features.verdicts.bulk_undo import undo_batch
+from app.features.verdicts.bulk import give_verdicts, list_bulk_verdicts, plan_verdicts
+from app.features.verdicts.bulk_undo import undo_bulk_verdict
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
@@ -264,9 +264,9 @@ class TestHandIn:
         with pytest.raises(ForbiddenError, match="only ann"):
             give_verdicts(store, dataset, "", "deferred", actor="ben")
         give_verdicts(store, dataset, "", "deferred", actor="ann")
-        (batch,) = list_batches(store, dataset)
+        (batch,) = list_bulk_verdicts(store, dataset)
         with pytest.raises(ConflictError, match="submitted"):
-            undo_batch(store, batch.id, actor="ann")
+            undo_bulk_verdict(store, batch.id, actor="ann")
         assert get_annotation(store, take.id).verdict == "deferred"
 
     def test_nobody_else_takes_back_the_verdict_of_a_copy_that_was_returned(

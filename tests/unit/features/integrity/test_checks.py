@@ -17,7 +17,10 @@ from app.db.home import make_home
 from app.db.store import Store
 from app.features.imports.upload_queries import UploadWriter, mark_upload_permanent
 from app.features.integrity import checks
-from app.features.integrity.checks import examine_home, examine_surroundings
+from app.features.integrity.checks import (
+    examine_admins_clock_and_leftovers,
+    examine_home_without_database,
+)
 from app.features.people.login_queries import put_identity
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -34,7 +37,7 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def faults(settings: Settings) -> dict[str, CheckResult]:
-    return {check.name: check for check in examine_home(settings) if not check.ok}
+    return {check.name: check for check in examine_home_without_database(settings) if not check.ok}
 
 
 SIGN_ON = {"sso_client_id": CLIENT, "sso_client_secret": SECRET}
@@ -49,7 +52,7 @@ class TestMail:
             said |= {"smtp_port": box.port}
             checks = tmp_path / "home"
             make_home(settings := Settings(home=checks, url="https://club.example", **said))
-            found = {one.name: one for one in examine_home(settings)}["mail"]
+            found = {one.name: one for one in examine_home_without_database(settings)}["mail"]
             assert found.ok
             assert found.sentence == f"127.0.0.1:{box.port} answers (none); nothing was sent"
             assert "TOUCHLINE_URL" in faults(Settings(home=checks, **said))["mail"].sentence
@@ -67,7 +70,9 @@ class TestSignOn:
             said = {**SIGN_ON, "sso_issuer": provider.address}
             make_home(settings := Settings(home=tmp_path / "home", **said))
             assert "single sign-on" not in faults(settings)
-            found = {one.name: one for one in examine_home(settings)}["single sign-on"]
+            found = {one.name: one for one in examine_home_without_database(settings)}[
+                "single sign-on"
+            ]
             assert found.sentence == f"{provider.address} answers, with 1 keys"
             other = {**provider.described(), "issuer": "https://other.example"}
             there = "/.well-known/openid-configuration"
@@ -94,7 +99,7 @@ class TestSignOn:
 
 
 def around(store: Store) -> dict[str, CheckResult]:
-    return {check.name: check for check in examine_surroundings(store)}
+    return {check.name: check for check in examine_admins_clock_and_leftovers(store)}
 
 
 class TestExamineHome:
@@ -143,7 +148,9 @@ class TestExamineHome:
 
 class TestExamineSurroundings:
     def test_a_healthy_store_has_no_fault(self, there: Store) -> None:
-        assert [check.name for check in examine_surroundings(there) if not check.ok] == []
+        assert [
+            check.name for check in examine_admins_clock_and_leftovers(there) if not check.ok
+        ] == []
 
     def test_a_clock_behind_the_log_is_named(self, store: Store, fill, make_group) -> None:
         fill(make_group(7))

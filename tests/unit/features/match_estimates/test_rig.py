@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, InputError, StaleRevisionError
-from app.features.groups.edit import SetStationCalibration, SetStationCamera
+from app.features.groups.edit import SetStationCalibrationSource, SetStationCamera
 from app.features.groups.replay import replay_log
 from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
@@ -176,7 +176,7 @@ class TestAccept:
 
     def test_a_camera_that_has_changed_since_is_not_overwritten(self, store, proposed) -> None:
         state = proposed.stations["cam3"]
-        other = SetStationCalibration("lines")
+        other = SetStationCalibrationSource("lines")
         submit_station_edit(store, state.id, other, if_match=state.etag, actor="bob")
         with pytest.raises(StaleRevisionError):
             accept_rig(store, proposed, CAMERAS, actor="ann")

@@ -26,7 +26,7 @@ from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.paint import proposals as editing
 from app.features.paint.proposals import (
-    ProposalRun,
+    ProposalRunReport,
     forget_proposals,
     get_group_proposals,
     get_proposal_counts,
@@ -152,7 +152,7 @@ class TestProposeViews:
         )
         assert counts(filled) == (1, 0, 0, 0, 0, 0)
         run = propose_cameras_for_views(filled, "demo")
-        assert run == ProposalRun(views=1, proposed=1)
+        assert run == ProposalRunReport(views=1, proposed=1)
         ((key, is_open, item),) = get_group_proposals(filled, 2)
         assert (key, is_open, item.outcome, item.sentence) == ("b.png", True, "proposed", "")
         assert item.supported > 0.9 and item.points > 100 and item.error_px < 0.5
@@ -190,18 +190,18 @@ class TestProposeViews:
 
     def test_once_more_compares_pictures_and_looks_at_none(self, filled, asked):
         propose_cameras_for_views(filled, "demo")
-        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRunReport(views=1, left=1)
         assert len(asked) == 1
 
     def test_another_picture_and_a_missing_one_are_said(self, filled, asked, tmp_path: Path):
         propose_cameras_for_views(filled, "demo")
         draw(tmp_path / "b.png", empty=True)
-        assert propose_cameras_for_views(filled, "demo") == ProposalRun(
+        assert propose_cameras_for_views(filled, "demo") == ProposalRunReport(
             views=1, nothing=1, changed=1
         )
         (tmp_path / "b.png").unlink()
         run = propose_cameras_for_views(filled, "demo")
-        assert run == ProposalRun(views=1, nothing=1, missing=1)
+        assert run == ProposalRunReport(views=1, nothing=1, missing=1)
         ((_, _, item),) = get_group_proposals(filled, 2)
         assert (item.sentence, item.frame, dict(item.lines)) == (MISSING, "", {})
 
@@ -209,16 +209,16 @@ class TestProposeViews:
         with monkeypatch.context() as patch:
             patch.setattr(proposal_reading, "EXTRACTOR_VERSION", "0")
             propose_cameras_for_views(filled, "demo")
-        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRunReport(views=1, proposed=1)
 
     def test_where_nothing_was_found_a_later_search_looks_again(
         self, filled, asked, monkeypatch, tmp_path: Path
     ):
         draw(tmp_path / "b.png", empty=True)
         propose_cameras_for_views(filled, "demo")
-        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRunReport(views=1, left=1)
         monkeypatch.setattr(editing, "SEARCH_VERSION", editing.SEARCH_VERSION + 1)
-        assert propose_cameras_for_views(filled, "demo") == ProposalRun(views=1, nothing=1)
+        assert propose_cameras_for_views(filled, "demo") == ProposalRunReport(views=1, nothing=1)
 
     def test_where_nothing_was_found_more_of_the_match_is_worth_another_look(
         self, store, groups, asked, tmp_path: Path
@@ -227,8 +227,8 @@ class TestProposeViews:
         import_groups(store, "demo", groups, source="files", actor="ann")
         propose_cameras_for_views(store, "demo")
         solve_dataset(store, "demo")
-        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, nothing=1)
-        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRunReport(views=1, nothing=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRunReport(views=1, left=1)
 
     def test_a_static_camera_is_looked_at_once(self, store, asked, tmp_path: Path):
         media = draw(tmp_path / "s.png")
@@ -236,7 +236,7 @@ class TestProposeViews:
             Group(str(number), (view("cam1", media, shared=True),), match="m") for number in (1, 2)
         ]
         import_groups(store, "demo", shared, source="files", actor="ann")
-        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRunReport(views=1, proposed=1)
         assert counts(store) == (1, 1, 1, 0, 0, 0)
 
     def test_killed_midway_it_goes_on_where_it_was(self, store, asked, tmp_path, monkeypatch):
@@ -344,13 +344,13 @@ class TestDrawnLines:
         return store
 
     def test_are_looked_at_once_they_are_solved(self, poor, asked):
-        assert propose_cameras_for_views(poor, "demo") == ProposalRun()
+        assert propose_cameras_for_views(poor, "demo") == ProposalRunReport()
         solve_dataset(poor, "demo")
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
-        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRunReport(views=1, proposed=1)
         assert counts(poor) == (1, 1, 1, 0, 0, 0)
         assert found(poor, "proposal:proposed") == [1]
-        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, left=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRunReport(views=1, left=1)
 
     def test_a_camera_that_is_a_guess_is_none(self, store, asked, tmp_path: Path):
         names = iter(lines_of(CAMERA))
@@ -360,7 +360,7 @@ class TestDrawnLines:
         solve_dataset(store, "demo")
         calibration = load_group_state(store, 1).solution.views[0].calibration
         assert calibration.camera is not None and calibration.unobservable
-        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, unsure=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRunReport(views=1, unsure=1)
         ((_, is_open, item),) = get_group_proposals(store, 1)
         assert is_open and "Side line right” is drawn" in item.sentence
 
@@ -392,7 +392,7 @@ class TestDrawnLines:
         submit_edit(poor, 1, more, if_match=at.etag, actor="bob")
         assert not get_group_proposals(poor, 1)[0][1]
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
-        assert propose_cameras_for_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(poor, "demo") == ProposalRunReport(views=1, proposed=1)
         assert counts(poor) == (1, 1, 1, 0, 0, 0)
         ((_, is_open, item),) = get_group_proposals(poor, 1)
         assert is_open and "Big rect. right main" not in item.lines
@@ -414,7 +414,7 @@ class TestDrawnLines:
         ]
         import_groups(store, "demo", shared, source="files", actor="ann")
         solve_dataset(store, "demo")
-        assert propose_cameras_for_views(store, "demo") == ProposalRun(views=1, proposed=1)
+        assert propose_cameras_for_views(store, "demo") == ProposalRunReport(views=1, proposed=1)
 
 
 class TestQuery:

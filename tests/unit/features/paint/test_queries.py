@@ -17,7 +17,11 @@ from app.features.groups.revision_queries import (
     refresh_inputs_hashes,
     save_revision,
 )
-from app.features.paint.queries import insert_paint_readings, read_match_paint, read_paint_readings
+from app.features.paint.queries import (
+    count_paint_by_match,
+    insert_paint_readings,
+    read_paint_readings,
+)
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 
 POINTS = {"Middle line": (PaintPoint(1.25, 2.5, 0.0625),)}
@@ -96,6 +100,6 @@ class TestReadings:
     def test_readings_are_counted_by_match_and_reason(self, filled: Store) -> None:
         give(filled, READING, OTHER, READING)
         with filled.read() as session:
-            (item,) = read_match_paint(session, 1)
+            (item,) = count_paint_by_match(session, 1)
         assert (item.match, item.groups, item.reasons) == ("m", (1,), {None: 2, "no_paint": 1})
         assert (item.views >= item.without_picture, item.painted) == (True, (1,))

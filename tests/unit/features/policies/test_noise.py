@@ -21,7 +21,7 @@ from app.features.policies import noise
 from app.features.policies.noise import (
     ASSUMED_WORDS,
     adopt_estimated_noise,
-    read_noise,
+    estimate_dataset_noise,
     reset_noise_factors,
 )
 from app.features.policies.service import change_policy, read_policy, replace_thresholds
@@ -114,7 +114,7 @@ def make(store: Store, *, given: bool) -> None:
 class TestReadNoise:
     def test_clicks_noisier_than_the_policy_thinks_are_noticed(self, store: Store) -> None:
         make(store, given=False)
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         (advice,) = found.advice
         assert (advice.name, advice.present, advice.agrees) == ("click_sigma_px", 1.0, False)
         assert advice.low < advice.estimate < advice.high
@@ -130,7 +130,7 @@ class TestReadNoise:
         solve_dataset(store, "demo")
         with store.write() as session:
             append_entries(session, [*placings(read_states_of(store))])
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         worst, *rest = found.stations
         assert worst.source == "b" and not any(one.differs for one in rest if one.ratio > 1)
         assert worst.low < 4 * NOISY < worst.high and worst.differs
@@ -143,7 +143,7 @@ class TestReadNoise:
         carried = {view.noise for state in read_states_of(store) for view in state.group.views}
         assert carried <= {item.ratio for item in found.factors} and max(carried) > 1.5
         solve_dataset(store, "demo")
-        again = read_noise(store, "demo")
+        again = estimate_dataset_noise(store, "demo")
         assert not again.is_new and again.used == found.factors
         assert _mean_sigma(store) > sigma
         with store.write() as session:
@@ -160,7 +160,7 @@ class TestReadNoise:
         ]
         import_groups(store, "demo", groups, source="test", actor="ann")
         solve_dataset(store, "demo")
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         assert found.line_estimate is not None and found.line_estimate.views == 24
         advice = {item.name: item for item in found.advice}
         sigma, share = advice["calibration.line_sigma_px"], advice["calibration.line_share"]
@@ -173,21 +173,21 @@ class TestReadNoise:
         assert len(list_stale_groups(store, state.dataset_id)) == 8
         solve_dataset(store, "demo")
         assert (_spreads(store) < before).mean() > 0.8
-        again = read_noise(store, "demo")
+        again = estimate_dataset_noise(store, "demo")
         assert all(item.agrees for item in again.advice if "line" in item.name)
 
     def test_of_given_cameras_it_is_theirs(self, store: Store) -> None:
         make(store, given=True)
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         assert [item.name for item in found.advice] == ["given_sigma_px"]
         assert found.line_estimate is None
 
     def test_an_empty_dataset_says_that_nothing_is_known(self, store: Store) -> None:
         ensure_dataset(store, "demo", "ann")
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         assert (found.advice, found.values, len(found.notices)) == ((), {}, 2)
         with pytest.raises(NotFoundError):
-            read_noise(store, "nothing")
+            estimate_dataset_noise(store, "nothing")
 
     @pytest.mark.parametrize("error", [np.linalg.LinAlgError, DegenerateGeometryError])
     def test_lines_that_leave_a_camera_open_are_passed_over(
@@ -199,7 +199,7 @@ class TestReadNoise:
             raise error("open")
 
         monkeypatch.setattr(dataset_noise, "collect_view_line_evidence", fails)
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         assert (found.line_estimate, len(found.advice)) == (None, 1)
 
     def test_what_is_put_into_the_policy_is_what_was_shown(
@@ -213,7 +213,7 @@ class TestReadNoise:
         ]
         shown = iter([misses])
         monkeypatch.setattr(GroupNoiseInputs, "ray_residuals", lambda *_: tuple(next(shown, ())))
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         click, share = found.advice
         assert (click.name, share.name, share.unit) == (
             "click_sigma_px",
@@ -231,14 +231,14 @@ class TestApplyNoise:
         self, store: Store, given: bool
     ) -> None:
         make(store, given=given)
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         state = adopt_estimated_noise(store, found, actor="ben")
         assert (state.policy.name, state.history[-1].actor) == ("custom", "ben")
         name = found.advice[0].name
         assert getattr(state.policy, name) == found.advice[0].estimate
         assert len(list_stale_groups(store, state.dataset_id)) == 25
         solve_dataset(store, "demo")
-        again = read_noise(store, "demo")
+        again = estimate_dataset_noise(store, "demo")
         assert all(item.agrees for item in again.advice)
         assert (again.values, again.notices) == ({}, ())
         with pytest.raises(InputError, match="is what its policy already uses"):
@@ -247,10 +247,10 @@ class TestApplyNoise:
     def test_a_second_estimate_is_the_first(self, store: Store) -> None:
         """Lines and balls are each known with the other's noise, not with what was used before."""
         make_lined(store)
-        first = read_noise(store, "demo")
+        first = estimate_dataset_noise(store, "demo")
         adopt_estimated_noise(store, first, actor="ben")
         solve_dataset(store, "demo")
-        again = read_noise(store, "demo")
+        again = estimate_dataset_noise(store, "demo")
         for one, other in zip(first.advice, again.advice, strict=True):
             assert other.estimate == pytest.approx(one.estimate, abs=0.011)
             assert (other.low, other.high) == pytest.approx((one.low, one.high), abs=0.011)
@@ -285,7 +285,7 @@ class TestFollowing:
         assert state.policy.name == "touchline" and is_builtin_policy(state.policy)
         assert state.policy.click_sigma_px == pytest.approx(NOISY, rel=0.4)
         assert state.policy.calibration.line_sigma_px == pytest.approx(LINE_NOISY, rel=0.15)
-        found = read_noise(store, "demo")
+        found = estimate_dataset_noise(store, "demo")
         assert (found.follows, found.values) == (True, {})
         solutions = [item.solution for item in read_states_of(store)]
         assert None not in solutions

@@ -13,8 +13,8 @@ from app.features.practice.lessons import (
     WORDS,
     Feedback,
     judge_lesson,
+    make_practice_match,
     make_practice_scenes,
-    make_practice_stage,
 )
 from app.sample.faults import FaultPlan
 from app.sample.scene import PRACTICE_KINDS, Scene
@@ -42,7 +42,7 @@ def scenes() -> dict[str, Scene]:
 def mended(scene: Scene, kind: str) -> Group:
     """The group with the view as it was before the fault."""
     lesson = next(item for item in LESSONS if item.kind == kind)
-    sound = make_scene(make_practice_stage(), lesson.number, None).group
+    sound = make_scene(make_practice_match(), lesson.number, None).group
     return with_view(scene.group, sound.views[lesson.view])
 
 
@@ -155,7 +155,7 @@ class TestRejectable:
         assert told(scene, scene.group, ACCEPTED).state == "wrong"
 
     def test_leaving_the_view_of_another_moment_out_is_right_where_two_others_remain(self):
-        stage = make_practice_stage()
+        stage = make_practice_match()
         numbers = range(501, 560)
         made = (make_scene(stage, n, FaultPlan("not_synchronous", 1, 1)) for n in numbers)
         scene = next(item for item in made if len(item.group.views) == 3)

@@ -12,8 +12,8 @@ import pytest
 from app.features.practice.lessons import (
     CLEAN,
     LESSONS,
+    make_practice_match,
     make_practice_scenes,
-    make_practice_stage,
     write_practice,
 )
 from app.formats.soccernet_v3 import ARCHIVE
@@ -86,7 +86,7 @@ class TestLessons:
     @pytest.mark.parametrize("kind", MENDABLE)
     def test_what_was_there_before_the_fault_mends_it(self, scenes: dict[str, Scene], kind: str):
         lesson = next(item for item in LESSONS if item.kind == kind)
-        sound = make_scene(make_practice_stage(), lesson.number, None)
+        sound = make_scene(make_practice_match(), lesson.number, None)
         spoilt = scenes[kind].group
         views = [replace(view, media=None) for view in spoilt.views]
         views[lesson.view] = sound.group.views[lesson.view]

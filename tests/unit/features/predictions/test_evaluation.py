@@ -13,8 +13,8 @@ from app.features.predictions.accept import AcceptRequest, accept_predicted_ball
 from app.features.predictions.evaluation import (
     FrameQuery,
     compare_runs,
+    get_chart,
     get_evaluation,
-    get_figure,
     list_evaluations,
     list_frames,
     parse_run_tables,
@@ -252,11 +252,11 @@ class TestListFrames:
 class TestFigures:
     def test_tables_and_figures_come_back_as_they_were(self, store, exact) -> None:
         run = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
-        figure = get_figure(store, run.id, "precision_recall")
+        figure = get_chart(store, run.id, "precision_recall")
         assert figure.panels[0].series[0].y[-1] == 1
         assert figure.panels[0].x.high == 1
         with pytest.raises(NotFoundError, match='no figure "jac"'):
-            get_figure(store, run.id, "jac")
+            get_chart(store, run.id, "jac")
 
 
 class TestCompare:

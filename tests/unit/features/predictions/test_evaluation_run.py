@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.evaluation.frame import Frame
+from app.evaluation.frame import GroundTruthFrame
 from app.evaluation.result import Table
 from app.features.predictions.evaluation_run import (
     AcceptedTruthCounts,
@@ -19,9 +19,11 @@ from app.soccer.frames import Box, ImageSize
 BOXES = {"annotated": Box(1, 2, 3, 4)}
 
 
-def frame(identity: int, source: str = "", **more: object) -> Frame:
+def frame(identity: int, source: str = "", **more: object) -> GroundTruthFrame:
     values = {"boxes": BOXES, "predicted_by": source, **more}
-    return Frame(identity, 1, "g", f"{identity}.png", "m", ImageSize(1280, 720), **values)
+    return GroundTruthFrame(
+        identity, 1, "g", f"{identity}.png", "m", ImageSize(1280, 720), **values
+    )
 
 
 class TestAcceptedTruth:

@@ -10,7 +10,7 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
-from app.features.predictions.evaluation import get_figure, parse_run_tables
+from app.features.predictions.evaluation import get_chart, parse_run_tables
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
     SourcesEvaluationRequest,
@@ -73,7 +73,7 @@ class TestEvaluation:
         assert tables["tracks"].cell("all", "mae_m").value == pytest.approx(0.0, abs=1e-12)
         assert tables["tracks"].cell("all", "coverage").value == 1.0
         assert tables["track_events"].cell("any", "f1").value == 1.0
-        assert get_figure(accepted, found.id, "track_distance").panels[0].series[0].y[1] == 1.0
+        assert get_chart(accepted, found.id, "track_distance").panels[0].series[0].y[1] == 1.0
         assert found.counts["track_frames"] == found.counts["track_frames_compared"] > 30
 
     def test_another_one_has_its_error_and_what_pins_the_truth(self, accepted, own) -> None:

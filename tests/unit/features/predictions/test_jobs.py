@@ -13,7 +13,11 @@ from app.features.jobs.service import Jobs
 from app.features.predictions.accept import AcceptRequest
 from app.features.predictions.evaluation import list_evaluations
 from app.features.predictions.evaluation_run import EvaluationRequest
-from app.features.predictions.jobs import request_accept, request_evaluation, resume_prediction_jobs
+from app.features.predictions.jobs import (
+    register_prediction_jobs,
+    request_accept,
+    request_evaluation,
+)
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
 
@@ -21,7 +25,7 @@ from app.features.predictions.service import add_predictions
 @pytest.fixture
 def jobs(store):
     jobs = Jobs(store)
-    resume_prediction_jobs(jobs, store)
+    register_prediction_jobs(jobs, store)
     yield jobs
     jobs.close()
 

@@ -8,7 +8,7 @@ from app.db.log import find_newest_entry_id
 from app.db.store import Store
 from app.features.comments.service import begin_thread
 from app.features.datasets.service import delete_dataset, get_dataset
-from app.features.groups.edit import SetStationCalibration, SetViewInclusion
+from app.features.groups.edit import SetStationCalibrationSource, SetViewInclusion
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
@@ -68,7 +68,7 @@ class TestReadChanges:
         station = next(iter(load_group_state(store, ids[0]).station_ids.values()))
         before, etag = newest(store), load_station(store, station).etag
         submit_station_edit(
-            store, station, SetStationCalibration("lines"), if_match=etag, actor="ann"
+            store, station, SetStationCalibrationSource("lines"), if_match=etag, actor="ann"
         )
         told = since(store, before)
         assert [(item.kind, item.group_id) for item in told if item.group_id] == [

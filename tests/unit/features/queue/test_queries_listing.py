@@ -18,7 +18,7 @@ from app.features.queue.queries import (
     RowOrder,
     compare_condition,
     count_states,
-    find_group_position,
+    find_dataset_and_sort_keys,
     read_columns,
     read_rows,
 )
@@ -98,10 +98,10 @@ class TestOrder:
     def test_a_group_has_a_place_also_where_it_is_not_among_those_that_are_meant(
         self, session: Session
     ) -> None:
-        place = find_group_position(session, 4, BY_SIGMA)
+        place = find_dataset_and_sort_keys(session, 4, BY_SIGMA)
         assert place is not None
         dataset, keys = place
-        assert (dataset, find_group_position(session, 9, BY_SIGMA)) == (1, None)
+        assert (dataset, find_dataset_and_sort_keys(session, 9, BY_SIGMA)) == (1, None)
         assert GroupListing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5, total=5) == (
             [2],
             [3, 1],

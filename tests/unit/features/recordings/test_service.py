@@ -24,9 +24,9 @@ from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants
 from app.features.recordings.jobs import (
     InstantOptions,
+    register_recording_jobs,
     request_groups_of_instants,
     request_index,
-    resume_recording_jobs,
 )
 from app.features.recordings.service import (
     Recording,
@@ -187,7 +187,7 @@ class TestJobs:
         with stopped_at_its_first_step(module, "index_recording_in_worker", first):
             number = request_index(first, store, recording, actor="ann").id
         with closing(Jobs(store)) as second:
-            resume_recording_jobs(second, store)
+            register_recording_jobs(second, store)
             second.start()
             assert second.wait(number, SECONDS).state == "done"
             options = InstantOptions(propose=False)

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from app.errors import ConflictError, NotFoundError, StaleRevisionError
-from app.features.groups.edit import SetStationCalibration, SetStationLines
+from app.features.groups.edit import SetStationCalibrationSource, SetStationLines
 from app.features.groups.submit import load_group_state
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
@@ -92,7 +92,7 @@ class TestSubmitStation:
             change(store, own)
 
     def test_which_calibration_counts_is_a_switch(self, store, station) -> None:
-        after = change(store, station, SetStationCalibration("lines"))
+        after = change(store, station, SetStationCalibrationSource("lines"))
         assert after.station.calibration == "lines"
 
     def test_an_unknown_station_is_not_found(self, store) -> None:

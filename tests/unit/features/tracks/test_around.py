@@ -15,8 +15,8 @@ from app.features.groups.submit import load_group_state
 from app.features.tracks.around import AROUND, compute_track_excerpt, find_tracks_of_group
 from app.features.tracks.codec import TrackInputs, make_partial_track
 from app.features.tracks.making import read_export_records
-from app.features.tracks.queries import TrackGroup
-from app.features.tracks.service import list_tracks, make_tracks, read_track
+from app.features.tracks.queries import GroupForTracking
+from app.features.tracks.service import list_tracks, make_tracks, read_track_detail
 from app.features.verdicts.service import set_verdict
 from app.formats.export_record import ExportRecord
 from app.soccer.group import Group
@@ -43,7 +43,7 @@ def at_frame(store: Store, track: int) -> np.ndarray:
 
 class TestTrackAround:
     def test_is_the_track_where_nothing_has_changed(self, store: Store, track: int) -> None:
-        whole = read_track(store, track).ball.position[AT]
+        whole = read_track_detail(store, track).ball.position[AT]
         assert np.linalg.norm(at_frame(store, track) - whole) < 0.03
         assert np.linalg.norm(at_frame(store, track) - places(AT + 1)[-1]) < 0.1
 
@@ -59,7 +59,7 @@ class TestTrackAround:
             for item in detail.ball.contradicted
         ]
         assert frames == [FIRST + AT]
-        assert not read_track(store, track).ball.contradicted
+        assert not read_track_detail(store, track).ball.contradicted
 
     def test_reads_what_changed_and_keeps_the_rest(
         self, store: Store, flight: list[int], track: int, monkeypatch: pytest.MonkeyPatch
@@ -67,7 +67,7 @@ class TestTrackAround:
         compute_track_excerpt(store, track, FIRST + AT)
         asked: list[str] = []
 
-        def reading(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+        def reading(session: Session, groups: Sequence[GroupForTracking]) -> Iterator[ExportRecord]:
             asked.extend(group.key for group in groups)
             return read_export_records(session, groups)
 
@@ -117,7 +117,7 @@ class TestInexactCamera:
             return make_partial_track(inputs, known)
 
         monkeypatch.setattr("app.features.tracks.around.make_partial_track", part)
-        whole = read_track(store, track.id).ball.position[AT]
+        whole = read_track_detail(store, track.id).ball.position[AT]
         assert np.linalg.norm(at_frame(store, track.id) - whole) < 0.05
         assert told == [ViewErrors(track.summary.noise, track.summary.late)]
 

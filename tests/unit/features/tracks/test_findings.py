@@ -27,7 +27,7 @@ from app.features.tracks.service import (
     TrackReview,
     list_tracks,
     make_tracks,
-    read_track,
+    read_track_detail,
     review_track,
 )
 from app.features.tracks.tables import TrackModel
@@ -166,7 +166,7 @@ class TestFindings:
 
     def test_say_where_the_balls_of_a_track_are(self, store: Store, beside: int) -> None:
         (track,) = list_tracks(store, "demo")
-        detail = read_track(store, track.id)
+        detail = read_track_detail(store, track.id)
         assert len(detail.ball.contradicted) == track.summary.contradicted >= 1
 
 

@@ -19,7 +19,7 @@ from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.recordings.follow import BallFollower
 from app.features.tracks import follow
 from app.features.tracks.follow import FollowedViews, follow_ball_from_view, plan_ball_following
-from app.features.tracks.queries import find_group_location
+from app.features.tracks.queries import find_dataset_match_and_key
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -178,7 +178,7 @@ class TestFollowView:
         ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED, FIRST + 13]))
         view = view_of(store, ids[10])
         with store.write() as session:
-            dataset = find_group_location(session, ids[13]).dataset_id
+            dataset = find_dataset_match_and_key(session, ids[13]).dataset_id
             gold = {"group_id": ids[13], "dataset_id": dataset, "start": "bare"}
             session.execute(
                 insert(GoldModel), {**gold, "truth": b"", "marked": "x", "marked_by": "lea"}
@@ -309,7 +309,7 @@ class TestRefusals:
     ) -> None:
         ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
         with store.read() as session:
-            place = find_group_location(session, ids[0])
+            place = find_dataset_match_and_key(session, ids[0])
         assert place is not None
         monkeypatch.setattr(follow, "COPIES", place.dataset_id - 1)
         assert "no ball is followed" in self.refused(store, frames, ids[0])

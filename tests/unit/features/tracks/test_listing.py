@@ -24,7 +24,7 @@ from app.features.people.service import invite
 from app.features.solutions.service import solve_dataset
 from app.features.tracks.listing import TrackChoice, choose_tracks
 from app.features.tracks.service import TrackReview, list_tracks, make_tracks, review_track
-from app.features.webhooks.queries import read_batch_values
+from app.features.webhooks.queries import read_message_values_of_batch
 from tests.flights import flight_groups
 from tests.unit.features.tracks.test_service import move
 from tests.unit.stores import Once
@@ -103,7 +103,7 @@ class TestBatchesOfTracks:
         judge(store, tracks["late"], "none")
         assert get_batch(store, batch.id).settled == 0
         with store.read() as session:
-            values = read_batch_values(session, batch.id)
+            values = read_message_values_of_batch(session, batch.id)
         assert values is not None
         assert (values["groups"], values["settled"]) == (2, 0)
 

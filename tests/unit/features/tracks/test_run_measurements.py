@@ -11,7 +11,7 @@ import pytest
 
 from app.db.store import Store
 from app.features.tracks.around import compute_track_excerpt
-from app.features.tracks.service import TrackDetail, list_tracks, make_tracks, read_track
+from app.features.tracks.service import TrackDetail, list_tracks, make_tracks, read_track_detail
 from tests.bench.link import at_times
 from tests.linked_recording import (
     BALL,
@@ -45,7 +45,7 @@ def recording(
 def made(store: Store) -> TrackDetail:
     make_tracks(store, "cup", None, "ann", lambda *_: None)
     (track,) = list_tracks(store, "cup")
-    return read_track(store, track.id)
+    return read_track_detail(store, track.id)
 
 
 class TestFollowedRuns:

@@ -21,7 +21,7 @@ from app.features.tracks.service import (
     get_track,
     list_tracks,
     make_tracks,
-    read_track,
+    read_track_detail,
     review_track,
 )
 from app.features.verdicts.service import set_verdict
@@ -63,7 +63,7 @@ class TestMakeTracks:
         assert (track.stale, track.verdict, track.actor) == (False, None, "ann")
         assert track.summary.frames == sum(track.summary.states.values()) == 60
         assert track.summary.measurements > 150
-        detail = read_track(store, track.id)
+        detail = read_track_detail(store, track.id)
         assert np.nanmedian(np.linalg.norm(detail.ball.position - places(60), axis=1)) < 0.1
         assert detail.groups[FIRST + 3].id == flight[3]
 
@@ -202,7 +202,7 @@ def mirrored(group: Group) -> Group:
 
 
 def _events(store: Store) -> list[tuple[int, str]]:
-    events = read_track(store, only(store).id).ball.events
+    events = read_track_detail(store, only(store).id).ball.events
     return [(event.frame, event.kind) for event in events]
 
 

@@ -24,8 +24,13 @@ from app.features.queue.service import list_groups, summarize_groups
 from app.features.queue.tables import QueueModel
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts.bulk import BatchRun, give_verdicts, list_batches, plan_verdicts
-from app.features.verdicts.bulk_undo import undo_batch
+from app.features.verdicts.bulk import (
+    BulkVerdictRun,
+    give_verdicts,
+    list_bulk_verdicts,
+    plan_verdicts,
+)
+from app.features.verdicts.bulk_undo import undo_bulk_verdict
 from app.features.verdicts.service import check_verdict, set_verdict
 from tests.unit.features.pending import keyed_request
 
@@ -196,9 +201,9 @@ class TestGiveVerdicts:
         named = ",".join(map(str, range(ids[1], ids[1] + 12_764)))
         report = give_verdicts(store, 1, f"id:{named}", "deferred", actor="ben")
         assert report.changed == 3
-        (batch,) = list_batches(store, 1)
+        (batch,) = list_bulk_verdicts(store, 1)
         assert batch.query == f"id:{named}"
-        assert undo_batch(store, report.batch, actor="ben").restored == 3
+        assert undo_bulk_verdict(store, report.batch, actor="ben").restored == 3
         with store.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
@@ -212,7 +217,7 @@ class TestGiveVerdicts:
         first = give_verdicts(store, 1, "", "deferred", actor="ben")
         again = give_verdicts(store, 1, "", "deferred", actor="ann")
         assert (first.changed, again.changed, again.batch) == (4, 0, None)
-        assert len(list_batches(store, 1)) == 1
+        assert len(list_bulk_verdicts(store, 1)) == 1
 
     def test_a_page_is_full_where_batches_between_are_for_reviewers_alone(
         self, store, ids, monkeypatch: pytest.MonkeyPatch
@@ -220,10 +225,10 @@ class TestGiveVerdicts:
         for number in range(5):
             asked = "submissions<9" if number in (1, 2, 3) else ""
             give_verdicts(store, 1, asked, "deferred", note=f"round {number}", actor="ben")
-        monkeypatch.setattr(bulk, "sees_all_work", lambda _: False)
-        shown = list_batches(store, 1, 2)
+        monkeypatch.setattr(bulk, "sees_independent_work", lambda _: False)
+        shown = list_bulk_verdicts(store, 1, 2)
         assert [one.id for one in shown] == [5, 1]
-        assert [one.id for one in list_batches(store, 1, 2, before=5)] == [1]
+        assert [one.id for one in list_bulk_verdicts(store, 1, 2, before=5)] == [1]
 
     def test_the_same_verdict_with_a_note_of_its_own_is_a_new_one(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
@@ -244,7 +249,7 @@ class TestGiveVerdicts:
 
     def test_a_request_that_is_being_carried_out_is_not_carried_out_twice(self, store, ids) -> None:
         verdict = check_verdict("deferred", None, None)
-        first, second = (BatchRun(1, "", verdict, "ann") for _ in range(2))
+        first, second = (BulkVerdictRun(1, "", verdict, "ann") for _ in range(2))
         with keyed_request().activate():
             with store.write() as session:
                 assert (first.resume(session), second.resume(session)) == (None, None)
@@ -265,7 +270,7 @@ class TestGiveVerdicts:
         self, store, ids, monkeypatch
     ) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 3)
-        save, calls = bulk.BatchRun.save_chunk, []
+        save, calls = bulk.BulkVerdictRun.save_chunk, []
 
         def killed(self, session, rows):
             calls.append(rows)
@@ -273,16 +278,16 @@ class TestGiveVerdicts:
                 raise KeyboardInterrupt
             save(self, session, rows)
 
-        monkeypatch.setattr(bulk.BatchRun, "save", killed)
+        monkeypatch.setattr(bulk.BulkVerdictRun, "save", killed)
         with pytest.raises(KeyboardInterrupt):
             give_verdicts(store, 1, "", "deferred", actor="ben")
         assert statuses(store) == ["deferred"] * 3 + ["unreviewed"]
-        (left,) = list_batches(store, 1)
+        (left,) = list_bulk_verdicts(store, 1)
         assert (left.changed, left.done) == (3, False)
         rest = give_verdicts(store, 1, "", "deferred", actor="ben")
         assert rest.changed == 1
         for batch in (rest.batch, left.id):
-            undo_batch(store, batch, actor="ben")
+            undo_bulk_verdict(store, batch, actor="ben")
         assert set(statuses(store)) == {"unreviewed"}
 
     def test_others_write_between_the_chunks(self, store, ids, monkeypatch) -> None:
@@ -302,7 +307,7 @@ class TestUndoBatch:
         before = [verdict_of(store, number) for number in ids]
         report = give_verdicts(store, 1, "", "accepted", note="all", actor="ben")
         assert report.changed == 4
-        undone = undo_batch(store, report.batch, actor="eve")
+        undone = undo_bulk_verdict(store, report.batch, actor="eve")
         assert (undone.restored, undone.kept) == (4, 0)
         after = [verdict_of(store, number) for number in ids]
         assert after[:2] == before[:2]
@@ -318,25 +323,25 @@ class TestUndoBatch:
     def test_a_group_that_was_judged_since_keeps_its_verdict(self, store, ids) -> None:
         report = give_verdicts(store, 1, "", "deferred", actor="ben")
         judge(store, ids[2], "rejected", actor="ann", reason="bad_calibration")
-        undone = undo_batch(store, report.batch, actor="ben")
+        undone = undo_bulk_verdict(store, report.batch, actor="ben")
         assert (undone.restored, undone.kept) == (3, 1)
         assert statuses(store)[2] == "rejected"
 
     def test_a_batch_is_taken_back_only_once(self, store, ids) -> None:
         report = give_verdicts(store, 1, "", "deferred", actor="ben")
-        undo_batch(store, report.batch, actor="ben")
-        (batch,) = list_batches(store, 1)
+        undo_bulk_verdict(store, report.batch, actor="ben")
+        (batch,) = list_bulk_verdicts(store, 1)
         assert (batch.undone_by, batch.done) == ("ben", True)
         with pytest.raises(ConflictError, match="ben has undone this batch"):
-            undo_batch(store, report.batch, actor="ann")
+            undo_bulk_verdict(store, report.batch, actor="ann")
 
     def test_two_who_take_it_back_at_once_do_it_once(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 2)
         batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
-        before_write(store, monkeypatch, 2, lambda: undo_batch(store, batch, actor="eve"))
+        before_write(store, monkeypatch, 2, lambda: undo_bulk_verdict(store, batch, actor="eve"))
         with pytest.raises(ConflictError, match="eve has undone this batch"):
-            undo_batch(store, batch, actor="ann")
-        (found,) = list_batches(store, 1)
+            undo_bulk_verdict(store, batch, actor="ann")
+        (found,) = list_bulk_verdicts(store, 1)
         assert (found.undone_by, found.undo_spans) == ("eve", [[5, 8]])
         with store.read() as session:
             kinds = session.scalars(text("SELECT kind FROM log WHERE kind LIKE '%undo'")).all()
@@ -354,13 +359,13 @@ class TestUndoBatch:
 
         def somebody_else_begins() -> None:
             with pytest.raises(RuntimeError, match="killed"):
-                undo_batch(store, batch, actor="eve")
+                undo_bulk_verdict(store, batch, actor="eve")
 
         monkeypatch.setattr(bulk, "CHUNK", 1)
         monkeypatch.setattr(bulk_undo, "_restore_chunk", stopped)
         batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
         before_write(store, monkeypatch, 2, somebody_else_begins)
-        undone = undo_batch(store, batch, actor="ann")
+        undone = undo_bulk_verdict(store, batch, actor="ann")
         assert (undone.restored, undone.kept) == (4, 0)
         assert set(statuses(store)) == {"unreviewed"}
 
@@ -368,16 +373,16 @@ class TestUndoBatch:
         self, store, ids, monkeypatch
     ) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 1)
-        before_write(store, monkeypatch, 3, lambda: undo_batch(store, 1, actor="eve"))
+        before_write(store, monkeypatch, 3, lambda: undo_bulk_verdict(store, 1, actor="eve"))
         with pytest.raises(ConflictError, match="were undone meanwhile"):
             give_verdicts(store, 1, "", "deferred", actor="ben")
         assert set(statuses(store)) == {"unreviewed"}
-        (found,) = list_batches(store, 1)
+        (found,) = list_bulk_verdicts(store, 1)
         assert (found.changed, found.done, found.undone_by) == (2, False, "eve")
 
     def test_an_unknown_batch_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            undo_batch(store, 5, actor="ben")
+            undo_bulk_verdict(store, 5, actor="ben")
 
 
 class TestManyGroups:
@@ -396,7 +401,7 @@ class TestManyGroups:
         monkeypatch.setattr(store, "write", counted)
         report = give_verdicts(store, 1, "", "deferred", actor="ben")
         assert report.changed == count
-        assert undo_batch(store, report.batch, actor="ben").restored == count
+        assert undo_bulk_verdict(store, report.batch, actor="ben").restored == count
         assert len(turns) == 2 * (count // bulk.CHUNK)
         with store.read() as session:
             assert verify_chain(session) == 1 + count + 1 + count + 1

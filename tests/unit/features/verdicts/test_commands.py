@@ -13,7 +13,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
-from app.features.verdicts.bulk import list_batches
+from app.features.verdicts.bulk import list_bulk_verdicts
 from app.formats.report import ReaderReport
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3_writer import write_soccernet_v3
@@ -56,7 +56,7 @@ class TestVerdict:
         code, out, _ = run("--actor", "nightly", *words, "--expected", 2)
         assert (code, json.loads(out)["changed"], accepted(run)) == (0, 2, 2)
         store = Store.open(Settings(home=tmp_path / "home"))
-        assert [batch.actor for batch in list_batches(store, 1)] == ["script:nightly"]
+        assert [batch.actor for batch in list_bulk_verdicts(store, 1)] == ["script:nightly"]
         store.close()
         assert run("verdict", "unreviewed", "--dataset", "demo", "--query", "id:1")[0] == 0
         assert accepted(run) == 1

@@ -8,9 +8,9 @@ from app.features.verdicts.queries import (
     StoredVerdict,
     count_groups_by_judge,
     insert_verdicts_and_end_work,
-    list_groups_judged_between,
-    list_groups_with_newest_verdict_between,
-    read_judged_inputs,
+    list_groups_of_verdict_range,
+    list_groups_with_newest_verdict_in_range,
+    read_judged_inputs_hashes,
     read_last_verdicts,
     read_verdicts,
 )
@@ -32,16 +32,16 @@ class TestRanges:
     def test_a_group_that_was_judged_again_is_not_of_the_earlier_range(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts_and_end_work(session, 1, [FIRST, LATER], actor="ann", at="t")
-            assert list_groups_with_newest_verdict_between(session, 1, 1) == []
+            assert list_groups_with_newest_verdict_in_range(session, 1, 1) == []
             assert (
-                list_groups_with_newest_verdict_between(session, 1, 2)
-                == list_groups_with_newest_verdict_between(session, 2, 9)
+                list_groups_with_newest_verdict_in_range(session, 1, 2)
+                == list_groups_with_newest_verdict_in_range(session, 2, 9)
                 == [1]
             )
-            assert list_groups_judged_between(session, 1, 2) == [1, 1]
-            assert read_judged_inputs(session, 1, 1, [1, 9]) == {1: "a"}
-            assert read_judged_inputs(session, 2, 2, [1]) == {1: "b"}
-            assert read_judged_inputs(session, 1, 2, [9]) == {}
+            assert list_groups_of_verdict_range(session, 1, 2) == [1, 1]
+            assert read_judged_inputs_hashes(session, 1, 1, [1, 9]) == {1: "a"}
+            assert read_judged_inputs_hashes(session, 2, 2, [1]) == {1: "b"}
+            assert read_judged_inputs_hashes(session, 1, 2, [9]) == {}
 
 
 class TestCountByJudge:

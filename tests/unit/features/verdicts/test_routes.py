@@ -10,7 +10,7 @@ from sqlalchemy import text
 from app.db.session import Session
 from app.features.imports.ingest import import_groups
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts.bulk import BatchRun
+from app.features.verdicts.bulk import BulkVerdictRun
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -90,13 +90,13 @@ class TestListBatches:
         for number in range(5):
             api.post(VERDICTS, json={"state": "deferred", "note": f"round {number}"})
         asked: list[int] = []
-        read = bulk.read_batches
+        read = bulk.read_bulk_verdicts
 
         def counted(session: Session, dataset_id: int, limit: int, *before: Any) -> Any:
             asked.append(limit)
             return read(session, dataset_id, limit, *before)
 
-        monkeypatch.setattr(bulk, "read_batches", counted)
+        monkeypatch.setattr(bulk, "read_bulk_verdicts", counted)
         pages, cursor = [], None
         while True:
             params = {"limit": 2, **({"cursor": cursor} if cursor else {})}
@@ -165,7 +165,7 @@ class TestStoppedBetweenChunks:
 
     def test_verdicts_are_given_once(self, app, api, monkeypatch) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
         assert log_kinds(app) == ["verdict"]
         done = api.post(VERDICTS, json={**self.BODY, "expected": None}, headers=self.KEY)
@@ -183,7 +183,7 @@ class TestStoppedBetweenChunks:
     ) -> None:
         body = {"state": "deferred", "expected": 3}
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
         new = Group("new", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
         import_groups(app.state.services.store, "broadcast", [new], source="test", actor="local")
@@ -193,14 +193,14 @@ class TestStoppedBetweenChunks:
     def test_one_that_an_earlier_version_began_goes_on_with_the_groups_that_it_had_left(
         self, api, monkeypatch
     ) -> None:
-        interrupt = BatchRun.save_remaining
+        interrupt = BulkVerdictRun.save_remaining
 
-        def in_its_words(run: BatchRun, session: Session, left: dict[str, Any]) -> None:
+        def in_its_words(run: BulkVerdictRun, session: Session, left: dict[str, Any]) -> None:
             interrupt(run, session, {"ids": [3], "refused": []})
 
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save_remaining", in_its_words)
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_remaining", in_its_words)
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
         done = api.post(VERDICTS, json=self.BODY, headers=self.KEY).json()
         assert (done["batch"], done["changed"]) == (1, 2)
@@ -209,7 +209,7 @@ class TestStoppedBetweenChunks:
     def test_what_was_expected_is_weighed_at_the_beginning_alone(self, api, monkeypatch) -> None:
         body = {"state": "deferred", "expected": 3}
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=2))
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=2))
             assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
         assert api.post(VERDICTS, json=body, headers=self.KEY).json()["changed"] == 3
 
@@ -217,7 +217,7 @@ class TestStoppedBetweenChunks:
         self, api, monkeypatch
     ) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
             api.post(VERDICTS, json=self.BODY, headers=self.KEY)
         api.post("/api/v1/verdict-batches/1/undo")
         refused = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
@@ -241,7 +241,7 @@ class TestStoppedBetweenChunks:
         api.post("/api/v1/verdict-batches/1/undo")
         redo = "/api/v1/verdict-batches/1/redo"
         with monkeypatch.context() as patch:
-            patch.setattr(BatchRun, "save", Stop(BatchRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(redo, headers=self.KEY).status_code == 500
         done = api.post(redo, headers=self.KEY).json()
         assert (done["batch"], done["changed"], done["kept"], done["refused"]) == (2, 3, 0, [])

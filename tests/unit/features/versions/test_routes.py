@@ -9,7 +9,7 @@ import pytest
 
 from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.features.versions.jobs import request_freeze, resume_version_jobs
+from app.features.versions.jobs import register_version_jobs, request_freeze
 from app.http.deps import Services
 
 API = "/api/v1"
@@ -77,7 +77,7 @@ class TestFreezeVersion:
         request = FreezeRequest("v1", groups="passing")
         job = request_freeze(earlier, store, "broadcast", request, actor="ann")
         later = Jobs(store)
-        resume_version_jobs(later, store)
+        register_version_jobs(later, store)
         later.start()
         ended_job = later.wait(job.id, 60)
         later.close()
@@ -96,7 +96,7 @@ class TestFreezeVersion:
         )
         version = freeze_dataset(store, "broadcast", request, actor="ann")
         later = Jobs(store)
-        resume_version_jobs(later, store)
+        register_version_jobs(later, store)
         later.start()
         ended = [later.wait(job.id, 60) for job in (first, second)]
         later.close()

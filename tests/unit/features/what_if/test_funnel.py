@@ -26,7 +26,7 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.soccer.thresholds import THRESHOLDS
-from app.solving.ball_covariance import MeanCovariance
+from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.facts import collect_facts_of_views, join_facts
 from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups
 from app.solving.solve import solve_group
@@ -99,7 +99,7 @@ def random_policy(seed: int) -> Policy:
 
 
 def judge_table(table: YieldTable, policy: Policy) -> Judgement:
-    return judge_groups(table.facts, policy, MeanCovariance(table.facts))
+    return judge_groups(table.facts, policy, CovarianceOfMeanBall(table.facts))
 
 
 def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
@@ -161,7 +161,7 @@ class TestJudgeTable:
             ]
         )
         policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
-        judged = judge_groups(table, policy, MeanCovariance(table))
+        judged = judge_groups(table, policy, CovarianceOfMeanBall(table))
         assert GATES.index("agreement") in judged.first_failed_gate and judged.passing_groups.any()
         for place, (group, old) in enumerate(painted):
             failing = solved_again(group, old, policy).first_failing

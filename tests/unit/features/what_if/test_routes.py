@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.features.what_if.funnel import UNSOLVED
-from app.features.what_if.routes import LABELS, WhatIf
+from app.features.what_if.routes import LABELS, ThresholdsToTry
 from app.soccer.solution import GATES
 from app.soccer.thresholds import THRESHOLDS
 
@@ -83,8 +83,8 @@ class TestTryPolicy:
 
 class TestWhatIf:
     def test_has_every_threshold_of_a_policy(self) -> None:
-        inner = WhatIf.model_fields["calibration"].annotation.__args__[0].model_fields
-        assert {*WhatIf.model_fields} - {"calibration"} | {
+        inner = ThresholdsToTry.model_fields["calibration"].annotation.__args__[0].model_fields
+        assert {*ThresholdsToTry.model_fields} - {"calibration"} | {
             f"calibration.{name}" for name in inner
         } == {threshold.name for threshold in THRESHOLDS}
 

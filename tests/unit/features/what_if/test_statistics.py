@@ -18,8 +18,8 @@ from app.features.groups.undo import undo_group_edit
 from app.features.policies.service import change_policy
 from app.features.queue.statistics import read_statistics
 from app.features.solutions.service import solve_dataset
-from app.features.verdicts.bulk import give_verdicts, list_batches
-from app.features.verdicts.bulk_undo import undo_batch
+from app.features.verdicts.bulk import give_verdicts, list_bulk_verdicts
+from app.features.verdicts.bulk_undo import undo_bulk_verdict
 from app.features.what_if import statistics as kept
 from app.features.what_if.statistics import StatisticsCache
 from app.soccer.policy import PAPER
@@ -75,9 +75,9 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
         give_verdicts(store, 1, "passes:yes", "accepted", actor="ben", note="seen")
 
     def take_back_all() -> None:
-        standing = [batch for batch in list_batches(store, 1) if batch.undone is None]
+        standing = [batch for batch in list_bulk_verdicts(store, 1) if batch.undone is None]
         if standing:
-            undo_batch(store, standing[0].id, actor="ben")
+            undo_bulk_verdict(store, standing[0].id, actor="ben")
 
     def move() -> None:
         policy = replace(PAPER, min_jac=rng.choice([0.5, 0.999]))
