@@ -121,7 +121,7 @@ class Ball3DDistance:
     p_value: float | None = None
 
     @property
-    def is_within_uncertainty(self) -> bool | None:
+    def is_explained(self) -> bool | None:
         """Whether both uncertainties explain the difference; None where that is not known."""
         return None if self.p_value is None else self.p_value >= EXPLAINED_P
 

@@ -236,7 +236,7 @@ class FrameNameIndex:
             f"{frame.station}/{frame.group}" if frame.station else frame.view for frame in found
         ]
 
-    def explain_unknown(self, name: str) -> str:
+    def explain_unknown_name(self, name: str) -> str:
         """Why ``find`` found nothing, in words."""
         if self._find_frame_id(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"

@@ -202,7 +202,7 @@ def read_predicted_cameras(
         ids = (frame.id,) if frame is not None else names.find_station_frames(name)
         if not ids:
             found.unknown[name] += 1
-            found.reasons[name] = names.explain_unknown(name)
+            found.reasons[name] = names.explain_unknown_name(name)
         for identity in ids:
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size
@@ -386,7 +386,7 @@ def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) ->
         return
     named = known.names.find(identity) or ""
     if own:
-        frame = run.find_frame(own)
+        frame = run.find_frame_or_count_unknown(own)
         if problem := _describe_contradiction(run, own, identity, named, frame):
             raise FieldError("file_name", problem)
     elif named or isinstance(value["image_id"], str):
@@ -441,7 +441,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionCollector) -> None:
         frame = run.names.find(name)
         if frame is None:
             run.found.unknown[name] += len(boxes)
-            run.found.reasons[name] = run.names.explain_unknown(name)
+            run.found.reasons[name] = run.names.explain_unknown_name(name)
         else:
             run.matched = True
         rows.extend((shown, number, frame, cells) for number, cells in boxes)

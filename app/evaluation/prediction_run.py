@@ -109,16 +109,16 @@ class PredictionCollector:
         self._total = 0
         self._near_corner = 0
 
-    def find_frame(self, name: str) -> NamedFrame | None:
+    def find_frame_or_count_unknown(self, name: str) -> NamedFrame | None:
         """The frame of a name; a name that is none is counted."""
         found = self.names.find(name)
         if found is None:
-            self.count_unknown_frame(name, self.names.explain_unknown(name))
+            self.count_unknown_frame(name, self.names.explain_unknown_name(name))
         else:
             self.matched = True
         return found
 
-    def find_frame_by_number(self, text: str) -> NamedFrame | None:
+    def find_frame_by_number_or_count_unknown(self, text: str) -> NamedFrame | None:
         """The frame of a number as its picture or view has it in its name, ``4`` for ``0004.jpg``."""
         found = self.names.find(text) or self.names.find_by_number(text)
         if found is None:

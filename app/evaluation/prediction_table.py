@@ -217,19 +217,21 @@ def _find_row_frame(run: PredictionCollector, cells: Mapping[str, str]) -> Named
             f"{action}" if is_missing(replay) else f"{action}_{fields.parse_whole_number(replay)}"
         )
         parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
-        return run.find_frame("/".join([part for part in parts if part] + [image]))
+        return run.find_frame_or_count_unknown("/".join([part for part in parts if part] + [image]))
     if number is not None and not is_missing(cells.get("camera")):
         camera = id_to_text((cells["camera"] or "").strip().removeprefix("cam"))
-        return run.find_frame(f"cam{camera}/{id_to_text(cells[number])}")
+        return run.find_frame_or_count_unknown(f"cam{camera}/{id_to_text(cells[number])}")
     # The name of a picture says more than a number, which tools count from where they like. Beside
     # a class, "name" is that of the class.
     named = any(name in cells for name in _CLASSES)
     for name in _NAMES:
         if not is_missing(cells.get(name)) and not (named and name == "name"):
             text = cells[name].strip()
-            return run.find_frame(id_to_text(text) or text if name == "image_id" else text)
+            return run.find_frame_or_count_unknown(
+                id_to_text(text) or text if name == "image_id" else text
+            )
     if number is not None:
-        return run.find_frame_by_number(cells[number].strip())
+        return run.find_frame_by_number_or_count_unknown(cells[number].strip())
     raise FieldError("frame", "is missing, and so is every other column that can name the frame")
 
 

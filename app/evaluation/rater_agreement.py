@@ -305,7 +305,7 @@ def _find_group_disagreements(
             True: ", which both uncertainties explain",
             False: ", more than their uncertainties explain",
         }
-        explained = "" if ball.is_within_uncertainty is None else words[ball.is_within_uncertainty]
+        explained = "" if ball.is_explained is None else words[ball.is_explained]
         text = f"the 3D balls are {ball.distance_m:.2f} m apart{explained}"
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
 

@@ -60,7 +60,7 @@ class ExportRecord:
     def camera_covariance(self, view: View) -> tuple[float, ...] | None:
         """Covariance of the parameters of a view's camera, row by row, where it is known, (64,)."""
         solved = self.view_solution(view)
-        return None if solved is None else solved.calibration.known_covariance
+        return None if solved is None else solved.calibration.known_covariance_with_pitch
 
     def passes_camera_gates(self, view: View) -> bool:
         """Whether the view has a camera that passed the gates on cameras."""

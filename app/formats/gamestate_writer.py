@@ -99,7 +99,7 @@ class _LabelsFile:
         """Id of the next image; no sequence of an export has the same."""
         return f"{_SPLIT_NUMBERS.get(self.split, 9)}{self.number:03d}{len(self.images) + 1:06d}"
 
-    def track_number(self, who: Hashable) -> int:
+    def assign_track_number(self, who: Hashable) -> int:
         """Number of a track, beyond those that a file may have brought."""
         start = _FIRST_OF_OURS if self.kept else 1
         return self.tracks.setdefault(who, start + len(self.tracks))
@@ -258,9 +258,9 @@ def _make_people_annotations(
         person = _make_person_annotation(box)
         if person is None:
             continue
-        track = file.track_number(_identify_track_owner(box, group, view, index))
+        track = file.assign_track_number(_identify_track_owner(box, group, view, index))
         if track in seen:
-            track = file.track_number((group.key, view.key, index))
+            track = file.assign_track_number((group.key, view.key, index))
         seen.add(track)
         person["track_id"] = track
         people.append(person)
@@ -316,7 +316,7 @@ def _make_ball_fields(
     file: _LabelsFile, record: ExportRecord, view: View, index: int
 ) -> dict[str, Any]:
     return {
-        "track_id": file.track_number(("ball", index)),
+        "track_id": file.assign_track_number(("ball", index)),
         "bbox_pitch": _locate_spot_below_ball(record, view),
     }
 

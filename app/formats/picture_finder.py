@@ -112,7 +112,7 @@ class LabelLocation:
             yield from (_join_path(top, inner) for inner in PICTURE_FOLDERS)
             yield _join_path(top, "images", "default")
 
-    def can_hold_picture(self, place: str, wanted: Collection[str]) -> bool:
+    def can_picture_belong(self, place: str, wanted: Collection[str]) -> bool:
         """Whether a picture can be one of this file's, for all that its folders say."""
         own = {part.lower() for part in (*PurePosixPath(self.folder).parts, *wanted)}
         if any(_is_below_folder(place, other) for other in self.elsewhere):
@@ -182,7 +182,7 @@ class PictureFinder:
         name = "/".join(parts)
         for folder in home.list_picture_folders():
             place = self._places.get(_join_path(folder, name))
-            if place is not None and home.can_hold_picture(place, parts):
+            if place is not None and home.can_picture_belong(place, parts):
                 return PictureSearchResult(place, len(parts))
         for fold in (False, True):
             found = self._find_by_longest_common_end(parts, home, fold)
@@ -202,7 +202,7 @@ class PictureFinder:
                 break
         if len(places) > _MAX_RIVALS:
             return PictureSearchResult(rivals=tuple(places[:3]))
-        fitting = [place for place in places if home.can_hold_picture(place, parts)]
+        fitting = [place for place in places if home.can_picture_belong(place, parts)]
         ranks: dict[tuple[int, bool, bool], list[str]] = {}
         for place in fitting:
             rank = (

@@ -189,7 +189,7 @@ class RecordFieldReader:
         except InputError as error:
             raise self.make_field_error("given_covariance", error.message) from error
         included = self.read_flag("included", True)
-        why = None if included else self.read_left_out()
+        why = None if included else self.read_view_exclusion()
         return View(key, station, self.read_balls(), None, included, extras, why)
 
     def read_covariance(self) -> tuple[float, ...] | None:
@@ -221,7 +221,7 @@ class RecordFieldReader:
         except (ValueError, InputError) as error:
             raise self.make_field_error("picture", str(error)) from error
 
-    def read_left_out(self) -> ViewExclusion | None:
+    def read_view_exclusion(self) -> ViewExclusion | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
         found = self.value.get("left_out")
         if found is None:

@@ -118,7 +118,7 @@ def read_viper(
         report.add_problem_at(shown, None, None, f"is in an encoding that cannot be read ({error})")
     except _BROKEN:
         report.add_problem_at(shown, None, None, f"is damaged or cut off; {reader.kept_summary}")
-    return reader.finish_tracks()
+    return reader.finish_videos()
 
 
 class _LimitedStream:
@@ -178,7 +178,7 @@ class _ViperFileReader:
                 # What was read is let go, or a long file would stay in memory.
                 del open_elements[-1][:]
 
-    def finish_tracks(self) -> list[ViperVideo]:
+    def finish_videos(self) -> list[ViperVideo]:
         """The tracks; reports what was not read, a line for each kind of object and shape."""
         for (name, what), count in self._left_out.items():
             entries = plural(count, "entry is", "entries are")

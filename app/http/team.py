@@ -75,7 +75,7 @@ class AttemptLimits:
         self._count_attempt(NAME_LIMIT, "name", name, address)
         self._count_attempt(NAME_LIMIT_ALL_ADDRESSES, "name", name)
 
-    def count_code(self, name: str) -> None:
+    def count_second_factor_attempt(self, name: str) -> None:
         """Count a code of a second factor.
 
         Raises:
@@ -182,11 +182,11 @@ class TeamLogin:
         device = None if name is None else self.cookies.find_known_device(request.scope, name)
         self.attempts.count_login(self.find_client_address(request), name, device)
 
-    def make_landing_url(self, request: Request) -> str:
+    def make_sign_on_return_url(self, request: Request) -> str:
         """The address to which the provider sends people back."""
         return self.get_base_url(request) + LANDING
 
-    def require_sign_on(self) -> SignOn:
+    def require_sign_on_provider(self) -> SignOn:
         """The provider by which people come in; raises ConflictError where there is none."""
         if self.sign_on is None:
             raise ConflictError(
@@ -195,7 +195,7 @@ class TeamLogin:
             )
         return self.sign_on
 
-    def require_passwords(self) -> None:
+    def require_password_login_allowed(self) -> None:
         """Raise ConflictError where people come by single sign-on alone."""
         if self.sign_on is not None and self.sign_on.rules.only:
             label = self.sign_on.rules.label

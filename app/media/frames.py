@@ -193,7 +193,7 @@ class FrameProvider:
         data = read_cached_frame(media, width, flipped, self._settings)
         return None if data is None else EncodedPicture.of(JPEG, data)
 
-    def request_fetch(self, media: Media) -> PoolTask | None:
+    def request_frame_preparation(self, media: Media) -> PoolTask | None:
         """Have a frame made ready; None where it is: one of a store is brought to this disk, and
         the video of one is indexed.
 
@@ -233,7 +233,7 @@ class FrameProvider:
         Raises:
             OverloadedError: Too many wait.
         """
-        work = self._videos.wrap_with_index(
+        work = self._videos.make_worker_call(
             media, find_neighbouring_frames, media, group, static, self._settings
         )
         return self._pool.submit(*work)
@@ -292,7 +292,7 @@ class FrameProvider:
         def submit(bounded: bool) -> PoolTask:
             call = (work, *arguments)
             if media is not None:
-                call = self._videos.wrap_with_index(media, *call)
+                call = self._videos.make_worker_call(media, *call)
             return self._readers.submit(*call, explain=explain, bounded=bounded)
 
         indexing = None
@@ -343,7 +343,7 @@ class FrameProvider:
                 self._remember_refusal(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
 
-        work = self._videos.wrap_with_index(
+        work = self._videos.make_worker_call(
             media, make_picture, media, width, flipped, self._settings
         )
         return self._pool.submit(
@@ -431,7 +431,7 @@ class VideoIndexer:
                 if progress is not None and media is not None:
                     progress(done, total, f"Finding the frames of {Path(media.path).name}.")
 
-    def wrap_with_index(
+    def make_worker_call(
         self, media: Media, work: Callable[..., Any], *arguments: Any
     ) -> tuple[Callable[..., Any], *tuple[Any, ...]]:
         """What to call in a process for ``work(*arguments)``, which reads a frame.

@@ -168,7 +168,7 @@ class Calibration:
         return self.covariance is not None and sum(self.covariance[::9]) > 0
 
     @property
-    def known_covariance(self) -> tuple[float, ...] | None:
+    def known_covariance_with_pitch(self) -> tuple[float, ...] | None:
         """How exact the camera is, with what is not known of the pitch: as files and documents say it."""
         known = self.covariance if self.camera is not None and self.has_known_covariance else None
         if known is None or not all(map(math.isfinite, known)):

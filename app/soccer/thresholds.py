@@ -37,7 +37,7 @@ class Threshold:
         minimum: None, as ``maximum`` is, for a switch.
         choices: The values that forms offer where a range would promise too much; where they are
             words, there are no others.
-        later: It came after the first release, see ``values_to_digest``.
+        later: It came after the first release, see ``collect_digested_values``.
     """
 
     name: str

@@ -81,7 +81,9 @@ def collect_view_line_evidence(
     rows = problem.compute_line_noise_inputs(
         parameters, make_observations(lines, policy.pitch_for_fitted_lines(pitch), size)
     )
-    return collect_line_evidence(*rows).rescaled_to_pixels(problem.pixels_per_reference_pixel)
+    return collect_line_evidence(*rows).rescaled_to_reference_pixels(
+        problem.pixels_per_reference_pixel
+    )
 
 
 def compute_view_line_covariance(

@@ -188,7 +188,7 @@ class LineEvidence:
         ) / 2
         return inside + (gammaln(total / 2) - gammaln(freedom / 2))
 
-    def rescaled_to_pixels(self, pixels: float) -> LineEvidence:
+    def rescaled_to_reference_pixels(self, pixels: float) -> LineEvidence:
         """The same with so many pixels for one."""
         return LineEvidence(self.rest / pixels**2, self.log_determinant, self.freedom)
 

@@ -71,7 +71,7 @@ def add_match_tripod_to_readings(
         calibration = calibrate_view(
             replace(group, paint={**group.paint, view.key: alone}), view, policy
         )
-        known = calibration.known_covariance
+        known = calibration.known_covariance_with_pitch
         if calibration.source != "paint" or calibration.camera is None or known is None:
             continue
         found[number] = alone

@@ -178,7 +178,9 @@ def in_a_dataset(
             calibration = None if solution is None else solution.views[0].calibration
             if calibration is None or calibration.camera is None or calibration.source != "paint":
                 continue
-            covariance = np.reshape(calibration.known_covariance, (PARAMETERS, PARAMETERS))
+            covariance = np.reshape(
+                calibration.known_covariance_with_pitch, (PARAMETERS, PARAMETERS)
+            )
             found.setdefault(clip, []).append(Known(calibration.camera, covariance, _size(image)))
         return found
 

@@ -46,7 +46,7 @@ PLAIN_WORDS = """
     pixel place places play playback player pointer policies pool popover position postgresql
     preopen preview problem process profile progress proof property proposal propose props provider
     queries query quota rail rater reader reasons record refresh reimport remote render repeats
-    report requests resect resource restore result return revert reviewers rights roles router
+    report requests resect resource restore result return revert reviewers rights roles router sentences
     routes row rows rules run runner running runs safe save scale scene scene3d scenes schemas
     scores scoring scroll search sender sending serve server service session sets shared sharing
     sheet sign snapshot solve solving source sources sphere spread sqlite squares stacks stage

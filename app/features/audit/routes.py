@@ -50,7 +50,7 @@ class AuditDocument(ListDocument[AuditEntry]):
 async def find_led_datasets_of_request(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
     login = get_current_login(request.scope)
-    return EVERYTHING if login is None else login.roles.led_datasets()
+    return EVERYTHING if login is None else login.roles.visibility_of_led_datasets()
 
 
 Led = Annotated[Visibility, Depends(find_led_datasets_of_request)]

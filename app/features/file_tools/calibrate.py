@@ -256,7 +256,7 @@ def _make_frame(
         camera=None
         if camera is None
         else format_camera_file(
-            camera, add_lone_frame_covariance(calibration, lone).known_covariance, size
+            camera, add_lone_frame_covariance(calibration, lone).known_covariance_with_pitch, size
         ),
         reason=calibration.reason,
         findings=tuple(findings),
@@ -275,7 +275,7 @@ def _map_frame_to_given_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    known = add_lone_frame_covariance(frame.alone, frame.lone).known_covariance
+    known = add_lone_frame_covariance(frame.alone, frame.lone).known_covariance_with_pitch
     return replace(
         frame,
         camera=format_camera_file(picture.camera_of_annotated_picture(camera, size), known, size),

@@ -286,7 +286,7 @@ def _snap_picture(
     clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
         return _build_result_row(frame, NOTHING, reason=clicked.reason), None, None
-    kept = format_camera_file(clicked.camera, clicked.known_covariance, size)
+    kept = format_camera_file(clicked.camera, clicked.known_covariance_with_pitch, size)
     field = find_field_of_play(picture.image)
     reason = explain_missing_field(picture.image, field)
     if reason is not None:

@@ -65,7 +65,7 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     Example:
         Of a parameter log f with sigma 0.01, a focal length of 2000 px has a sigma of 20 px.
     """
-    camera, covariance = calibration.camera, calibration.known_covariance
+    camera, covariance = calibration.camera, calibration.known_covariance_with_pitch
     if camera is None or covariance is None:
         return None
     spread = np.array(covariance).reshape(PARAMETERS, PARAMETERS)
@@ -223,7 +223,8 @@ def _make_calibration_document(
     return CalibrationDocument.model_validate(
         {
             **vars(calibration),
-            "camera": camera and camera_to_json(camera, calibration.known_covariance, size),
+            "camera": camera
+            and camera_to_json(camera, calibration.known_covariance_with_pitch, size),
             "sigma": camera_sigma(calibration),
             "markings": markings,
         }

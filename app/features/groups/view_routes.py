@@ -245,7 +245,7 @@ async def _find_neighbour_frame_media(
         return {}
     try:
         if view.media.frame is not None:
-            indexing = await to_thread.run_sync(frames.request_fetch, view.media)
+            indexing = await to_thread.run_sync(frames.request_frame_preparation, view.media)
             if indexing is not None and not await indexing.result_unless_client_gone(
                 request.is_disconnected
             ):
@@ -281,7 +281,7 @@ async def _read_picture(
         found = await to_thread.run_sync(frames.read_cached, view.media, width, view.flipped)
         if found is not None:
             return found
-        fetching = await to_thread.run_sync(frames.request_fetch, view.media)
+        fetching = await to_thread.run_sync(frames.request_frame_preparation, view.media)
         if fetching is not None and not await fetching.result_unless_client_gone(
             request.is_disconnected
         ):

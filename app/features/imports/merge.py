@@ -206,7 +206,7 @@ class _MergeRun:
     counted: set[str]
     """Static cameras that are counted already."""
 
-    def ensure_origin_dataset(self, session: Session) -> ImportContext:
+    def ensure_target_dataset(self, session: Session) -> ImportContext:
         """The dataset, made with the other's policy when there is none of that name."""
         row = find_dataset(session, self.dataset)
         number = (
@@ -264,7 +264,7 @@ def _merge_tree(
         item.station.key: item for item in _parse_records(tree, STATIONS, report, parse_station)
     }
     with open_import_session(run.store, keep=run.keep) as session:
-        origin = run.ensure_origin_dataset(session)
+        origin = run.ensure_target_dataset(session)
         _report_policy_difference(session, run)
         merge_stations(session, origin, stations.values(), run.report)
     known = {key: item.station for key, item in stations.items()}
@@ -311,7 +311,7 @@ def _merge_group_chunk(
     batch: Sequence[MergeGroup],
     stations: Mapping[str, MergeStation],
 ) -> None:
-    origin = run.ensure_origin_dataset(session)
+    origin = run.ensure_target_dataset(session)
     if not run.keep:
         # A dry run took its stations back; the groups need them for a moment.
         merge_stations(session, origin, stations.values(), IngestReport())

@@ -114,7 +114,7 @@ class JobProgress:
         if self.cancelled.is_set():
             raise JobCancelled
 
-    def wait_and_check(self, seconds: float) -> None:
+    def wait_and_require_not_stopped(self, seconds: float) -> None:
         """``check``, once the server stops or this time is over."""
         self._closing.wait(seconds)
         self.check()
@@ -282,7 +282,7 @@ def leave_work_to_next_server(progress: JobProgress) -> Iterator[None]:
     try:
         yield
     except (WorkerEnded, OverloadedError, TooLargeError):
-        progress.wait_and_check(STOP_SECONDS)
+        progress.wait_and_require_not_stopped(STOP_SECONDS)
         raise
 
 

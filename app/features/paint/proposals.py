@@ -240,7 +240,7 @@ def _run_tasks(
 ) -> list[Proposal | None]:
     futures = [
         PictureTask(
-            pool, *videos.wrap_with_index(task.media, propose_lines_for_task, task, store.settings)
+            pool, *videos.make_worker_call(task.media, propose_lines_for_task, task, store.settings)
         )
         for task in tasks
     ]

@@ -312,7 +312,9 @@ def _read_paint_of_pictures(
     def submit_task(task: PaintTask) -> PictureTask:
         work = (read_view_paint, task, store.settings)
         media = task.view.media
-        return PictureTask(pool, *(work if media is None else videos.wrap_with_index(media, *work)))
+        return PictureTask(
+            pool, *(work if media is None else videos.make_worker_call(media, *work))
+        )
 
     futures = {
         number: [(task, submit_task(task)) for task in some] for number, some in tasks.items()

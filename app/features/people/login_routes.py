@@ -49,7 +49,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     """One's own passkeys, and whether there can be any at this address."""
     try:
         team.make_passkey_site(request)
-        team.require_passwords()
+        team.require_password_login_allowed()
         unavailable = None
     except ConflictError as error:
         unavailable = f"{error.message}. {error.hint}"
@@ -67,7 +67,7 @@ def begin_passkey(
     body: PasswordOnly, request: Request, team: AppTeam, me: Me
 ) -> PasskeyCreationOptions:
     """What a browser needs to make a passkey; takes the password."""
-    team.require_passwords()
+    team.require_password_login_allowed()
     team.count_login_attempt(request, me.name)
     return PasskeyCreationOptions(
         options=team.passkeys.begin_creation(me, body.password, team.make_passkey_site(request))
@@ -113,7 +113,7 @@ def begin_passkey_login(
     request: Request, response: Response, team: AppTeam
 ) -> PasskeyRequestOptions:
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
-    team.require_passwords()
+    team.require_password_login_allowed()
     team.attempts.count_challenge(team.find_client_address(request))
     asker = secrets.token_urlsafe()
     options = team.passkeys.begin_login(asker, team.make_passkey_site(request))
@@ -131,7 +131,7 @@ def log_in_with_passkey(
     body: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in with a passkey: no name, no password, and no code."""
-    team.require_passwords()
+    team.require_password_login_allowed()
     address = team.find_client_address(request)
     team.count_login_attempt(request)
     try:
@@ -182,7 +182,7 @@ def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me:
 @may(Action.ACCOUNT, to_enrol=True)
 def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
-    team.attempts.count_code(me.name)
+    team.attempts.count_second_factor_attempt(me.name)
     return RecoveryCodes(codes=team.factors.confirm(me, body.code))
 
 

@@ -161,7 +161,7 @@ class DatasetRoles:
         role = self.find_role_in(dataset_id)
         return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
 
-    def led_datasets(self) -> Visibility:
+    def visibility_of_led_datasets(self) -> Visibility:
         """The datasets of which they are a lead, and nothing that is of none."""
         if self.is_admin:
             return EVERYTHING

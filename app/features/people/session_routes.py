@@ -130,7 +130,7 @@ def log_in(
     second factor is asked for its code by a 401 whose pointer is `/code`: send all three then. 409
     where people come by single sign-on alone.
     """
-    team.require_passwords()
+    team.require_password_login_allowed()
     return _begin_session(team, store, request, response, who.name, who.password, who.code)
 
 
@@ -150,7 +150,7 @@ def _begin_session(
             name,
             password,
             code=code,
-            on_code=lambda: team.attempts.count_code(name),
+            on_code=lambda: team.attempts.count_second_factor_attempt(name),
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.get_session_token(request),
@@ -197,7 +197,7 @@ def change_password(
     me: Me,
 ) -> SessionDocument:
     """Give oneself another password; every session ends, and this browser gets a new one."""
-    team.require_passwords()
+    team.require_password_login_allowed()
     team.count_login_attempt(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
     response.set_cookie(**team.cookies.make_session_cookie(token))
@@ -258,7 +258,7 @@ def use_link(
     For whoever has a second factor the password is set, and the answer is the 401 whose pointer is
     `/code`: log in with the new password and a code.
     """
-    team.require_passwords()
+    team.require_password_login_allowed()
     team.count_login_attempt(request)
     name = links.set_password_by_link(store, chosen.token, chosen.password, chosen.name)
     return _begin_session(team, store, request, response, name, chosen.password)
@@ -275,11 +275,15 @@ def begin_sign_on(
     body: SignOnBegin, request: Request, response: Response, team: AppTeam
 ) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
-    sign_on = team.require_sign_on()
+    sign_on = team.require_sign_on_provider()
     team.attempts.count_challenge(team.find_client_address(request))
     asker = secrets.token_urlsafe()
     address = sign_on.begin(
-        asker, redirect=team.make_landing_url(request), to=body.to, link=body.link, name=body.name
+        asker,
+        redirect=team.make_sign_on_return_url(request),
+        to=body.to,
+        link=body.link,
+        name=body.name,
     )
     response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
     return SignOnStarted(address=address)
@@ -300,7 +304,7 @@ def finish_sign_on(
     Whoever has a second factor is asked for its code by a 401 whose pointer is `/factor`, unless the
     provider says, as the operator wants it, that it has asked for one.
     """
-    sign_on, address = team.require_sign_on(), team.find_client_address(request)
+    sign_on, address = team.require_sign_on_provider(), team.find_client_address(request)
     team.count_login_attempt(request)
     try:
         entered = sign_on.finish(
@@ -313,7 +317,7 @@ def finish_sign_on(
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.get_session_token(request),
-            on_code=team.attempts.count_code,
+            on_code=team.attempts.count_second_factor_attempt,
         )
     except AccessError as error:
         log.warning("a single sign-on was refused", address=address, reason=error.message)
@@ -353,11 +357,11 @@ def begin_identity_link(
     body: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnStarted:
     """Where to go to link an account of the provider with one's own; takes the password."""
-    sign_on = team.require_sign_on()
+    sign_on = team.require_sign_on_provider()
     team.count_login_attempt(request, me.name)
     asker = secrets.token_urlsafe()
     address = sign_on.begin_linking_account(
-        asker, me, body.password, redirect=team.make_landing_url(request)
+        asker, me, body.password, redirect=team.make_sign_on_return_url(request)
     )
     response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
     return SignOnStarted(address=address)

@@ -268,7 +268,9 @@ def _judge_unreviewed(truth: SceneTruth, group: Group, words: _LessonTexts) -> F
     if kind == CLEAN:
         return Feedback(OPEN)
     if _is_fault_corrected(truth, group):
-        return Feedback(MENDED, f"Right: {words.fixed_sentence} Press A to accept the group.")
+        return Feedback(
+            MENDED, f"Right: {words.corrected_fault_sentence} Press A to accept the group."
+        )
     if _list_mislabelled_views(truth, group):
         letter = make_view_letter(_view_index(group, _list_mislabelled_views(truth, group)[0]))
         return Feedback(
@@ -317,7 +319,7 @@ class _LessonTexts:
         self._values = _make_fault_text_values(truth.faults, group)
 
     @property
-    def fixed_sentence(self) -> str:
+    def corrected_fault_sentence(self) -> str:
         """What was wrong, and that it no longer is."""
         return f"the fault is fixed. {self.fault_sentence}"
 

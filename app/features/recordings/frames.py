@@ -104,7 +104,7 @@ class _OpenRecording:
     ready: OrderedDict[tuple[int, int | None], bytes] = field(default_factory=OrderedDict)
     ready_bytes: int = 0
 
-    def has_frame(self, number: int) -> bool:
+    def has_frame_ready(self, number: int) -> bool:
         """Whether a frame can be given at once."""
         return (number, self.width) in self.ready or self.reader.has(number)
 
@@ -151,13 +151,13 @@ def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool
         found = _open_recording(path, sha256, settings)
         if found.way > 0:
             following = range(number + 1, min(number + 1 + AHEAD, found.count))
-            found.planned = [one for one in following if not found.has_frame(one)]
+            found.planned = [one for one in following if not found.has_frame_ready(one)]
         elif not found.planned:
             together = min(max(BEHIND, -found.way), MOST_BEHIND)
             before = max(number - together // 2, 0)
-            if not found.has_frame(before):
+            if not found.has_frame_ready(before):
                 asked_next = range(max(before - together, 0), max(number, 1))
-                found.planned = [one for one in asked_next if not found.has_frame(one)]
+                found.planned = [one for one in asked_next if not found.has_frame_ready(one)]
         if found.planned and found.reader.prefetch(found.planned[0], STEP):
             found.cache_encoded_frame(found.planned.pop(0))
         return bool(found.planned)
@@ -170,7 +170,7 @@ def _read_frame_jpeg(
     found = _open_recording(path, sha256, settings)
     follows = 0 < number - found.last <= 2 * AHEAD
     found.width = width
-    is_kept = found.has_frame(number)
+    is_kept = found.has_frame_ready(number)
     way = 1 if number >= found.last else -1
     if way * found.way < 0 or not (follows or is_kept):
         found.planned.clear()

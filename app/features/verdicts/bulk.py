@@ -2,7 +2,7 @@
 
 A batch is many short write transactions, so that others go on working; killed in between it
 leaves whole verdicts, and given again it does the rest (under the same key as the same batch).
-``bulk_undo`` takes it back, which ends a run that is still giving it, and its ``redo_batch`` gives it
+``bulk_undo`` takes it back, which ends a run that is still giving it, and its ``redo_bulk_verdict`` gives it
 once more after that.
 """
 

@@ -206,4 +206,4 @@ def try_policy(dataset: DatasetPath, values: ThresholdsToTry, services: AppServi
     the fields for which that cannot be known before.
     """
     found = dataset_id(services.store, dataset)
-    return get_yield(services.yields, found, values.values())
+    return get_yield(services.yields, found, values.to_policy_values())

@@ -87,10 +87,10 @@ class TestCompareBalls3D:
         far = compare_balls_3d(ball_at(0, 0.01), ball_at(0.6, 0.01))
         # d^2 / (s1^2 + s2^2) is 2 and 18; 5 % of chi-square with three degrees lie above 7.81.
         assert near.p_value == pytest.approx(0.5724, abs=1e-4)
-        assert (near.is_within_uncertainty, far.is_within_uncertainty) == (True, False)
+        assert (near.is_explained, far.is_explained) == (True, False)
 
     def test_without_a_covariance_nobody_knows(self) -> None:
-        assert compare_balls_3d(ball_at(0, 0.0), ball_at(1, 0.0)).is_within_uncertainty is None
+        assert compare_balls_3d(ball_at(0, 0.0), ball_at(1, 0.0)).is_explained is None
 
 
 class TestCompareAnnotations:

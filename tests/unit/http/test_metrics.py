@@ -94,7 +94,7 @@ def test_every_class_of_requests_begins_with_nobody(read, name: str) -> None:
 def test_says_who_is_at_work_who_waits_and_who_was_told_to_come_back(app: FastAPI) -> None:
     limiter = SimpleNamespace(request_class=WRITE, busy=1, waiting=2, refused=3)
     registry = CollectorRegistry()
-    registry.register(metrics.ProcessCollector(app, SimpleNamespace(all=(limiter,))))
+    registry.register(metrics.ProcessCollector(app, SimpleNamespace(class_limiters=(limiter,))))
     for name, value in (("busy", 1), ("waiting", 2), ("refused_total", 3)):
         assert registry.get_sample_value(f"touchline_requests_{name}", {"class": "write"}) == value
 

@@ -193,7 +193,7 @@ class TestFramesOfTheServer:
         try:
             asked = frames.request_work_on_frame(media, False, is_indexed)
             asked.abandon()
-            indexing = frames.request_fetch(media)
+            indexing = frames.request_frame_preparation(media)
             assert indexing is None or indexing.future.result(60)
             assert asked.future.cancelled() and frames._readers.tasks == 0
             assert has_video_index(media, settings)
@@ -223,10 +223,10 @@ class TestFramesOfTheServer:
         try:
             data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
             assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 35
-            assert frames.request_fetch(media) is None
+            assert frames.request_frame_preparation(media) is None
             assert frames.request_work_on_frame(media, False, is_indexed).future.result(60)
             write_video(tmp_path / "cam1.mp4", "mp4v", 41)
-            assert frames.request_fetch(media) is not None
+            assert frames.request_frame_preparation(media) is not None
         finally:
             frames.close()
 
@@ -236,9 +236,9 @@ class TestFramesOfTheServer:
         path = vary_times(write_video(tmp_path / "cam1.mp4", "MPG2"), RATES["any duration"])
         media, frames = Media(str(path), frame=55), FrameProvider(settings)
         try:
-            indexing = frames.request_fetch(media)
+            indexing = frames.request_frame_preparation(media)
             assert indexing is not None and indexing.future.result(60)
-            assert frames.request_fetch(media) is None
+            assert frames.request_frame_preparation(media) is None
             data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
             assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 55
         finally:
@@ -250,7 +250,10 @@ class TestFramesOfTheServer:
         path = write_video(tmp_path / "cam1.mp4", "MPG2")
         media, frames = Media(str(path), frame=55), FrameProvider(settings)
         try:
-            first, second = frames.request_fetch(media), frames.request_fetch(media)
+            first, second = (
+                frames.request_frame_preparation(media),
+                frames.request_frame_preparation(media),
+            )
             assert first is not None and second is not None
             assert frames._videos.pool.tasks == 1
             first.abandon()
@@ -265,7 +268,10 @@ class TestFramesOfTheServer:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
         media, frames = Media(str(tmp_path / "cam1.mp4"), frame=0), FrameProvider(settings)
         try:
-            for waiting in (frames.request_fetch(media), frames.request_fetch(media)):
+            for waiting in (
+                frames.request_frame_preparation(media),
+                frames.request_frame_preparation(media),
+            ):
                 assert waiting is not None
                 with pytest.raises(ImageError, match="not a video that can be read"):
                     waiting.future.result(60)

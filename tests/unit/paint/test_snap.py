@@ -114,6 +114,6 @@ class TestStored:
         assert np.abs(moved / sigma).max() < 0.1
         told = np.sqrt(np.diag(np.reshape(again.covariance, (8, 8))))
         assert told == pytest.approx(sigma, rel=0.02)
-        whole = np.sqrt(np.diag(np.reshape(again.known_covariance, (8, 8))))
+        whole = np.sqrt(np.diag(np.reshape(again.known_covariance_with_pitch, (8, 8))))
         assert whole == pytest.approx(np.sqrt(np.diag(found.covariance)), rel=0.02)
         assert (whole[3:6] > 2 * told[3:6]).any()

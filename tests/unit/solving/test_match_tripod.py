@@ -68,7 +68,7 @@ def with_reading(group: Group, reading: PaintReading) -> Group:
 def off_and_covariance(group: Group, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     found = calibrate_view(group, group.views[0], POLICY)
     assert found.source == "paint"
-    covariance = np.reshape(found.known_covariance, (8, 8))[POSITION, POSITION]
+    covariance = np.reshape(found.known_covariance_with_pitch, (8, 8))[POSITION, POSITION]
     return found.camera.position - truth[POSITION], covariance
 
 

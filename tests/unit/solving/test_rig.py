@@ -32,7 +32,7 @@ def off_px(rig, parameters) -> list[float]:
     apart = []
     for camera, row, true in zip(rig.cameras, parameters, TRUTH.values(), strict=True):
         grass = sample_grass_in_view(camera)
-        moved = camera.with_parameters(row).project(grass) - true.project(grass)
+        moved = camera.camera_of_parameters(row).project(grass) - true.project(grass)
         apart.append(float(np.median(np.hypot(*moved.T))))
     return apart
 
@@ -93,12 +93,12 @@ class TestMakeRig:
 
 class TestAdjust:
     def test_rays_meet_within_the_noise(self, rig, fit):
-        assert gaps(rig, rig.start) > 3.0
+        assert gaps(rig, rig.initial_parameters) > 3.0
         # Two errors of a click of 0.5 px, of which one direction in four is left over.
         assert gaps(rig, fit.parameters) < 0.7
 
     def test_every_camera_shows_the_pitch_where_it_lies(self, rig, fit):
-        before, after = off_px(rig, rig.start), off_px(rig, fit.parameters)
+        before, after = off_px(rig, rig.initial_parameters), off_px(rig, fit.parameters)
         assert min(before) > 2.5
         assert max(after) < 1.2
 

@@ -132,7 +132,7 @@ class TestErrorCovariance:
         rng = np.random.default_rng(5)
         draws = rng.multivariate_normal(TRUE[0], covariance, 400)
         apart = [
-            camera.with_parameters(row).project(balls) - TRUTH["cam1"].project(balls)
+            camera.camera_of_parameters(row).project(balls) - TRUTH["cam1"].project(balls)
             for row in draws
         ]
         assert np.mean(np.square(apart)) == pytest.approx(np.mean(moved**2), rel=0.2)
@@ -150,7 +150,7 @@ class TestErrorCovariance:
         assert np.percentile(gaps, 95) == pytest.approx(1.96, rel=0.2)
 
     def test_a_camera_that_stands_right_is_not_off(self, rig):
-        camera = replace(rig.cameras[0], camera=rig.cameras[0].with_parameters(TRUE[0]))
+        camera = replace(rig.cameras[0], camera=rig.cameras[0].camera_of_parameters(TRUE[0]))
         own = camera.parameters
         assert (
             compute_error_covariance(camera, own, optimize_points(TRUE, rig.rays, np.inf)) == 0

@@ -97,11 +97,11 @@ class TestAudit:
     def test_a_lead_reads_of_their_datasets_alone_rights_there_too(
         self, store: Store, said: int
     ) -> None:
-        lead = DatasetRoles(Role.NONE, {1: Role.LEAD}).led_datasets()
+        lead = DatasetRoles(Role.NONE, {1: Role.LEAD}).visibility_of_led_datasets()
         assert lines(store, sight=lead)[2] == "anna: bob: role in dataset (lead)"
         assert not any("logged in" in line for line in lines(store, sight=lead))
         for roles in (DatasetRoles(Role.REVIEWER), DatasetRoles(Role.LEAD, {1: Role.VIEWER})):
-            assert lines(store, sight=roles.led_datasets()) == []
+            assert lines(store, sight=roles.visibility_of_led_datasets()) == []
 
     def test_pages_follow_each_other_and_hold_each_entry_once(
         self, store: Store, said: int

@@ -256,17 +256,17 @@ class TestLeases:
         assert leases.lease_next_group(batch, BO).group is None
         lease = leases.lease_next_group(batch, ADA)
         assert (lease.group, lease.part) == (groups[0], BatchRole.ANNOTATOR)
-        assert leases.submit(batch, groups[0], ADA, actor="ada").batch.submitted == 1
+        assert leases.submit_group(batch, groups[0], ADA, actor="ada").batch.submitted == 1
         assert leases.lease_next_group(batch, ADA, after=groups[0]).group == groups[1]
         review = leases.lease_next_group(batch, BO)
         assert (review.group, review.part) == (groups[0], BatchRole.REVIEWER)
         with pytest.raises(ConflictError):
-            leases.submit(batch, groups[1], BO, actor="bo")
+            leases.submit_group(batch, groups[1], BO, actor="bo")
         with pytest.raises(ConflictError, match="assigned to other people"):
             leases.lease_next_group(batch, CY)
         with pytest.raises(NotFoundError):
             leases.lease_group(batch, 99, BO)
-        leases.submit(batch, groups[0], ADA, actor="ada", done=False)
+        leases.submit_group(batch, groups[0], ADA, actor="ada", done=False)
         assert get_batch(store, batch).submitted == 0
 
     @pytest.mark.parametrize("done", [True, False])
@@ -281,7 +281,7 @@ class TestLeases:
             kept.append((lease, read_batch(session, batch).submitted))
 
         with stored_by(keep):
-            lease = leases.submit(batch, groups[0], ADA, actor="ada", done=done)
+            lease = leases.submit_group(batch, groups[0], ADA, actor="ada", done=done)
         assert kept == [(lease, int(done))]
 
     def test_what_is_handed_back_waits_for_its_annotator_first_and_says_why(
@@ -293,7 +293,7 @@ class TestLeases:
         batch = make_batch(store, dataset, new, actor="lead").id
         with pytest.raises(ConflictError, match="is not submitted"):
             leases.return_group(batch, groups[3], BO, actor="bo")
-        leases.submit(batch, groups[3], ADA, actor="ada")
+        leases.submit_group(batch, groups[3], ADA, actor="ada")
         assert leases.lease_next_group(batch, BO).group == groups[3]
         back = leases.return_group(batch, groups[3], BO, "the far goal  line", actor="bo")
         assert (back.batch.submitted, back.here) == (0, ())
@@ -311,7 +311,7 @@ class TestLeases:
         assert leases.lease_next_group(batch, dan, after=groups[2]).group == groups[4]
         lease = leases.lease_next_group(batch, ADA)
         assert lease.group == groups[3] and lease.returned is not None
-        lease = leases.submit(batch, groups[3], ADA, actor="ada")
+        lease = leases.submit_group(batch, groups[3], ADA, actor="ada")
         assert (
             lease.batch.submitted == 1 and list_own_batches(store, lambda _: ADA)[0].returned == []
         )
@@ -339,7 +339,7 @@ class TestLeases:
         while (copy := leases.lease_next_group(batch, ADA).group) is not None:
             # What is left falls by one with each, whatever it is a copy of.
             assert [one.left for one in list_own_batches(store, lambda _: ADA)] == [3 - had]
-            leases.submit(batch, copy, ADA, actor="ada")
+            leases.submit_group(batch, copy, ADA, actor="ada")
             had += 1
             (mine,) = list_own_batches(store, lambda _: ADA)
             seen = mine.batch
@@ -363,7 +363,7 @@ class TestLeases:
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.lease_next_group(batch, ADA)
         assert (back.group, back.returned.reason) == (groups[0], "too wide")
-        leases.submit(batch, groups[0], ADA, actor="ada")
+        leases.submit_group(batch, groups[0], ADA, actor="ada")
         assert leases.lease_next_group(batch, ADA).group is None
         judge(store, groups[0], "bo")
         assert leases.lease_next_group(batch, BO).group == groups[1]
@@ -380,7 +380,7 @@ class TestLeases:
             copy = leases.lease_next_group(batch, ADA).group
             with store.read() as session:
                 ordinary = find_annotation_of_copy(session, copy).kind == INDEPENDENT
-            leases.submit(batch, copy, ADA, actor="ada")
+            leases.submit_group(batch, copy, ADA, actor="ada")
         assert get_batch(store, batch).submitted == 0
         compare_uncompared_groups(store)
         assert get_batch(store, batch).submitted == 1
@@ -407,22 +407,22 @@ class TestLeases:
 
         monkeypatch.setattr(leases_module, "find_own_annotation", closing)
         with pytest.raises(ConflictError, match="closed"):
-            leases.submit(batch, groups[0], ADA, actor="ada")
+            leases.submit_group(batch, groups[0], ADA, actor="ada")
 
     @pytest.mark.parametrize("done", [True, False])
     def test_what_somebody_else_handed_in_stays_theirs(self, store, dataset, groups, leases, done):
         new = NewBatch("a", annotators=["ada", "bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.submit(batch, groups[0], ADA, actor="ada")
+        leases.submit_group(batch, groups[0], ADA, actor="ada")
         with pytest.raises(ConflictError, match="ada has submitted this group"):
-            leases.submit(batch, groups[0], BO, actor="bo", done=done)
+            leases.submit_group(batch, groups[0], BO, actor="bo", done=done)
         (row,) = [one for one in list_batch_groups(store, batch) if one.group == groups[0]]
         assert row.submitted_by == "ada"
 
     def test_a_group_that_was_judged_is_not_handed_back(self, store, dataset, groups, leases):
         new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.submit(batch, groups[0], ADA, actor="ada")
+        leases.submit_group(batch, groups[0], ADA, actor="ada")
         judge(store, groups[0], "bo")
         with pytest.raises(ConflictError, match="already has a verdict"):
             leases.return_group(batch, groups[0], BO, "once more", actor="bo")
@@ -460,7 +460,7 @@ class TestProgress:
     def test_work_is_of_those_to_whom_it_is_given(self, store, dataset, groups, leases):
         new = NewBatch("a", size=3, annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.submit(batch, groups[0], ADA, actor="ada")
+        leases.submit_group(batch, groups[0], ADA, actor="ada")
         left = {
             one.name: [
                 (item.parts, item.left) for item in list_own_batches(store, lambda _, one=one: one)

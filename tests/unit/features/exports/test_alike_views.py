@@ -307,7 +307,7 @@ class TestWhatIsWrittenIsFoundAgain:
         )
         for file in filter(is_picture, on_disk(tmp_path / "out")):
             found = known.find(file)
-            assert found is not None, known.explain_unknown(file)
+            assert found is not None, known.explain_unknown_name(file)
             assert grey_of(tmp_path / "out" / file) == shade(found.id)
 
 

@@ -106,7 +106,7 @@ def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) ->
         ready.solve(break_down, None, None, {})
     assert ready.solve(solve_here, None, None, {}) == os.getpid()
     end = time.monotonic() + SECONDS
-    while not ready.workers[0].begin():
+    while not ready.workers[0].start_and_check_ready():
         assert time.monotonic() < end, "no other took its place"
         time.sleep(0.02)
     task = ready.workers[0].submit(os.getpriority, os.PRIO_PROCESS, 0)

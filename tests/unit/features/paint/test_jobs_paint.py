@@ -120,7 +120,7 @@ def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked
 def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch) -> None:
     monkeypatch.setattr(editing, "_PER_WORKER", 1)
     first = Jobs(asked)
-    with stopped_at_its_first_step(paint_job, "read_paint", first):
+    with stopped_at_its_first_step(paint_job, "read_paint_of_pictures", first):
         job = PAINT.request(first, asked, "demo", None, actor="ann")
     second = Jobs(asked)
     PAINT.register_with_jobs(second, asked)

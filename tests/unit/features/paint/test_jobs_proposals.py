@@ -76,7 +76,7 @@ def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, mon
 def test_a_server_that_stops_leaves_it_to_the_next_one(gone: Store, monkeypatch) -> None:
     monkeypatch.setattr(editing, "_PER_WORKER", 1)
     first = Jobs(gone)
-    with stopped_at_its_first_step(proposals_job, "propose_views", first, workers=1):
+    with stopped_at_its_first_step(proposals_job, "propose_cameras_for_views", first, workers=1):
         job = PROPOSALS.request(first, gone, "demo", None, actor="ann")
     assert get_proposal_counts(gone, "demo").sum_counts("looked") == 1
     second = Jobs(gone)

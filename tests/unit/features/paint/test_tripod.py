@@ -56,7 +56,7 @@ def sigmas(store):
     found = []
     for number in range(1, 6):
         (view,) = load_group_state(store, number).solution.views
-        covariance = np.reshape(view.calibration.known_covariance, (8, 8))[3:6, 3:6]
+        covariance = np.reshape(view.calibration.known_covariance_with_pitch, (8, 8))[3:6, 3:6]
         found.append(float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])))
     return found
 

@@ -82,7 +82,7 @@ class TestText:
 class TestFind:
     def test_says_who_it_is_and_what_for(self, tokens, anna) -> None:
         made, text = tokens.make(anna, "deploy", [Scope.EXPORT, Scope.READ])
-        login = tokens.find(text)
+        login = tokens.find_login_of_token(text)
         assert (login.name, login.role, login.actor) == ("anna", Role.LEAD, "anna (token deploy)")
         assert person_of_actor(login.actor) == "anna"
         assert login.token is not None
@@ -92,26 +92,26 @@ class TestFind:
     def test_ends_on_its_day(self, tokens, anna, clock) -> None:
         _, text = tokens.make(anna, "short", READ, days=7)
         clock.at += timedelta(days=7) - timedelta(seconds=1)
-        assert tokens.find(text)
+        assert tokens.find_login_of_token(text)
         assert not tokens.list_of_person(anna.person_id)[0].expired
         clock.at += timedelta(seconds=1)
         with pytest.raises(NotLoggedInError) as refused:
-            tokens.find(text)
+            tokens.find_login_of_token(text)
         assert refused.value.message == INVALID
         assert tokens.list_of_person(anna.person_id)[0].expired
 
     def test_its_use_is_noted_at_once_and_then_seldom(self, tokens, anna, clock) -> None:
         _, text = tokens.make(anna, "used", READ)
-        assert tokens.should_log_use(tokens.find(text))
-        tokens.touch(tokens.find(text))
+        assert tokens.should_log_use(tokens.find_login_of_token(text))
+        tokens.touch(tokens.find_login_of_token(text))
         assert tokens.list_of_person(anna.person_id)[0].used is not None
-        assert not tokens.should_log_use(tokens.find(text))
+        assert not tokens.should_log_use(tokens.find_login_of_token(text))
         clock.at += timedelta(minutes=6)
-        assert tokens.should_log_use(tokens.find(text))
+        assert tokens.should_log_use(tokens.find_login_of_token(text))
 
     def test_one_that_was_not_copied_whole_is_told_so(self, tokens) -> None:
         with pytest.raises(NotLoggedInError) as refused:
-            tokens.find(make_access_token_text()[:-1])
+            tokens.find_login_of_token(make_access_token_text()[:-1])
         assert refused.value.message == CUT
 
     def test_who_is_disabled_is_refused_whatever_tokens_there_are(self, home, tokens, anna) -> None:
@@ -119,7 +119,7 @@ class TestFind:
         with home.write() as session:
             update_person(session, anna.person_id, disabled=True)
         with pytest.raises(NotLoggedInError):
-            tokens.find(text)
+            tokens.find_login_of_token(text)
 
     def test_one_of_a_dataset_goes_with_it(self, home, tokens, anna) -> None:
         ensure_dataset(home, "small", "local")
@@ -127,7 +127,7 @@ class TestFind:
         assert tokens.list_of_person(None)[0].dataset == "small"
         delete_dataset(home, "small", confirm="small", actor="local")
         with pytest.raises(NotLoggedInError):
-            tokens.find(text)
+            tokens.find_login_of_token(text)
 
 
 class TestMake:
@@ -161,11 +161,11 @@ class TestMake:
         made, text = tokens.make(anna, "deploy", READ)
         with pytest.raises(NotFoundError):
             tokens.end(made.id, anna.person_id + 1, actor="ada")
-        tokens.find(text)
+        tokens.find_login_of_token(text)
         ended = tokens.end(made.id, None, actor="ada")
         assert (ended.person, ended.name) == ("anna", "deploy")
         with pytest.raises(NotLoggedInError):
-            tokens.find(text)
+            tokens.find_login_of_token(text)
 
     def test_the_log_and_the_list_of_people_know_of_it(self, home, tokens, anna) -> None:
         made, _ = tokens.make(anna, "deploy", READ)

@@ -278,7 +278,7 @@ class TestGiveVerdicts:
                 raise KeyboardInterrupt
             save(self, session, rows)
 
-        monkeypatch.setattr(bulk.BulkVerdictRun, "save", killed)
+        monkeypatch.setattr(bulk.BulkVerdictRun, "save_chunk", killed)
         with pytest.raises(KeyboardInterrupt):
             give_verdicts(store, 1, "", "deferred", actor="ben")
         assert statuses(store) == ["deferred"] * 3 + ["unreviewed"]

@@ -165,7 +165,7 @@ class TestStoppedBetweenChunks:
 
     def test_verdicts_are_given_once(self, app, api, monkeypatch) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
         assert log_kinds(app) == ["verdict"]
         done = api.post(VERDICTS, json={**self.BODY, "expected": None}, headers=self.KEY)
@@ -183,7 +183,7 @@ class TestStoppedBetweenChunks:
     ) -> None:
         body = {"state": "deferred", "expected": 3}
         with monkeypatch.context() as patch:
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
         new = Group("new", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
         import_groups(app.state.services.store, "broadcast", [new], source="test", actor="local")
@@ -200,7 +200,7 @@ class TestStoppedBetweenChunks:
 
         with monkeypatch.context() as patch:
             patch.setattr(BulkVerdictRun, "save_remaining", in_its_words)
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
         done = api.post(VERDICTS, json=self.BODY, headers=self.KEY).json()
         assert (done["batch"], done["changed"]) == (1, 2)
@@ -209,7 +209,7 @@ class TestStoppedBetweenChunks:
     def test_what_was_expected_is_weighed_at_the_beginning_alone(self, api, monkeypatch) -> None:
         body = {"state": "deferred", "expected": 3}
         with monkeypatch.context() as patch:
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=2))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=2))
             assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
         assert api.post(VERDICTS, json=body, headers=self.KEY).json()["changed"] == 3
 
@@ -217,7 +217,7 @@ class TestStoppedBetweenChunks:
         self, api, monkeypatch
     ) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=1))
             api.post(VERDICTS, json=self.BODY, headers=self.KEY)
         api.post("/api/v1/verdict-batches/1/undo")
         refused = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
@@ -241,7 +241,7 @@ class TestStoppedBetweenChunks:
         api.post("/api/v1/verdict-batches/1/undo")
         redo = "/api/v1/verdict-batches/1/redo"
         with monkeypatch.context() as patch:
-            patch.setattr(BulkVerdictRun, "save", Stop(BulkVerdictRun.save_chunk, after=1))
+            patch.setattr(BulkVerdictRun, "save_chunk", Stop(BulkVerdictRun.save_chunk, after=1))
             assert api.post(redo, headers=self.KEY).status_code == 500
         done = api.post(redo, headers=self.KEY).json()
         assert (done["batch"], done["changed"], done["kept"], done["refused"]) == (2, 3, 0, [])
