@@ -12,14 +12,13 @@ from app.features.groups.schemas import BoxNumbers, PointNumbers
 from app.features.tracks.follow import (
     EACH_WAY,
     MOST_EACH_WAY,
-    FollowedSequence,
     FollowedView,
     FollowedViews,
-    FollowEnd,
     build_followed_views,
     plan_ball_following,
     submit_follow_task,
 )
+from app.features.tracks.follow_sequence import FollowedSequence, FollowEnd
 from app.http.deps import AppServices, Id
 from app.http.documents import Document
 from app.http.permissions import Action, OwnedKind, may
