@@ -21,7 +21,7 @@ from app.features.groups.bulk_edits import (
     plan_edits,
 )
 from app.features.groups.edit import Edit, SetLines, make_set_ball_edit
-from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
+from app.features.groups.edit_schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.features.groups.submit import require_followed_groups
 from app.features.solutions.service import solve_and_encode
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun

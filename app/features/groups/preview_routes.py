@@ -28,7 +28,12 @@ from app.features.groups.edit import (
     SetViewInclusion,
     make_set_ball_edit,
 )
-from app.features.groups.schemas import BallEdit, LineEdits, PictureGeometryEdit, points_by_marking
+from app.features.groups.edit_schemas import (
+    BallEdit,
+    LineEdits,
+    PictureGeometryEdit,
+    points_by_marking,
+)
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, solve_edited_group
 from app.features.groups.view_paint import PaintUpdater, PaintUpdaterWithoutPictures

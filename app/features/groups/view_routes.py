@@ -20,13 +20,11 @@ from app.features.groups.edit import (
     SetViewInclusion,
     make_set_ball_edit,
 )
+from app.features.groups.edit_schemas import BallEdit, LinesEdit, ViewEdit
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
 from app.features.groups.schemas import (
-    BallEdit,
     GroupDocument,
-    LinesEdit,
     NeighbourFrameList,
-    ViewEdit,
     describe_frame_offset,
     make_group_response,
 )

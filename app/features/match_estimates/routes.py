@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.db.session import Session
-from app.features.groups.schemas import PictureGeometryEdit
+from app.features.groups.edit_schemas import PictureGeometryEdit
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, undo_rig_adjustment

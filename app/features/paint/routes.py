@@ -10,12 +10,8 @@ from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.schemas import (
-    LineDocuments,
-    LineEdits,
-    lines_to_document,
-    points_by_marking,
-)
+from app.features.groups.edit_schemas import LineEdits, points_by_marking
+from app.features.groups.schemas import LineDocuments, lines_to_document
 from app.features.groups.view_paint import (
     ViewPaintRequest,
     make_paint_request,

@@ -12,13 +12,12 @@ from pydantic import BaseModel, Field
 from app.db.idempotency import without_pending_response
 from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibrationSource, SetStationLines
+from app.features.groups.edit_schemas import LinesEdit, StationCalibrationSourceEdit
 from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
 from app.features.groups.schemas import (
     DatasetReference,
     GroupDocument,
     LineDocuments,
-    LinesEdit,
-    StationCalibrationSourceEdit,
     lines_to_document,
     make_group_response,
 )

@@ -8,7 +8,7 @@ from anyio import to_thread
 from fastapi import APIRouter, Body, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.features.groups.schemas import BoxNumbers, PointNumbers
+from app.features.groups.edit_schemas import BoxNumbers, PointNumbers
 from app.features.tracks.follow import (
     EACH_WAY,
     MOST_EACH_WAY,

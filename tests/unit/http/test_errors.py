@@ -27,7 +27,7 @@ from app.errors import (
     UnsafePathError,
 )
 from app.features.batches.service import Presence
-from app.features.groups.schemas import LinesEdit
+from app.features.groups.edit_schemas import LinesEdit
 from app.features.people.schemas import LoginCredentials
 from app.http.errors import (
     PreconditionRequiredError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from app.features.groups.schemas import LinesEdit
+from app.features.groups.edit_schemas import LinesEdit
 
 
 def test_of_each_marking_the_first_wrong_point_is_told() -> None:
