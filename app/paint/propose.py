@@ -8,28 +8,14 @@ stand there by convention.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from app.geometry.arrays import BoolArray, FloatArray
+from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.geometry.resection import (
-    LOG_FOCAL,
-    PAN,
-    ROLL,
-    TILT,
-    X,
-    Z,
-    camera_from_parameters,
-    parameters_from_camera,
-)
 from app.paint.agreement import (
     PaintAgreement,
     measure_agreement,
@@ -37,7 +23,6 @@ from app.paint.agreement import (
     measure_strength_near_markings,
 )
 from app.paint.candidates import (
-    KNOWN,
     MAIN,
     WIDE,
     CameraSearchSpace,
@@ -45,35 +30,38 @@ from app.paint.candidates import (
 )
 from app.paint.evidence import (
     PreparedPicture,
-    has_grass_beside,
     prepare_picture,
-    trace_visible_markings,
 )
 from app.paint.goal import measure_goal_height
 from app.paint.grass import explain_missing_field, find_field_of_play
+from app.paint.ranking import (
+    MOST_UNCERTAIN_M,
+    VISIBLE_PX,
+    WINDOWS,
+    WORK_WIDTH,
+    FrameToSearch,
+    Image,
+    RankedCamera,
+    measure_weakest_marking,
+    merge_ranked_cameras,
+    move_to_known_position,
+    rank_cameras,
+    snap_with_known_position,
+)
 from app.paint.ridges import Strength, find_straight_pieces, measure_line_strength
 from app.paint.search import (
-    KAPPA_MEAN,
-    SCOUTED,
-    SEARCHED,
     PictureToScore,
-    VisiblePaint,
-    find_visible_paint,
-    is_same_or_half_turned_view,
-    search_cameras,
+    get_kernel_executor,
 )
-from app.paint.snap import SnappedCamera, snap_to_prepared_picture
+from app.paint.snap import SnappedCamera
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import principal_point
 
-Image = npt.NDArray[np.uint8]
-
 SEARCH_VERSION = 4
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
-WORK_WIDTH = 960
 ENLARGED_WIDTH, ENLARGED = 640, 2
 """Narrower pictures are read so many times as large: their paint is hardly a pixel broad."""
 LEAST_SIDE = 160
@@ -83,32 +71,12 @@ SHAPES = (1.29, 2.45)
 BORDER_PX = 4
 """At the border of a picture ridges are no paint."""
 MOST_PIECES = 8
-SNAPPED = 12
-KNOWN_SNAPPED, KNOWN_SCOUTED, KNOWN_SEARCHED = 4, 150, 24
-"""Where the match says where the camera stands, fewer are looked at."""
-WINDOWS = (16.0, 10.0, 6.0, 4.0, 3.0, 3.0)
-VISIBLE_PX = 0.8
-"""Across: narrower paint may fade into the grass."""
-KNOWN_KAPPA_SIGMA = 0.015
-"""How far the distortion of a lens moves with its zoom."""
-MARKING_PLACES = 12
-"""Places (``evidence.SPACING_PX`` apart) from which on the paint of a marking would be seen."""
-LEAST_WEAKEST = 0.25
 WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
 LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""
-NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.97
-"""How near a known position a camera of the other libraries has to stand to be sought there, and the
-share of its agreement that it has to keep."""
 LEAST_KNOWN = 0.25, 0.40
 """As the second and the last of the above where the match knows the position and most of the markings have paint."""
-MOST_UNCERTAIN_M = 1.0
-"""Standard deviation of the position: three lines lie on their paint for many cameras."""
-AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
-"""Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
-AIM, MOST_TURNED = [PAN, TILT, ROLL, LOG_FOCAL], 0.3
-"""Radians, and a share of the focal length, that another position may make up for."""
 SOLE_LEAD = 0.15
 """What counts as lead where the search found no other camera."""
 LAST_WINDOWS = (5.0, 3.0, 3.0)
@@ -137,58 +105,6 @@ class FrameProposal:
     snapped: SnappedCamera | None = None
     runner_up: float | None = None
     weakest: float | None = None
-
-
-@dataclass(frozen=True)
-class FrameToSearch:
-    """A frame in the width in which it is searched."""
-
-    image: Image
-    field: BoolArray
-    strength: Strength
-    pieces: FloatArray
-    picture: PictureToScore
-    reading: PreparedPicture
-
-    @property
-    def paint(self) -> BoolArray:
-        """What looks like paint."""
-        return np.asarray(self.strength > 0)
-
-
-@dataclass(frozen=True)
-class RankedCamera:
-    """A camera on the paint, and how well it agrees with all of it.
-
-    Attributes:
-        weakest: As of ``measure_weakest_marking``.
-        policy: Prior of the distortion with which it was snapped.
-        known: Covariance of where it started, shape (8, 8), where the match knows the position.
-    """
-
-    snapped: SnappedCamera
-    agreement: PaintAgreement
-    weakest: float
-    policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
-    known: FloatArray | None = None
-
-    @property
-    def position_sigma_m(self) -> float:
-        """Largest standard deviation of the position that the paint leaves, metres."""
-        covariance = self.snapped.planned
-        if covariance is None:
-            return np.inf
-        return float(np.sqrt(np.linalg.eigvalsh(covariance[X : Z + 1, X : Z + 1])[-1]))
-
-    @property
-    def is_contradicted(self) -> bool:
-        """Whether a marking that would be seen has no paint."""
-        return self.weakest < LEAST_WEAKEST
-
-    @property
-    def score(self) -> float:
-        """Supported x explained, and half of that where a marking is contradicted."""
-        return self.agreement.combined_score * (0.5 if self.is_contradicted else 1.0)
 
 
 def propose_camera(
@@ -234,7 +150,7 @@ def propose_for_frame(
     for library in [*([match] if match else []), *libraries]:
         found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
-            found = [_move_to_known_position(frame, item, match, pitch) for item in found]
+            found = [move_to_known_position(frame, item, match, pitch) for item in found]
         ranked = merge_ranked_cameras(frame, ranked, found)
         if explain_uncertain_camera(ranked) is None:
             break
@@ -354,7 +270,7 @@ def _snap_at_full_resolution(
     start = scale_snapped_camera(item.snapped, height, width).camera
     found = []
     for windows in (LAST_WINDOWS, WINDOWS):
-        snapped = _snap_with_known_position(
+        snapped = snap_with_known_position(
             looked.reading, start, pitch, windows, item.policy, item.known
         )
         if snapped.reason is None:
@@ -368,168 +284,6 @@ def _resize_field(frame: FrameToSearch, width: int, height: int) -> BoolArray:
     """The field of play in the picture as it is."""
     size, small = (width, height), frame.field.astype(np.uint8)
     return cv2.resize(small, size, interpolation=cv2.INTER_NEAREST).astype(np.bool_)
-
-
-def rank_cameras(
-    frame: FrameToSearch, library: CameraSearchSpace, pitch: Pitch, policy: CalibrationPolicy
-) -> list[RankedCamera]:
-    """The cameras of a library that lie on the paint of a frame, best first."""
-    amount = (SNAPPED, SCOUTED, SEARCHED)
-    if library.name == KNOWN:
-        amount = (KNOWN_SNAPPED, KNOWN_SCOUTED, KNOWN_SEARCHED)
-    if library.kappa is None:
-        kappa = KAPPA_MEAN
-    else:
-        kappa = library.kappa
-        sigma = min(KNOWN_KAPPA_SIGMA, policy.distortion_sigma)
-        policy = replace(policy, distortion_mean=kappa, distortion_sigma=sigma)
-    found = search_cameras(
-        frame.picture, frame.pieces, library, pitch, get_kernel_executor(), *amount, kappa
-    )
-    if not found:
-        return []
-    drawn = get_kernel_executor().map(
-        lambda item: _snap_from_search(frame, item.camera, library, pitch, policy), found
-    )
-    known = _make_start_covariance(library) if library.name == KNOWN else None
-    ranked = [
-        _rank_snapped(frame, item, pitch, policy, known) for item in drawn if item.reason is None
-    ]
-    if known is not None:
-        ranked = [_move_to_known_position(frame, item, library, pitch) for item in ranked]
-    return merge_ranked_cameras(frame, [], ranked)
-
-
-def _rank_snapped(
-    frame: FrameToSearch,
-    snapped: SnappedCamera,
-    pitch: Pitch,
-    policy: CalibrationPolicy,
-    known: FloatArray | None,
-) -> RankedCamera:
-    seen = measure_agreement(snapped.camera, frame.field, frame.paint, pitch)
-    return RankedCamera(
-        snapped, seen, measure_weakest_marking(frame.reading, snapped, pitch), policy, known
-    )
-
-
-def _snap_from_search(
-    frame: FrameToSearch,
-    start: Camera,
-    library: CameraSearchSpace,
-    pitch: Pitch,
-    policy: CalibrationPolicy,
-) -> SnappedCamera:
-    """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
-    once more with what is known of cameras, or at the position that the match knows."""
-    alone = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy)
-    if alone.reason is None:
-        return alone
-    known = _make_start_covariance(library)
-    if library.name == KNOWN:
-        start = _move_to_nearest_stand(frame.reading, start, library, pitch)
-        return _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
-    return snap_to_prepared_picture(
-        frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
-    )
-
-
-def _move_to_known_position(
-    frame: FrameToSearch, item: RankedCamera, match: CameraSearchSpace, pitch: Pitch
-) -> RankedCamera:
-    """A camera at the position that the match knows, where the paint alone leaves that open and shows
-    the markings there as well."""
-    if item.position_sigma_m <= MOST_UNCERTAIN_M:
-        return replace(item, known=None)
-    camera = item.snapped.camera
-    away = np.linalg.norm(match.stands - camera.position, axis=1)
-    if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.position_sigma_m):
-        return replace(item, known=None)
-    policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
-    start, known = (
-        _move_to_nearest_stand(frame.reading, camera, match, pitch),
-        _make_start_covariance(match),
-    )
-    snapped = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
-    if snapped.reason is not None:
-        return replace(item, known=None)
-    there = _rank_snapped(frame, snapped, pitch, policy, known)
-    return there if there.score >= KEPT_AT_KNOWN * item.score else replace(item, known=None)
-
-
-def _move_to_nearest_stand(
-    reading: PreparedPicture, camera: Camera, library: CameraSearchSpace, pitch: Pitch
-) -> Camera:
-    """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
-    away = np.linalg.norm(library.stands - camera.position, axis=1)
-    moved = library.stands[away.argmin()] - camera.position
-    rows = trace_visible_markings(reading, camera, pitch).jacobian
-    if len(rows) < len(AIM):
-        return camera
-    turned = np.linalg.lstsq(rows[:, AIM], -rows[:, X : Z + 1] @ moved, rcond=None)[0]
-    if np.abs(turned).max() > MOST_TURNED:
-        return camera
-    parameters = parameters_from_camera(camera, reading.half_diagonal)
-    parameters[X : Z + 1] += moved
-    parameters[AIM] += turned
-    return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
-
-
-def _make_start_covariance(library: CameraSearchSpace) -> FloatArray:
-    """Covariance of a start of the search, shape (8, 8)."""
-    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
-    return np.diag(sigma**2)
-
-
-def _snap_with_known_position(
-    reading: PreparedPicture,
-    start: Camera,
-    pitch: Pitch,
-    windows: Sequence[float],
-    policy: CalibrationPolicy,
-    known: FloatArray | None = None,
-) -> SnappedCamera:
-    """As ``snap_to_prepared_picture``, with what is known of the position where the match knows it."""
-    return snap_to_prepared_picture(
-        reading, start, pitch, windows, policy, known,
-        circles_count_twice=True, position_is_known=known is not None,
-    )  # fmt: skip
-
-
-def measure_weakest_marking(
-    reading: PreparedPicture, snapped: SnappedCamera, pitch: Pitch, visible_px: float = VISIBLE_PX
-) -> float:
-    """The lowest share of a marking's places that have paint; short markings do not count.
-
-    A camera that lays some markings on paint that is there by chance shows others where none is.
-    Nothing is asked of places behind people and along the border of the picture.
-    """
-    traced, paint = trace_visible_markings(reading, snapped.camera, pitch), snapped.evidence.traced
-    usable = has_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
-    usable &= traced.widths > visible_px
-    shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
-    seen = np.bincount(paint.marking[paint.widths > visible_px], minlength=len(MARKINGS))
-    seen = np.minimum(seen, shown)
-    long = shown >= MARKING_PLACES
-    return float((seen[long] / shown[long]).min()) if long.any() else 1.0
-
-
-def merge_ranked_cameras(
-    frame: FrameToSearch, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
-) -> list[RankedCamera]:
-    """Both lists in one, best first, each camera once."""
-    kept: list[RankedCamera] = []
-    shown: list[VisiblePaint] = []
-    for item in sorted([*one, *other], key=lambda item: -item.score):
-        height, width = item.snapped.size
-        rows, columns = frame.field.shape
-        camera = item.snapped.camera
-        if (height, width) != (rows, columns):
-            camera = camera.scaled(columns / width, rows / height)
-        if not any(is_same_or_half_turned_view(old, camera, frame.picture) for old in shown):
-            kept.append(item)
-            shown.append(find_visible_paint(camera, frame.picture))
-    return kept
 
 
 def measure_score_lead(ranked: Sequence[RankedCamera]) -> float | None:
@@ -626,7 +380,7 @@ def _snap_at_full_size(
     height, width = image.shape[:2]
     reading = prepare_picture(image, _resize_field(frame, width, height))
     found = scale_snapped_camera(best.snapped, height, width)
-    last = _snap_with_known_position(
+    last = snap_with_known_position(
         reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known
     )
     return last if last.reason is None else found
@@ -643,9 +397,3 @@ def scale_snapped_camera(snapped: SnappedCamera, height: int, width: int) -> Sna
         moved_px=snapped.moved_px * factor,
         size=(height, width),
     )
-
-
-@cache
-def get_kernel_executor() -> Executor:
-    """Threads for the compiled kernels, which let go of the GIL."""
-    return ThreadPoolExecutor(os.cpu_count() or 1, "propose")

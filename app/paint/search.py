@@ -7,10 +7,11 @@ that show the same are kept once.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -379,3 +380,9 @@ def is_same_or_half_turned_view(
         ):
             return True
     return False
+
+
+@cache
+def get_kernel_executor() -> Executor:
+    """Threads for the compiled kernels, which let go of the GIL."""
+    return ThreadPoolExecutor(os.cpu_count() or 1, "propose")

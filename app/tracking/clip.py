@@ -12,12 +12,8 @@ import numpy as np
 from app.errors import ImageError
 from app.geometry.camera import Camera
 from app.paint.evidence import Image
-from app.paint.propose import (
-    ENLARGED_WIDTH,
-    WORK_WIDTH,
-    enlarge_small_picture,
-    explain_too_small_picture,
-)
+from app.paint.propose import ENLARGED_WIDTH, enlarge_small_picture, explain_too_small_picture
+from app.paint.ranking import WORK_WIDTH
 from app.soccer.frames import ImageSize
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex

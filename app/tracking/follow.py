@@ -30,7 +30,7 @@ from app.geometry.resection import (
 )
 from app.paint.agreement import PaintAgreement, measure_agreement
 from app.paint.candidates import MAIN, WIDE, CameraSearchSpace
-from app.paint.propose import measure_weakest_marking
+from app.paint.ranking import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy

@@ -18,12 +18,12 @@ from app.paint.evidence import Image, PreparedPicture, prepare_picture
 from app.paint.grass import find_field_of_play
 from app.paint.propose import (
     FrameProposal,
-    get_kernel_executor,
     line_strength,
     prepare_frame_to_search,
     propose_for_frame,
 )
 from app.paint.ridges import Strength
+from app.paint.search import get_kernel_executor
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import ClipFrame

@@ -45,10 +45,10 @@ PLAIN_WORDS = """
     pages paint palette panel parquet parse parts path pen people permissions pins pitch pitches
     pixel place places play playback player pointer policies pool popover position postgresql
     preopen preview problem process profile progress proof property proposal propose props provider
-    queries query quota rail rater reader reasons record refresh reimport remote render repeats
+    queries query quota rail ranking rater reader reasons record refresh reimport remote render repeats
     report requests resect resource restore result return revert reviewers rights roles router sentences
     routes row rows rules run runner running runs safe save scale scene scene3d scenes schemas
-    scores scoring scroll search sender sending serve server service session sets shared sharing
+    scores scoring scroll search sender sending sequence serve server service session sets shared sharing
     sheet sign snapshot solve solving source sources sphere spread sqlite squares stacks stage
     staging standpoints state statistics steps storage store stored stream stretches submit
     suggested suggestions summary surface swap synloc tab table tall team term terminal text threads

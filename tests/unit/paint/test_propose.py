@@ -17,15 +17,13 @@ from app.paint.evidence import (
     trace_visible_markings,
 )
 from app.paint.propose import (
-    FrameToSearch,
-    RankedCamera,
     explain_non_square_pixels,
     explain_uncertain_camera,
-    measure_weakest_marking,
     propose_camera,
     resize_and_prepare_frame,
     scale_snapped_camera,
 )
+from app.paint.ranking import FrameToSearch, RankedCamera, measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.sample.render import render_view
 from app.sample.scene import Scene
@@ -139,7 +137,7 @@ class TestPropose:
             asked.append((given[0].width, given[4], named))
             return snap_to_prepared_picture(*given, **named)
 
-        monkeypatch.setattr("app.paint.propose.snap_to_prepared_picture", snap)
+        monkeypatch.setattr("app.paint.ranking.snap_to_prepared_picture", snap)
         small = lawn(drawn(TRUE, 3))
         picture = np.asarray(cv2.resize(small, (1280, 720), interpolation=cv2.INTER_CUBIC))
         assert propose_camera(picture, known=[TRUE]).outcome == "proposed"

@@ -21,7 +21,7 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.propose import measure_weakest_marking
+from app.paint.ranking import measure_weakest_marking
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
 from app.sample.render import render_view
 from app.soccer.pitch import Pitch
