@@ -31,8 +31,8 @@ class BallSensitivity:
 
     Attributes:
         distance_m: From the camera.
-        by_size: Metres that the ball moves, at each of ``make_size_changes()``.
-        by_shift: The same at ``make_centre_shifts()``.
+        by_size: Metres that the ball moves, at each of ``make_box_size_percents()``.
+        by_shift: The same at ``make_box_shift_percents()``.
         size_slope: Derivative at zero, metres per per cent of the size.
         shift_slope: Metres per per cent of the diagonal.
     """
@@ -45,12 +45,12 @@ class BallSensitivity:
     shift_slope: float
 
 
-def make_size_changes() -> FloatArray:
+def make_box_size_percents() -> FloatArray:
     """Changes of the size, per cent."""
     return np.linspace(-SIZE_PERCENT, SIZE_PERCENT, STEPS)
 
 
-def make_centre_shifts() -> FloatArray:
+def make_box_shift_percents() -> FloatArray:
     """Shifts of the centre, per cent of the diagonal."""
     return np.linspace(-SHIFT_PERCENT, SHIFT_PERCENT, STEPS)
 
@@ -89,8 +89,8 @@ def measure_frame_sensitivity(frame: GroundTruthFrame, diameter_m: float) -> Bal
     return BallSensitivity(
         frame,
         float(np.linalg.norm(origin - camera.position)),
-        np.array([measure_displacement(0.0, percent) for percent in make_size_changes()]),
-        np.array([measure_displacement(shift, 0.0) for shift in make_centre_shifts()]),
+        np.array([measure_displacement(0.0, percent) for percent in make_box_size_percents()]),
+        np.array([measure_displacement(shift, 0.0) for shift in make_box_shift_percents()]),
         size_slope * diameter / 100,
         shift_slope * frame.size.diagonal / 100,
     )
@@ -150,7 +150,7 @@ def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Chart:
             line
             for item in samples
             for line in _make_curve_and_slope_series(
-                item, make_size_changes(), item.by_size, item.size_slope
+                item, make_box_size_percents(), item.by_size, item.size_slope
             )
         ),
         color=color,
@@ -163,7 +163,7 @@ def make_sensitivity_figure(samples: Sequence[BallSensitivity]) -> Chart:
             line
             for item in samples
             for line in _make_curve_and_slope_series(
-                item, make_centre_shifts(), item.by_shift, item.shift_slope
+                item, make_box_shift_percents(), item.by_shift, item.shift_slope
             )
         ),
         color=color,

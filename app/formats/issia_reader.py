@@ -24,7 +24,7 @@ from app.formats.report import ReaderReport
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
 from app.formats.trees import FolderTree, open_tree_context
-from app.formats.viper_reader import ViperVideo, is_viper, read_viper
+from app.formats.viper_reader import ViperVideo, is_viper_file, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
@@ -238,7 +238,7 @@ def _read_viper_videos(
 ) -> None:
     files = [name for name in names if _XGTF.search(name)]
     for name in (name for name in names if _XML.search(name)):
-        if is_viper(tree, name):
+        if is_viper_file(tree, name):
             files.append(name)
         else:
             report.add_problem_at(

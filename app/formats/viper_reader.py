@@ -77,7 +77,7 @@ class ViperVideo:
         return sum(map(len, self.persons.values()))
 
 
-def is_viper(tree: FileTree, name: str) -> bool:
+def is_viper_file(tree: FileTree, name: str) -> bool:
     """Whether a file begins as XGTF does, whatever its ending."""
     try:
         with tree.open(name) as stream:

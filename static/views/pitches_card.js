@@ -44,7 +44,7 @@ function MatchPitch({ one, busy, onSet }) {
 export function Pitches({ dataset }) {
 	const { value, error, reload, card, saving } = useMatchCard(getPitches, dataset, CONCERNED);
 	const { job, busy, error: refused, send } = saving;
-	if (error) return html`<${Trouble} title="The pitches cannot be shown" error=${error} retry=${reload} />`;
+	if (error) return html`<${Trouble} title="The pitch sizes cannot be shown" error=${error} retry=${reload} />`;
 	if (!value?.items.length) return null;
 	const open = value.items.some(({ estimate, problem }) => !estimate && !problem);
 	const proposals = value.items.filter(({ proposed }) => proposed).length;

@@ -310,7 +310,7 @@ const EDIT = [
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},
-	{ keys: ['Escape'], label: 'Close, or cancel the drag', group: 'Edit', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Cancel, deselect, or close', group: 'Edit', typing: true, run: escape },
 	{
 		keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓',
 		run: () => {},
@@ -334,7 +334,7 @@ const EDIT = [
 	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; again: accept what was followed', group: 'Edit', needs: 'annotate', once: true, run: () => { followOrAccept(viewInHand()); } },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
-	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
+	{ keys: ['u'], label: 'Reset the selected line or ball to the imported one', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
 	{ keys: ['m'], label: 'Swap left and right (first in the view named by a finding)', group: 'Edit', needs: 'annotate', run: swap },
 	{ keys: ['Shift+g'], label: 'Guidelines of the dataset', group: 'View', run: () => { guidelinesShown.value = !guidelinesShown.value; } },
 	{ keys: ['Shift+o'], label: 'Start an independent annotation on a copy of the group', group: 'Edit', needs: 'annotate', run: annotateOwn },

@@ -34,7 +34,7 @@ export function BottomStrip({ group, solution, pictures }) {
 	useKeys(TIMELINE_KEYS);
 	const timeline = isStatic.value && stripTab.value === 'timeline';
 	return html`
-		<section class="strip" data-collapsed=${stripCollapsed.value} data-tabs=${isStatic.value} data-tab=${timeline ? 'timeline' : 'ball'} aria-label="Details">
+		<section class="strip" data-collapsed=${stripCollapsed.value} data-tabs=${isStatic.value} data-tab=${timeline ? 'timeline' : 'ball'} aria-label="Balls, lines and pitch">
 			${isStatic.value ? html`<${Tabs} />` : null}
 			${timeline ? html`<${Timeline} />` : html`
 				<${ContactSheet} pictures=${pictures} policy=${group.policy} />

@@ -21,7 +21,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.queue.service import find_neighbours, list_groups
 from app.features.queue.statistics import read_statistics
-from app.features.what_if.funnel import get_yield
+from app.features.what_if.funnel import count_yield
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsCache
 from tests.bench.table import print_table
@@ -84,11 +84,11 @@ def _yields(store: Store) -> dict[str, float]:
     found = {"yield counted anew": 1000 * (time.perf_counter() - start)}
     yields = YieldStore(store)
     start = time.perf_counter()
-    get_yield(yields, 1)
+    count_yield(yields, 1)
     found["first yield after a start"] = 1000 * (time.perf_counter() - start)
     for asked in WHAT_IF:
         name = " ".join(f"{key}={value}" for key, value in asked.items())
-        found[f"what if {name}"] = _spent(lambda asked=asked: get_yield(yields, 1, asked))
+        found[f"what if {name}"] = _spent(lambda asked=asked: count_yield(yields, 1, asked))
     return found
 
 

@@ -38,7 +38,7 @@ from app.features.imports.merge_group import (
     CONFLICT,
     FOLLOW,
     UPSTREAM,
-    UnitHistory,
+    EditStateDigests,
     choose_merge_action,
     merge_dismissals,
     merge_group,
@@ -96,8 +96,8 @@ def _merge_station(
     report: IngestReport,
 ) -> bool:
     chain = read_station_revision_chain(session, stored)
-    here = UnitHistory(stored.digest, stored.source_digest, chain.states)
-    there = UnitHistory(station_digest(item.station), station_digest(item.base), item.states)
+    here = EditStateDigests(stored.digest, stored.source_digest, chain.states)
+    there = EditStateDigests(station_digest(item.station), station_digest(item.base), item.states)
     decision = choose_merge_action(here, there)
     if decision in (FOLLOW, UPSTREAM):
         _adopt_other_station(

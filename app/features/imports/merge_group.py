@@ -33,7 +33,7 @@ from app.soccer.group import Group, View
 
 
 @dataclass(frozen=True)
-class UnitHistory:
+class EditStateDigests:
     """One unit that is edited as a whole, as an installation has it.
 
     Attributes:
@@ -46,7 +46,7 @@ class UnitHistory:
     base: str
     past: Sequence[str]
 
-    def contains_history_of(self, other: UnitHistory) -> bool:
+    def contains_history_of(self, other: EditStateDigests) -> bool:
         """Whether it went through everything that the other did, in that order."""
         states = iter(self.past)
         return all(state in states for state in other.past)
@@ -55,7 +55,7 @@ class UnitHistory:
 FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
 
 
-def choose_merge_action(here: UnitHistory, there: UnitHistory) -> str:
+def choose_merge_action(here: EditStateDigests, there: EditStateDigests) -> str:
     """What becomes of a unit (a view or a camera) in this installation.
 
     Returns:
@@ -161,34 +161,40 @@ def _make_kept_edit_findings(view: str | None, decision: str, what: str) -> list
 
 def _make_pitch_histories(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
-) -> tuple[UnitHistory, UnitHistory]:
-    here = UnitHistory(
+) -> tuple[EditStateDigests, EditStateDigests]:
+    here = EditStateDigests(
         format_pitch_size(stored.group.pitch), format_pitch_size(chain.base.pitch), chain.pitches
     )
     size, base = format_pitch_size(exported.group.pitch), format_pitch_size(exported.base.pitch)
-    return here, UnitHistory(size, base, exported.pitches)
+    return here, EditStateDigests(size, base, exported.pitches)
 
 
-def _make_local_view_history(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
+def _make_local_view_history(
+    stored: StoredGroup, chain: RevisionChain, view: View
+) -> EditStateDigests:
     present, base = stored.view_digests[view.key]
-    return UnitHistory(present, base, chain.views.get(view.key, (present,)))
+    return EditStateDigests(present, base, chain.views.get(view.key, (present,)))
 
 
-def _make_exported_view_history(exported: MergeGroup, view: View, base: View) -> UnitHistory:
+def _make_exported_view_history(exported: MergeGroup, view: View, base: View) -> EditStateDigests:
     past = exported.views.get(view.key, ())
-    return UnitHistory(view_digest(view), view_digest(base), past)
+    return EditStateDigests(view_digest(view), view_digest(base), past)
 
 
 def _make_local_station_history(
     stored: StoredGroup, chain: RevisionChain, view: View
-) -> UnitHistory:
+) -> EditStateDigests:
     own = stored.stations[view.key]
-    return UnitHistory(own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,)))
+    return EditStateDigests(
+        own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,))
+    )
 
 
-def _make_exported_station_history(exported: MergeGroup, view: View, base: View) -> UnitHistory:
+def _make_exported_station_history(
+    exported: MergeGroup, view: View, base: View
+) -> EditStateDigests:
     past = exported.stations.get(view.key, ())
-    return UnitHistory(station_digest(view.station), station_digest(base.station), past)
+    return EditStateDigests(station_digest(view.station), station_digest(base.station), past)
 
 
 def _filter_new_findings(

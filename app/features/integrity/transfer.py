@@ -370,7 +370,7 @@ def _require_same_log_chain(session: Session, entries: int, last: str) -> int:
     found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
     if count != entries or (found.scalar() or "") != last:
         raise DamagedError(
-            "the last entry of the copied log differs from the last entry of the source's log"
+            "the copied log differs from the log of the source: in the number of entries, or in the last one"
         )
     return count
 

@@ -236,7 +236,8 @@ def _validate_token_name(text: str) -> str:
     name = text.strip()
     if not _NAME.fullmatch(name):
         raise InputError(
-            "the name of a token is up to 40 letters, digits, spaces and . _ -", pointer="/name"
+            "the name of a token has 1 to 40 characters (A to Z, a to z, digits, spaces and . _ -), and begins and ends with a letter or digit",
+            pointer="/name",
         )
     return name
 

@@ -22,7 +22,11 @@ from app.features.datasets.queries import (
 )
 from app.features.imports.upload_queries import get_upload
 from app.features.people.roles import DatasetRoles, Role
-from app.features.people.visibility_queries import RestrictedReader, Visibility, is_hidden_group
+from app.features.people.visibility_queries import (
+    RestrictedReader,
+    Visibility,
+    is_hidden_from_reader,
+)
 from app.soccer.actors import is_actor_of
 
 MIN_HASH = 8
@@ -99,7 +103,7 @@ _GROUPS: Mapping[OwnedKind, str] = {
     OwnedKind.VIEW: "view",
     OwnedKind.STATION: "station",
 }
-"""What can be hidden from whoever annotates copies of groups, and its name in ``is_hidden_group``."""
+"""What can be hidden from whoever annotates copies of groups, and its name in ``is_hidden_from_reader``."""
 
 
 def is_hidden_from(
@@ -112,7 +116,7 @@ def is_hidden_from(
     if dataset is None or dataset not in reader.batches:
         return False
     with store.read() as session:
-        return is_hidden_group(session, reader, dataset, **{kind: named.by})
+        return is_hidden_from_reader(session, reader, dataset, **{kind: named.by})
 
 
 def find_ownership(store: Store, named: NamedResource, visibility: Visibility) -> Ownership | None:

@@ -17,12 +17,12 @@ from app.features.people.invitations import (
 )
 from app.features.people.login_schemas import AccessTokenList
 from app.features.people.schemas import (
+    DatasetRoleList,
     InvitationList,
     InvitationReport,
     LinkRenewal,
     MemberDocument,
     MemberEdit,
-    MemberList,
     NewUser,
     UserEdit,
     UserList,
@@ -208,9 +208,9 @@ members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"],
 @members_router.get("", operation_id="listMembers", responses=responses(401, 404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
-def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> MemberList:
+def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> DatasetRoleList:
     """Everybody who can log in, and what they are in the dataset."""
-    return MemberList(items=people.list_members(store, dataset))
+    return DatasetRoleList(items=people.list_members(store, dataset))
 
 
 @members_router.put(

@@ -294,5 +294,5 @@ class MemberDocument(Document):
     single: Role | None = Field(description="Their role in this dataset; null: none of its own.")
 
 
-class MemberList(ListDocument[MemberDocument]):
+class DatasetRoleList(ListDocument[MemberDocument]):
     """Everybody who can log in, by name; those of role `none` do not see the dataset."""

@@ -111,7 +111,7 @@ def visible_groups_across_datasets_condition(dataset: Any, group: Any) -> list[C
     ]
 
 
-def is_hidden_group(
+def is_hidden_from_reader(
     session: Session, reader: RestrictedReader, dataset_id: int, **named: int
 ) -> bool:
     """Whether a group is hidden from somebody, or that of a view, or every one of a static camera.

@@ -130,10 +130,10 @@ _Values = dict[str, Any]
 @commands.command("predictions")
 def list_(dataset: Dataset, json_: Json = False) -> None:
     """List the sets of predictions of a dataset, newest first."""
-    from app.features.predictions.service import list_predictions
+    from app.features.predictions.service import list_prediction_sets
 
     with open_store() as store:
-        found = list_predictions(store, dataset)
+        found = list_prediction_sets(store, dataset)
     print_rows(
         found,
         json_,

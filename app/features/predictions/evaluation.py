@@ -178,7 +178,7 @@ def list_frames(
         InputError: The query, the limit or the place is impossible.
     """
     if not 1 <= limit <= MAX_PAGE:
-        raise InputError(f"a page has 1 to {MAX_PAGE} frames", pointer="/limit")
+        raise InputError(f"limit must be 1 to {MAX_PAGE} frames", pointer="/limit")
     where = _build_frame_conditions(query)
     sort = _validate_field(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
     descending = query.sort.endswith("-desc")

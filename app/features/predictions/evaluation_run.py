@@ -21,7 +21,7 @@ from app.features.predictions.frames import (
     EvaluationTruth,
     read_live_truth,
     read_version_truth,
-    unknown_rule_error,
+    unknown_group_rule_error,
 )
 from app.features.predictions.queries import (
     PredictionSet,
@@ -149,7 +149,11 @@ class EvaluationRequest:
     def check(self) -> None:
         """Raise InputError where it says something impossible."""
         if self.predictions is None and self.careful is None:
-            raise InputError("there are no predictions to evaluate", pointer="/predictions")
+            raise InputError(
+                "the request names neither predictions nor reference boxes",
+                hint="Give `predictions`, `careful`, or both.",
+                pointer="/predictions",
+            )
         if self.boxes not in BOX_KINDS:
             raise InputError(
                 f"boxes must be one of {', '.join(BOX_KINDS)}, not {quote_text(self.boxes)}",
@@ -161,7 +165,9 @@ class EvaluationRequest:
                 pointer="/min_score",
             )
         if len(self.name) > MAX_NAME:
-            raise InputError(f"a name has at most {MAX_NAME} characters", pointer="/name")
+            raise InputError(
+                f"the name of an evaluation has at most {MAX_NAME} characters", pointer="/name"
+            )
         refuse_group_rule_beside_version(self.groups, self.version)
 
 
@@ -265,7 +271,7 @@ def require_valid_evaluation_request(
         if request.version is not None:
             _require_own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
-            raise unknown_rule_error(request.groups)
+            raise unknown_group_rule_error(request.groups)
 
 
 def _find_track_set(

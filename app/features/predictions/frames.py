@@ -78,7 +78,7 @@ def read_live_truth(
         ConflictError: Groups that might take part have no solution.
     """
     if rule not in LIVE_RULES:
-        raise unknown_rule_error(rule)
+        raise unknown_group_rule_error(rule)
     candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
     require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
@@ -174,7 +174,7 @@ def make_truth_pins(
     }
 
 
-def unknown_rule_error(rule: str) -> InputError:
+def unknown_group_rule_error(rule: str) -> InputError:
     """The error where somebody wants groups by a rule that is none of ``LIVE_RULES``."""
     known = ", ".join(LIVE_RULES)
     return InputError(f"groups must be one of {known}, not {quote_text(rule)}", pointer="/groups")

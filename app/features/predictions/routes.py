@@ -54,7 +54,7 @@ LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "strin
 @paged()
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
     """The sets of predictions of a dataset, the newest first."""
-    found = review.list_predictions(store, dataset)
+    found = review.list_prediction_sets(store, dataset)
     return PredictionSetList(items=found)
 
 

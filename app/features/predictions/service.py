@@ -184,7 +184,7 @@ def read_frame_names(store: Store, dataset: str | int) -> FrameNameIndex:
     )
 
 
-def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
+def list_prediction_sets(store: Store, dataset: str | int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
@@ -207,7 +207,7 @@ def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionS
     Raises:
         NotFoundError: There is none; the hint names those that there are.
     """
-    known = list_predictions(store, dataset)
+    known = list_prediction_sets(store, dataset)
     found = next((item for item in known if name in (item.name, str(item.id))), None)
     if found is None:
         names = ", ".join(item.name for item in known[:10])

@@ -189,7 +189,7 @@ def list_groups(
     """
     parsed = parse_query(query)
     if not 1 <= limit <= MAX_PAGE:
-        raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
+        raise InputError(f"limit must be 1 to {MAX_PAGE} groups", pointer="/limit")
     if cursor is not None and start is not None:
         raise InputError("give a cursor or a position, not both", pointer="/from")
     order = parsed.order

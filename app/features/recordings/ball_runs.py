@@ -302,7 +302,9 @@ def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
 def _require_unaccepted_and_unchanged(run: StoredRun, if_match: str) -> None:
     require_etag(run.etag, if_match, "this ball run")
     if run.accepted_by is not None:
-        raise ConflictError("this ball run is accepted", hint="Undo the acceptance first.")
+        raise ConflictError(
+            "this ball run is accepted, so it cannot be changed", hint="Undo the acceptance first."
+        )
 
 
 def _validate_uncertain_frames(run: StoredRun, frames: Sequence[int]) -> list[int]:

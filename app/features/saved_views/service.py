@@ -71,7 +71,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
         names = [row.name for row in rows]
         if name in names:
             raise ConflictError(
-                f'there is a view "{name}" already', hint="Delete it, or choose another name."
+                f'there is a saved view "{name}" already', hint="Delete it, or choose another name."
             )
         if len(names) >= MAX_VIEWS:
             raise ConflictError(

@@ -215,7 +215,7 @@ def _plan_change(
     state = _read_state(session, station_id)
     if not state.station.shared:
         raise ConflictError(
-            f"static camera {state.station.key} belongs to a single view",
+            f"camera {state.station.key} is not a static camera: it belongs to one view alone",
             hint="Edit the lines of that view instead.",
         )
     require_etag(state.etag, if_match, f"camera {state.station.key}")

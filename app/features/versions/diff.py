@@ -95,10 +95,12 @@ def diff_versions(store: Store, older: int, newer: int) -> VersionDiff:
         InputError: They belong to two datasets.
     """
     with store.read() as session:
-        return read_diff(session, read_version(session, older), read_version(session, newer))
+        return compute_version_diff(
+            session, read_version(session, older), read_version(session, newer)
+        )
 
 
-def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
+def compute_version_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     """``diff_versions`` within a session."""
     if older.dataset_id != newer.dataset_id:
         raise InputError("the two versions belong to two datasets", pointer="/against")
@@ -137,7 +139,9 @@ def read_changelog(session: Session, version: Version) -> list[str]:
         counts = version.counts
         groups, balls = _format_group_count(counts["groups"]), plural(counts["balls"], "ball")
         return [f"First version: {groups}, {balls} in views."]
-    return describe_diff(read_diff(session, read_version(session, version.previous), version))
+    return describe_diff(
+        compute_version_diff(session, read_version(session, version.previous), version)
+    )
 
 
 def describe_diff(diff: VersionDiff) -> list[str]:

@@ -90,7 +90,7 @@ class Yield:
     needs_solving: tuple[str, ...]
 
 
-def get_yield(
+def count_yield(
     yields: YieldStore, dataset_id: int, values: Mapping[str, Any] | None = None
 ) -> Yield:
     """What a dataset's policy lets through, or what it would with other values.

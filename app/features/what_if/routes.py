@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, create_model
 
 from app.features.datasets.service import dataset_id
 from app.features.policies.schemas import PolicyDocument
-from app.features.what_if.funnel import UNSOLVED, Yield, get_yield
+from app.features.what_if.funnel import UNSOLVED, Yield, count_yield
 from app.http.deps import AppServices, DatasetPath
 from app.http.documents import Document
 from app.http.permissions import Action, OwnedKind, may
@@ -191,7 +191,7 @@ def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     is 503, and says how far it is.
     """
     found = dataset_id(services.store, dataset)
-    return get_yield(services.yields, found)
+    return count_yield(services.yields, found)
 
 
 @router.post(
@@ -206,4 +206,4 @@ def try_policy(dataset: DatasetPath, values: ThresholdsToTry, services: AppServi
     the fields for which that cannot be known before.
     """
     found = dataset_id(services.store, dataset)
-    return get_yield(services.yields, found, values.to_policy_values())
+    return count_yield(services.yields, found, values.to_policy_values())

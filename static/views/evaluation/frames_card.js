@@ -29,7 +29,7 @@ const ASKED = {
 	any_error_m: [{ field: 'any_error_m', label: 'error of the detection with the highest score, m' }],
 	predicted_error_m: [{ field: 'predicted_error_m', label: 'predicted camera: error, m' }, { field: 'predicted_error_percent', label: 'predicted camera: error, %' }],
 	predicted_any_error_m: [{ field: 'predicted_any_error_m', label: 'predicted camera: error of the detection with the highest score, m' }],
-	box_iou: [{ field: 'box_iou', label: 'IoU of the true box with the reference box' }],
+	box_iou: [{ field: 'box_iou', label: 'IoU of the dataset’s box with the reference box' }],
 };
 
 /** The clicked number first, then those that some frame has. @param {string} field @param {FrameJson[]} items */

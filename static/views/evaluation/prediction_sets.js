@@ -97,7 +97,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 			</fieldset>
 			<${UploadField} id="prediction-boxes" label=${format === 'tracks' ? 'Tracks of the ball' : 'Ball boxes'} onUploaded=${took('boxes')} />
 			${format === 'tracks' ? html`<p class="note">The ball in 3D over time, as an export of tracks has it: frame, time_s, x_m, y_m, z_m, and sigma_m where it is known.</p>` : html`<details>
-				<summary class="evaluation__pins">More about the file</summary>
+				<summary class="evaluation__pins">Options for reading the file</summary>
 				<div class="form">
 					${format === 'coco' ? html`<${UploadField} id="prediction-images" label="COCO images" hint="the document whose image numbers the results use" accept=".json" onUploaded=${took('images')} />` : null}
 					<div class="form__row"><label for="prediction-category">Class of the ball</label><input class="field" id="prediction-category" name="category" type="number" min="0" step="1" placeholder="the only one" /></div>

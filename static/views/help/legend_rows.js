@@ -182,7 +182,7 @@ const SCENE = {
 
 /** @type {Section} */
 const PAGE = {
-	title: 'Everywhere',
+	title: 'On every page',
 	rows: [
 		{ name: 'Views', meaning: 'Each view keeps its letter and its colour.', tokens: 'view-a view-b view-c view-d view-e view-f', part: html`<span class="legend__letters">${LETTERS.map((letter) => html`<span class="letter" data-letter=${letter}>${letter}</span>`)}</span>` },
 		{ name: 'Good', meaning: 'Well within its threshold, or passed.', tokens: 'ok', part: html`<span data-grade="ok">✓ 1.2</span>` },

@@ -80,7 +80,7 @@ function Tools({ cameras }) {
 	return html`
 		<div class="camera__tools">
 			<button class="button button--small" type="button" title="The frame whose camera lies farthest from the paint" onClick=${cameras.worst}>Worst frame <kbd>W</kbd></button>
-			<button class="button button--small" type="button" title="The next frame that is bridged or lost" onClick=${cameras.untracked}>Next not tracked <kbd>N</kbd></button>
+			<button class="button button--small" type="button" title="The next frame that is bridged or lost" onClick=${cameras.untracked}>Next untracked frame <kbd>N</kbd></button>
 			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Projected lines <kbd>P</kbd></button>
 			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Previous cameras <kbd>B</kbd></button>` : null}
 			<${ThisFrame} cameras=${cameras} />

@@ -165,7 +165,7 @@ function Film({ one, running, reload }) {
 	if (error) {
 		return html`
 			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />
-			<section class="card" aria-label="Index"><${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>
+			<section class="card" aria-label="Index"><${FindAgain} one=${one} running=${running} label="Index the recording again" over=${reload} /></section>
 		`;
 	}
 	if (!list) return html`<${Loading} what="shots" />`;
@@ -192,7 +192,7 @@ function Opened({ one, reload }) {
 	const running = useRunningJobs({ dataset: one.dataset }, ({ subject }) => subject?.recording === one.id);
 	const why = one.problem ?? (one.indexed ? null : 'It is not indexed yet.');
 	if (!why) return html`<${Film} one=${one} running=${running} reload=${reload} />`;
-	return html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p>${one.problem ? html`<p>Groups taken from it still work. Put the file back, or index it again as it is now; if the file is the same, its shots stay.</p>` : null}<${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>`;
+	return html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p>${one.problem ? html`<p>Groups taken from it still work. Put the file back, or index it again as it is now; if the file is the same, its shots stay.</p>` : null}<${FindAgain} one=${one} running=${running} label="Index the recording again" over=${reload} /></section>`;
 }
 
 export function RecordingPage() {

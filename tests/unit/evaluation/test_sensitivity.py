@@ -6,10 +6,10 @@ import pytest
 from app.evaluation.sensitivity import (
     choose_frames,
     error_slopes,
-    make_centre_shifts,
+    make_box_shift_percents,
+    make_box_size_percents,
     make_sensitivity_figure,
     make_sensitivity_table,
-    make_size_changes,
     measure_frame_sensitivity,
 )
 from app.geometry.sphere import position_from_diameter
@@ -65,7 +65,7 @@ class TestMeasure:
         assert found.distance_m == pytest.approx(50)
         assert found.by_size[0] == pytest.approx(50 * (1 / 0.9 - 1))
         assert found.by_size[-1] == pytest.approx(50 * (1 - 1 / 1.1))
-        assert found.by_size[len(make_size_changes()) // 2] == 0
+        assert found.by_size[len(make_box_size_percents()) // 2] == 0
 
     def test_two_per_cent_of_the_diagonal_move_it_across(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
@@ -75,8 +75,8 @@ class TestMeasure:
     def test_the_derivative_touches_the_curve(self, make_frame) -> None:
         found = measure_frame_sensitivity(make_frame(distance=70.0, point=POINTS[1]), DIAMETER)
         for places, curve, slope in (
-            (make_size_changes(), found.by_size, found.size_slope),
-            (make_centre_shifts(), found.by_shift, found.shift_slope),
+            (make_box_size_percents(), found.by_size, found.size_slope),
+            (make_box_shift_percents(), found.by_shift, found.shift_slope),
         ):
             middle = len(places) // 2
             step = abs(places[middle + 1])

@@ -11,7 +11,7 @@ from app.formats import viper_reader
 from app.formats.file_tree import ImportLimits
 from app.formats.report import ReaderReport
 from app.formats.trees import open_tree
-from app.formats.viper_reader import ViperVideo, is_viper, read_viper
+from app.formats.viper_reader import ViperVideo, is_viper_file, read_viper
 from app.soccer.frames import Box, ImagePoint, ImageSize
 
 HEAD = (
@@ -411,4 +411,4 @@ class TestIsViper:
         (tmp_path / "2.xml.gz").write_bytes(gzip.compress(content.encode()))
         tree = open_tree(tmp_path, report)
         assert tree is not None
-        assert [is_viper(tree, name) for name in ("1.xml", "2.xml.gz")] == [is_one, is_one]
+        assert [is_viper_file(tree, name) for name in ("1.xml", "2.xml.gz")] == [is_one, is_one]

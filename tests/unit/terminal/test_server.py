@@ -30,7 +30,7 @@ from app.features.people.roles import DatasetRoles, Role, Scope
 from app.features.people.service import invite
 from app.features.policies.service import policy_to_yaml
 from app.features.predictions.evaluation import evaluation_to_values, get_evaluation
-from app.features.predictions.service import list_predictions
+from app.features.predictions.service import list_prediction_sets
 from app.features.solutions.service import solve_dataset
 from app.features.solve.jobs import solve_fully
 from app.features.versions.service import list_versions
@@ -206,7 +206,7 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
         path.name for path in Path("measured").iterdir()
     }
     assert "AP" in remote(*measure[:-1]).stdout
-    assert len(list_predictions(place.store, "small")) == 1, "the same files are read once"
+    assert len(list_prediction_sets(place.store, "small")) == 1, "the same files are read once"
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify_version
-from app.features.what_if.funnel import get_yield
+from app.features.what_if.funnel import count_yield
 from app.features.what_if.service import YieldStore
 from app.media import files as media
 from app.sample.render import render_view
@@ -209,9 +209,9 @@ class TestReadPaint:
         first, second = sorted(row.agreement for row in list_groups(painted, 1).items)
         yields = YieldStore(painted)
         for asked, passing in ((first, 2), (second, 1), (1.0, 0)):
-            found = get_yield(yields, 1, {"min_agreement": asked})
+            found = count_yield(yields, 1, {"min_agreement": asked})
             assert (found.passing, found.needs_solving) == (passing, ())
-        assert "agreement" not in [step.gate for step in get_yield(yields, 1).funnel]
+        assert "agreement" not in [step.gate for step in count_yield(yields, 1).funnel]
         strict = replace(TOUCHLINE, name="strict", min_agreement=1.0)
         change_policy(painted, "demo", strict, if_match=None, actor="ann")
         solve_dataset(painted, "demo")

@@ -15,7 +15,7 @@ from app.features.predictions.service import (
     add_predictions,
     delete_predictions,
     get_predictions,
-    list_predictions,
+    list_prediction_sets,
     make_prediction_set_name,
     read_predictions_of_view,
 )
@@ -112,7 +112,7 @@ class TestAddPredictions:
             add_predictions(
                 store, "demo", "x", results(tmp_path / "y.json", "8.png", "9.png"), actor="ann"
             )
-        assert list_predictions(store, "demo") == []
+        assert list_prediction_sets(store, "demo") == []
 
     @pytest.mark.parametrize("name", ["", "../x", "a/b", "ü", "x" * 101])
     def test_a_name_that_no_file_could_have_is_refused(self, store, state, tmp_path, name) -> None:

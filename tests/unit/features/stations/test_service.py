@@ -88,7 +88,7 @@ class TestSubmitStation:
 
     def test_a_station_of_one_view_is_edited_there(self, store, state) -> None:
         own = load_station(store, next(iter(state.station_ids.values())))
-        with pytest.raises(ConflictError, match="belongs to a single view"):
+        with pytest.raises(ConflictError, match="belongs to one view alone"):
             change(store, own)
 
     def test_which_calibration_counts_is_a_switch(self, store, station) -> None:

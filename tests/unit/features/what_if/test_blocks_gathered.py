@@ -21,7 +21,7 @@ from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.what_if import blocks as gathered
 from app.features.what_if.blocks import DatasetBlocks
-from app.features.what_if.funnel import get_yield
+from app.features.what_if.funnel import count_yield
 from app.features.what_if.service import YieldStore
 from app.soccer.policy import PAPER, CalibrationPolicy
 from tests.waiting import SECONDS
@@ -49,7 +49,7 @@ def anew(store: Store, tmp_path: Path):
                 return tmp_path / "elsewhere"
 
         shutil.rmtree(tmp_path / "elsewhere", ignore_errors=True)
-        return get_yield(Elsewhere(store), 1, values)
+        return count_yield(Elsewhere(store), 1, values)
 
     return count
 
@@ -101,8 +101,8 @@ class TestInStep:
             rng.choice([edit, edit, edit, take_back, bring, solve, judge])()
             if rng.random() < 0.3:
                 yields = YieldStore(store)
-            assert get_yield(yields, 1) == anew()
-            assert get_yield(yields, 1, asked) == anew(asked)
+            assert count_yield(yields, 1) == anew()
+            assert count_yield(yields, 1, asked) == anew(asked)
 
     def test_an_edit_that_is_taken_back_is_seen(self, store, fill, make_group, anew) -> None:
         """Its solution is there from before: none is inserted."""
@@ -112,20 +112,20 @@ class TestInStep:
         etag = submit_edit(
             store, group, make_set_ball_edit("7.png", None), if_match=etag, actor="ann"
         ).etag
-        assert get_yield(yields, 1).passing == 1
+        assert count_yield(yields, 1).passing == 1
         undo_group_edit(store, group, if_match=etag, actor="ann")
-        assert get_yield(yields, 1) == anew()
-        assert get_yield(yields, 1).passing == 2
+        assert count_yield(yields, 1) == anew()
+        assert count_yield(yields, 1).passing == 2
 
     def test_another_calibration_begins_anew(self, store, fill, make_group, anew) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
         yields = YieldStore(store)
-        assert get_yield(yields, 1).unsolved == 0
+        assert count_yield(yields, 1).unsolved == 0
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
         change_policy(store, "demo", other, if_match=None, actor="ann")
-        assert get_yield(yields, 1).unsolved == 5
+        assert count_yield(yields, 1).unsolved == 5
         solve_dataset(store, "demo")
-        assert get_yield(yields, 1) == anew()
+        assert count_yield(yields, 1) == anew()
 
     def test_groups_that_went_without_a_mark_are_seen(self, store, fill, make_group, anew) -> None:
         """As when the log is replayed, which says everything anew: at the next change of any."""
@@ -139,39 +139,39 @@ class TestInStep:
             if_match=load_group_state(store, group).etag,
             actor="ann",
         )
-        assert get_yield(yields, 1) == anew()
+        assert count_yield(yields, 1) == anew()
 
 
 class TestAfterARestart:
     def test_no_solution_is_read_again(self, store, fill, make_group, monkeypatch) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = get_yield(YieldStore(store), 1)
+        before = count_yield(YieldStore(store), 1)
         monkeypatch.setattr("app.features.what_if.blocks.read_tables", None)
-        assert get_yield(YieldStore(store), 1) == before
+        assert count_yield(YieldStore(store), 1) == before
 
     def test_what_was_judged_is_not_judged_again(
         self, store, fill, make_group, monkeypatch
     ) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = get_yield(YieldStore(store), 1)
+        before = count_yield(YieldStore(store), 1)
         monkeypatch.setattr("app.features.what_if.block_results.judge_groups", None)
-        assert get_yield(YieldStore(store), 1) == before
+        assert count_yield(YieldStore(store), 1) == before
 
     @pytest.mark.parametrize("name", ["table.json", "*.facts", "*.judged", "bare.heads"])
     def test_a_damaged_file_is_made_again(self, store, fill, make_group, name: str) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = get_yield(YieldStore(store), 1)
+        before = count_yield(YieldStore(store), 1)
         for damage in (lambda old: b"", lambda old: old[: len(old) // 2], lambda old: b"x" * 500):
             path = sorted(folder(store).glob(name))[0]
             whole = path.read_bytes()
             path.unlink()
             path.write_bytes(damage(whole))
-            assert get_yield(YieldStore(store), 1) == before
+            assert count_yield(YieldStore(store), 1) == before
 
     def test_a_table_of_another_database_is_not_used(self, store, fill, make_group) -> None:
         """As after a restored backup, whose changes have the numbers of others."""
         fill(*(make_group(number) for number in range(7, 12)))
-        get_yield(YieldStore(store), 1)
+        count_yield(YieldStore(store), 1)
         path = folder(store) / "table.json"
         kept = json.loads(path.read_text())
         with store.read() as session:
@@ -185,18 +185,18 @@ class TestAfterARestart:
         fill(*(make_group(number) for number in range(7, 12)))
         store.settings.yields.parent.mkdir(exist_ok=True)
         store.settings.yields.write_text("")
-        assert get_yield(YieldStore(store), 1).passing == 5
+        assert count_yield(YieldStore(store), 1).passing == 5
 
     def test_no_file_is_left_behind(self, store, fill, make_group) -> None:
         ids = fill(*(make_group(number) for number in range(7, 13)))
         yields = YieldStore(store)
-        get_yield(yields, 1)
+        count_yield(yields, 1)
         for group, number in zip(ids, range(7, 13), strict=True):
             change = make_set_ball_edit(f"{number}.png", None)
             submit_edit(
                 store, group, change, if_match=load_group_state(store, group).etag, actor="ann"
             )
-            get_yield(yields, 1)
+            count_yield(yields, 1)
         blocks = {path.stem for path in folder(store).glob("*.facts")}
         named = {block.block.name for block in yields.get_snapshot(1).blocks}
         assert blocks == named - {""}
@@ -216,7 +216,7 @@ class TestHowFarItIs:
             yields.get_snapshot(1)
         for _ in range(int(SECONDS / 0.02)):
             try:
-                found = get_yield(yields, 1)
+                found = count_yield(yields, 1)
                 break
             except OverloadedError:
                 time.sleep(0.02)
@@ -242,7 +242,7 @@ class TestHowFarItIs:
             "read_tables",
             lambda session, rows: taken.extend(row.group_id for row in rows) or read(session, rows),
         )
-        found = get_yield(YieldStore(store), 1)
+        found = count_yield(YieldStore(store), 1)
         assert np.unique(taken[:6]).tolist() == ids[:6]
         assert not set(taken[9:]) & set(ids[:6])
         assert found == anew()

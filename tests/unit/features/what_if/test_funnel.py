@@ -17,7 +17,7 @@ from app.features.imports.ingest import ensure_dataset, import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
-from app.features.what_if.funnel import WITHOUT_EFFECT, Yield, get_yield
+from app.features.what_if.funnel import WITHOUT_EFFECT, Yield, count_yield
 from app.features.what_if.service import YieldStore
 from app.features.what_if.table import YieldTable
 from app.soccer.annotation import BallAnnotation
@@ -236,7 +236,7 @@ def counted(found: Yield) -> None:
 
 class TestGetYield:
     def test_counts_telescope_and_agree_with_the_queue(self, filled, solutions) -> None:
-        found = get_yield(YieldStore(filled), 1)
+        found = count_yield(YieldStore(filled), 1)
         counted(found)
         assert found.passing == list_groups(filled, 1, "passes:yes").total > 0
         for step in found.funnel:
@@ -250,7 +250,7 @@ class TestGetYield:
     def test_what_if_counts_what_is_gained_and_lost(self, filled, solutions, seed: int) -> None:
         policy = random_policy(seed)
         values = {name: getattr(policy, name) for name in ("min_jac", "tau_percent", "max_sigma_m")}
-        found = get_yield(YieldStore(filled), 1, values)
+        found = count_yield(YieldStore(filled), 1, values)
         counted(found)
         asked = replace(PAPER, **values)
         after = [solved_again(group, old, asked).passes for group, old in solutions]
@@ -260,7 +260,7 @@ class TestGetYield:
         assert found.lost == sum(a and not b for a, b in zip(before, after, strict=True))
 
     def test_curves_are_the_papers_figure_3(self, filled, solutions) -> None:
-        found = get_yield(YieldStore(filled), 1)
+        found = count_yield(YieldStore(filled), 1)
         assert [curve.gamma_percent for curve in found.curves] == [0.5, 1.0, 2.0]
         for place, curve in enumerate(found.curves):
             for threshold in (0, 50, 75, 90, 100):
@@ -281,7 +281,7 @@ class TestGetYield:
 
     def test_findings_follow_their_thresholds(self, filled, solutions) -> None:
         values = {"max_height_m": 1.0, "low_parallax_degrees": 30.0, "outside_pitch_m": -10.0}
-        found = get_yield(YieldStore(filled), 1, values)
+        found = count_yield(YieldStore(filled), 1, values)
         again = [solved_again(group, old, replace(PAPER, **values)) for group, old in solutions]
         assert found.findings
         for part in found.findings:
@@ -296,23 +296,23 @@ class TestGetYield:
             for view in bare.views
         )
         fill(replace(bare, key="11", views=views), make_static(10))
-        found = get_yield(YieldStore(store), 1, {"min_jac": 1.0})
+        found = count_yield(YieldStore(store), 1, {"min_jac": 1.0})
         assert found.given_not_measured == 1
         assert found.passing == 1
 
     def test_a_match_in_two_splits_is_a_leak(self, store, fill, make_group) -> None:
         test = replace(make_group(9), match="another", split="test", key="another/9.png")
         fill(make_group(7), make_group(8, split="test"), make_group(10), test)
-        (leak,) = get_yield(YieldStore(store), 1).leakage
+        (leak,) = count_yield(YieldStore(store), 1).leakage
         assert leak.match == make_group(7).match
         assert leak.splits == (("test", 1), ("train", 2))
 
     def test_thresholds_that_need_solving_are_named_and_left_as_they_are(self, filled) -> None:
         yields = YieldStore(filled)
         values = {"calibration": {"check_labels": False}, "min_jac": 0.5, "ball_diameter_m": 0.3}
-        found = get_yield(yields, 1, values)
+        found = count_yield(yields, 1, values)
         assert found.needs_solving == ("calibration.check_labels",)
-        assert found.passing == get_yield(yields, 1, {"min_jac": 0.5}).passing
+        assert found.passing == count_yield(yields, 1, {"min_jac": 0.5}).passing
 
     @pytest.mark.parametrize("name", ["ball_diameter_m", "pitch_length_m", "pitch_width_m"])
     def test_what_the_table_passes_over_changes_no_gate_of_a_solve(
@@ -327,34 +327,34 @@ class TestGetYield:
 
     def test_an_empty_dataset_yields_nothing(self, store) -> None:
         ensure_dataset(store, "demo", "ann")
-        found = get_yield(YieldStore(store), 1)
+        found = count_yield(YieldStore(store), 1)
         counted(found)
         assert found.groups == 0
 
     def test_an_unknown_dataset_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            get_yield(YieldStore(store), 9)
+            count_yield(YieldStore(store), 9)
 
 
 class TestYieldStore:
     def test_unsolved_groups_are_the_first_step(self, store, fill, make_group) -> None:
         fill(make_group(7), make_group(8), solved=False)
         yields = YieldStore(store)
-        found = get_yield(yields, 1)
+        found = count_yield(yields, 1)
         counted(found)
         assert (found.funnel[0].gate, found.funnel[0].dropped, found.unsolved) == ("unsolved", 2, 2)
         solve_dataset(store, "demo")
-        assert get_yield(yields, 1).passing == 2
+        assert count_yield(yields, 1).passing == 2
 
     def test_an_edit_is_seen_and_an_undo_too(self, store, fill, make_group) -> None:
         ids = fill(make_group(7), make_group(8), make_group(9))
         yields = YieldStore(store)
-        assert get_yield(yields, 1).passing == 3
+        assert count_yield(yields, 1).passing == 3
         state = load_group_state(store, ids[1])
         state = submit_edit(
             store, ids[1], make_set_ball_edit("8.png", None), if_match=state.etag, actor="ann"
         )
-        found = get_yield(yields, 1)
+        found = count_yield(yields, 1)
         assert [step.gate for step in found.funnel if step.dropped] == ["ball"]
         submit_edit(
             store,
@@ -363,9 +363,9 @@ class TestYieldStore:
             if_match=load_group_state(store, ids[2]).etag,
             actor="b",
         )
-        assert get_yield(yields, 1).passing == 1
-        fresh = get_yield(YieldStore(store), 1)
-        assert fresh == get_yield(yields, 1)
+        assert count_yield(yields, 1).passing == 1
+        fresh = count_yield(YieldStore(store), 1)
+        assert fresh == count_yield(yields, 1)
 
     def test_a_new_policy_needs_no_solution_to_be_answered(self, store, fill, make_group) -> None:
         fill(make_group(7), make_group(8))
@@ -373,12 +373,12 @@ class TestYieldStore:
         before = yields.get_snapshot(1)
         narrow = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=1e-6)
         change_policy(store, "demo", narrow, if_match=None, actor="ann")
-        found = get_yield(yields, 1)
+        found = count_yield(yields, 1)
         assert (found.unsolved, found.passing) == (0, 0)
         assert yields.get_snapshot(1).blocks[0].table is before.blocks[0].table
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
         change_policy(store, "demo", other, if_match=None, actor="ann")
-        assert get_yield(yields, 1).unsolved == 2
+        assert count_yield(yields, 1).unsolved == 2
 
     def test_nothing_is_read_again_while_nothing_changes(self, filled) -> None:
         yields = YieldStore(filled)
