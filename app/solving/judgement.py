@@ -65,7 +65,7 @@ class Judgement:
         return valid
 
     @cached_property
-    def first_failed_gate(self) -> IntArray:
+    def first_failed_gates(self) -> IntArray:
         """First gate that each group fails, or ``PASSES``, shape (G,)."""
         first = np.full(self.failed.shape[1], PASSES)
         for gate in reversed(range(PASSES)):
@@ -75,7 +75,7 @@ class Judgement:
     @cached_property
     def passing_groups(self) -> BoolArray:
         """Which groups pass every gate that the policy asks for, shape (G,)."""
-        passing: BoolArray = self.first_failed_gate == PASSES
+        passing: BoolArray = self.first_failed_gates == PASSES
         return passing
 
 

@@ -85,7 +85,7 @@ class RecordingReader:
         """Whether a frame is among those that are kept."""
         return number in self._kept
 
-    def prefetch(self, number: int, most: int) -> bool:
+    def step_towards_frame(self, number: int, most: int) -> bool:
         """Come nearer to a frame by so many frames at most, and decode it once it is the next; whether it is kept now.
 
         Raises:

@@ -328,7 +328,7 @@ class TestCutting:
             film.touch()
         page = open_page(f"/recordings/{recording}")
         expect(page.get_by_role("alert")).to_contain_text("has changed since it was indexed")
-        page.get_by_role("button", name="Index it again").click()
+        page.get_by_role("button", name="Index the recording again").click()
         expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(3)
 
     def test_what_somebody_else_changed_is_not_overwritten(

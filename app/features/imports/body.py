@@ -140,7 +140,7 @@ class GroupLimits:
         self._told: set[str] = set()
         """Static cameras whose markings are told already: every group brings them again."""
 
-    def limit_group(self, group: Group) -> Group | None:
+    def trim_group_to_limits(self, group: Group) -> Group | None:
         """The group with no more points than its views may have; None where it has too many views."""
         count = len(group.views)
         if count > MAX_VIEWS:

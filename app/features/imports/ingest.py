@@ -218,7 +218,7 @@ def _filter_storable_groups(
         else:
             # One that is left out is not missing: the source brought it.
             seen.add(group.key)
-            held = limits.limit_group(group)
+            held = limits.trim_group_to_limits(group)
             if held is not None:
                 report.without_picture += all(view.media is None for view in held.views)
                 yield replace(held, views=tuple(map(_make_media_path_absolute, held.views)))

@@ -158,7 +158,7 @@ def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool
             if not found.has_frame_ready(before):
                 asked_next = range(max(before - together, 0), max(number, 1))
                 found.planned = [one for one in asked_next if not found.has_frame_ready(one)]
-        if found.planned and found.reader.prefetch(found.planned[0], STEP):
+        if found.planned and found.reader.step_towards_frame(found.planned[0], STEP):
             found.cache_encoded_frame(found.planned.pop(0))
         return bool(found.planned)
     return False

@@ -287,7 +287,7 @@ def count_table_groups(
         gained=int((passes & ~before).sum()),
         lost=int((before & ~passes).sum()),
         unmeasured=counted.unmeasured,
-        dropped=np.bincount(judgement.first_failed_gate[live], minlength=len(GATES) + 1),
+        dropped=np.bincount(judgement.first_failed_gates[live], minlength=len(GATES) + 1),
         curves=counted.curves,
         distances=_count_by_distance(judgement, live),
         findings=_count_findings(table, live, policy, judgement),

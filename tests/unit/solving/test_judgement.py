@@ -130,7 +130,7 @@ class TestJudge:
         told = judge_with_known_view_failures(
             found, policy, uncertainty, jac, standing, first_alone=True
         )
-        assert told.first_failed_gate.tolist() == judged(found, policy).first_failed_gate.tolist()
+        assert told.first_failed_gates.tolist() == judged(found, policy).first_failed_gates.tolist()
 
     def test_a_view_that_does_not_count_has_no_part_in_sigma_and_residuals(self):
         policy = replace(PAPER, max_sigma_m=0.1, min_p_value=0.05, given_sigma_px=1.0)
@@ -170,7 +170,7 @@ class TestJudge:
     def test_random_groups_and_policies_reach_every_gate(self):
         whole = join_facts([collect_facts_of_views(*random_views(seed)) for seed in range(150)])
         first = np.concatenate(
-            [judged(whole, random_policy(seed)).first_failed_gate for seed in range(12)]
+            [judged(whole, random_policy(seed)).first_failed_gates for seed in range(12)]
         )
         assert set(first.tolist()) == set(range(PASSES + 1))
 
@@ -192,7 +192,7 @@ class TestJudge:
     def test_a_group_in_good_order_passes(self):
         judgement = judged(facts())
         assert failing(judgement) == []
-        assert (judgement.passing_groups.tolist(), judgement.first_failed_gate.tolist()) == (
+        assert (judgement.passing_groups.tolist(), judgement.first_failed_gates.tolist()) == (
             [True],
             [PASSES],
         )

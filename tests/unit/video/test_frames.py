@@ -156,7 +156,7 @@ class TestRecordingReader:
         index = index_recording(path, settings)
         with closing(RecordingReader(path, index)) as reader:
             reader.read(100)
-            assert all(reader.prefetch(number, 3) for number in (101, 102, 103))
+            assert all(reader.step_towards_frame(number, 3) for number in (101, 102, 103))
             monkeypatch.setattr(
                 media_video.FrameReader, "read", lambda *_: pytest.fail("decoded again")
             )
@@ -174,14 +174,14 @@ class TestRecordingReader:
         with closing(RecordingReader(path, index)) as reader:
             reader.read(110)
             steps = 1
-            while not reader.prefetch(70, 5):
+            while not reader.step_towards_frame(70, 5):
                 steps += 1
             assert steps > 4 and reader.has(70)
             assert number_of(reader.read(70)[..., ::-1]) == 70
             # One that is asked for meanwhile is another jump, and right.
-            assert not reader.prefetch(116, 5)
+            assert not reader.step_towards_frame(116, 5)
             assert number_of(reader.read(50)[..., ::-1]) == 50
-            while not reader.prefetch(116, 5):
+            while not reader.step_towards_frame(116, 5):
                 assert not reader.has(116)
             assert number_of(reader.read(116)[..., ::-1]) == 116
 
@@ -189,7 +189,7 @@ class TestRecordingReader:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 60)
         index = index_recording(path, settings)
         with closing(RecordingReader(path, index, kept_bytes=5 * 160 * 96 * 3)) as reader:
-            assert all(reader.prefetch(number, 60) for number in range(60))
+            assert all(reader.step_towards_frame(number, 60) for number in range(60))
             assert list(reader._kept) == [55, 56, 57, 58, 59]
 
     def test_frames_that_follow_are_not_sought(

@@ -42,14 +42,17 @@ class TestViews:
         view = make_group(7).views[0]
         views = tuple(replace(view, key=str(number)) for number in range(MAX_VIEWS))
         group = replace(make_group(7), views=views)
-        assert limits.limit_group(group) == group
+        assert limits.trim_group_to_limits(group) == group
         assert report.problems == []
 
     def test_a_group_of_more_is_left_out_and_named(
         self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         group = make_group(7)
-        assert limits.limit_group(replace(group, views=group.views[:1] * (MAX_VIEWS + 1))) is None
+        assert (
+            limits.trim_group_to_limits(replace(group, views=group.views[:1] * (MAX_VIEWS + 1)))
+            is None
+        )
         (problem,) = report.problems
         assert (problem.path, problem.record) == ("files", group.key)
         assert problem.problem == "has 101 views, a group may have 100; it is left out"
@@ -61,14 +64,14 @@ class TestPoints:
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS - 10, Side_line_top=10)
         group = with_lines(make_group(7), lines)
-        assert limits.limit_group(group) == group
+        assert limits.trim_group_to_limits(group) == group
         assert report.problems == []
 
     def test_a_marking_of_more_is_left_out_and_named(
         self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS + 1, Side_line_top=4)
-        held = limits.limit_group(
+        held = limits.trim_group_to_limits(
             with_lines(make_group(7), lines, ("Middle line", "Side line top"))
         )
         assert held is not None
@@ -85,7 +88,7 @@ class TestPoints:
         self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         lines = lines_of(Middle_line=600, Side_line_top=500, Circle_central=450, Side_line_left=50)
-        held = limits.limit_group(with_lines(make_group(7), lines))
+        held = limits.trim_group_to_limits(with_lines(make_group(7), lines))
         assert held is not None
         assert held.views[0].station.lines.keys() == {
             "Side line top", "Circle central", "Side line left",
@@ -98,7 +101,7 @@ class TestPoints:
     ) -> None:
         lines = lines_of(Middle_line=MAX_POINTS + 1, Side_line_top=4)
         for frame in (10, 11):
-            held = limits.limit_group(with_lines(make_static(frame), lines))
+            held = limits.trim_group_to_limits(with_lines(make_static(frame), lines))
             assert held is not None
             assert held.views[0].station.lines == lines_of(Side_line_top=4)
         (problem,) = report.problems
@@ -108,5 +111,7 @@ class TestPoints:
         self, limits: GroupLimits, report: ReaderReport, make_group: MakeGroup
     ) -> None:
         for number in (7, 8):
-            limits.limit_group(with_lines(make_group(number), lines_of(Middle_line=MAX_POINTS + 1)))
+            limits.trim_group_to_limits(
+                with_lines(make_group(number), lines_of(Middle_line=MAX_POINTS + 1))
+            )
         assert len(report.problems) == 2

@@ -130,8 +130,8 @@ class TestJudgeTable:
             failing = solution.first_failing
             name = (
                 None
-                if judged.first_failed_gate[place] == PASSES
-                else GATES[judged.first_failed_gate[place]]
+                if judged.first_failed_gates[place] == PASSES
+                else GATES[judged.first_failed_gates[place]]
             )
             assert name == (failing.name if failing else None), (group.key, failing)
             if solution.ball is not None:
@@ -146,7 +146,7 @@ class TestJudgeTable:
     ) -> None:
         table = YieldStore(filled).get_snapshot(1).table
         found = np.concatenate(
-            [judge_table(table, random_policy(n)).first_failed_gate for n in range(SEEDS)]
+            [judge_table(table, random_policy(n)).first_failed_gates for n in range(SEEDS)]
         )
         # No picture of these was read.
         assert set(found.tolist()) == {*range(PASSES + 1)} - {GATES.index("agreement")}
@@ -162,13 +162,13 @@ class TestJudgeTable:
         )
         policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
         judged = judge_groups(table, policy, CovarianceOfMeanBall(table))
-        assert GATES.index("agreement") in judged.first_failed_gate and judged.passing_groups.any()
+        assert GATES.index("agreement") in judged.first_failed_gates and judged.passing_groups.any()
         for place, (group, old) in enumerate(painted):
             failing = solved_again(group, old, policy).first_failing
             name = (
                 None
-                if judged.first_failed_gate[place] == PASSES
-                else GATES[judged.first_failed_gate[place]]
+                if judged.first_failed_gates[place] == PASSES
+                else GATES[judged.first_failed_gates[place]]
             )
             assert name == (failing.name if failing else None), (group.key, failing)
 
