@@ -60,7 +60,7 @@ class _DatetimeSerialization:
 
 
 Moment = Annotated[str, _DatetimeSerialization()]
-"""A time as ``text_of`` writes it; RFC 3339 where it is served."""
+"""A time as ``format_utc_time`` writes it; RFC 3339 where it is served."""
 
 
 def replace_non_finite(value: Any) -> Any:

@@ -30,7 +30,7 @@ function modules() {
 	return ours.sort();
 }
 
-/** As `app/http/site.py` reckons it. */
+/** As `app/http/pages.py` reckons it. */
 function digest() {
 	const hash = createHash('sha256');
 	for (const name of [...modules(), 'package-lock.json']) {

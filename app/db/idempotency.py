@@ -203,7 +203,7 @@ class PendingResponse(Generic[R]):
         if self._committed is not None:
             raise RuntimeError(
                 "the response of this request is stored already: wrap the inner work in"
-                " without_response"
+                " without_pending_response"
             )
         response: R | None = None
         if self._request is not None:

@@ -12,7 +12,7 @@ Four formats, each a file, a folder or a zip:
           replay`` as in SNv3D.csv, in ``image`` or ``file_name``, or in ``frame`` (with ``camera``);
           the box in ``ball_bbox`` (``[x, y, w, h]``), ``x, y, w, h``, corners or centre and size;
           ``score`` may be missing. MOT's text files, too.
-``tracks`` The ball in 3D over time (``track_cameras_of_clip``).
+``tracks`` The ball in 3D over time (``prediction_table``).
 
 Names count before numbers. What is wrong is reported with file, record and field, and left out; frames that the dataset does
 not have are counted and listed. Nothing is evaluated.

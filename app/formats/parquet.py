@@ -164,19 +164,19 @@ def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
 
 
 def _make_ball_3d_coordinate_getter(number: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_coordinate(row: ViewRow) -> float | None:
         point = row.record.ball_point
         return None if point is None or row.view_ball_fit is None else float(point[number])
 
-    return get_jac
+    return get_coordinate
 
 
 def _make_ball_3d_getter(name: str) -> Getter:
-    def get_jac(row: ViewRow) -> Any:
+    def get_ball_value(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.view_ball_fit is None else getattr(ball, name)
 
-    return get_jac
+    return get_ball_value
 
 
 def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
@@ -202,11 +202,11 @@ def _get_p_value_of_solution(solution: Solution) -> float | None:
 
 
 def _make_box_getter(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_side(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
 
-    return get_jac
+    return get_side
 
 
 def _get_annotated_box(row: ViewRow) -> Box | None:
@@ -218,11 +218,11 @@ def _choose_exported_box(row: ViewRow) -> Box | None:
 
 
 def _make_center_coordinate_getter(axis: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
+    def get_center_coordinate(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
 
-    return get_jac
+    return get_center_coordinate
 
 
 def _make_jac_getter(index: int) -> Getter:

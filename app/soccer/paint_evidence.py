@@ -186,7 +186,7 @@ def reading_from_canonical_json(text: str) -> PaintReading:
     except json.JSONDecodeError as error:
         raise InputError(f"this is not a valid paint measurement: {error}") from error
     # It need not be written again to be digested.
-    vars(reading)["text"] = text
+    vars(reading)["canonical_json"] = text
     return reading
 
 

@@ -23,8 +23,8 @@ WRITER = """
 import sys
 from pathlib import Path
 from app.config import Settings
-from app.features.groups.edit import set_ball
-from app.features.groups.submit import load, submit
+from app.features.groups.edit import make_set_ball_edit
+from app.features.groups.submit import load_group_state, submit_edit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.db.dialects import sqlite
@@ -38,11 +38,11 @@ def acknowledge(upload=""):
 sqlite.PRAGMAS["synchronous"] = {"FULL": ("FULL", 2), "NORMAL": ("NORMAL", 1)}[sys.argv[3]]
 settings = Settings(home=Path(sys.argv[1]))
 store = Store.open(settings)
-state = load(store, 1)
+state = load_group_state(store, 1)
 view = state.stored.group.views[0].key
 for number in range(int(sys.argv[2])):
     ball = BallAnnotation(box=Box(100.0 + number, 200.0, 12.0, 12.0))
-    state = submit(store, 1, set_ball(view, ball), if_match=state.etag, actor="ann")
+    state = submit_edit(store, 1, make_set_ball_edit(view, ball), if_match=state.etag, actor="ann")
     acknowledge()
     writer = UploadWriter(settings, f"{number}.csv", by="ann")
     writer.write(b"x,y,w,h\\n" * 200)

@@ -351,7 +351,7 @@ def submit_change(
 
     Raises:
         StaleRevisionError: Somebody else was faster.
-        ReviewError: As ``find_group_id`` and ``plan_edit`` raise it.
+        ReviewError: As ``find`` and ``plan`` raise it.
         StorageError: Nothing was saved.
     """
     while True:

@@ -161,7 +161,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
         base = group if value["base"] is None else _parse_group_record(value["base"], shared)
         if group.key != base.key:
             raise InputError(
-                "has a `base` ({base.key}) that is not the same group as its `group` ({group.key})"
+                f"has a `base` ({base.key}) that is not the same group as its `group` ({group.key})"
             )
         return MergeGroup(
             group=group,

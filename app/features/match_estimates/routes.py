@@ -271,11 +271,11 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     found, store = services.noises.read(dataset), services.store
     state = read_policy(store, found.dataset_id)
 
-    def reset_noise(session: Session) -> None:
+    def adopt_noise(session: Session) -> None:
         noises.adopt_estimated_noise_in_session(session, found, state, actor)
 
     return change_and_return_solve_job(
-        services.jobs, store, found.dataset_id, reset_noise, actor=actor
+        services.jobs, store, found.dataset_id, adopt_noise, actor=actor
     )
 
 

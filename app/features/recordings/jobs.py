@@ -107,7 +107,7 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
     name = recording.name
     progress(0, None, f"Reading {name}.")
 
-    def report_instants_taken(done: int, total: int | None = None, sentence: str = "") -> None:
+    def report_frames_read(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
     with leave_work_to_next_server(progress):
@@ -117,13 +117,13 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
                 store,
                 recording_id,
                 actor=actor,
-                progress=report_instants_taken,
+                progress=report_frames_read,
                 stop=progress.check,
             )
             found = get_recording(store, recording_id)
         else:
             found = index_recording_in_worker(
-                store, recording_id, progress=report_instants_taken, stop=progress.check
+                store, recording_id, progress=report_frames_read, stop=progress.check
             )
     return {
         "recording": found.id,

@@ -225,11 +225,11 @@ def request_policy_change(
         StaleRevisionError: Somebody else was faster.
     """
 
-    def apply_pitch_change(session: Session, job: Job) -> PolicyStateAndJob:
+    def apply_policy_change(session: Session, job: Job) -> PolicyStateAndJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
         return PolicyStateAndJob(state, job, len(list_unsolved_groups(session, dataset_id)))
 
-    return change_and_request_solve(jobs, store, dataset_id, apply_pitch_change, actor=actor)
+    return change_and_request_solve(jobs, store, dataset_id, apply_policy_change, actor=actor)
 
 
 def request_pitch_change(

@@ -79,16 +79,16 @@ class TestFind:
 
     def test_a_name_that_fits_several_is_none_of_them(self, names) -> None:
         assert names.find("7.png") is None
-        assert "several" in names.explain_unknown("7.png")
+        assert "several" in names.explain_unknown_name("7.png")
         assert names.find(f"{CEDAR}/7.png").id == 3
 
     def test_a_frame_of_another_match_is_not_the_one_of_that_number(self, names) -> None:
         other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
         assert names.find(other) is None
-        assert names.explain_unknown(other).startswith(
+        assert names.explain_unknown_name(other).startswith(
             "is not a frame of the dataset: its folders name none"
         )
-        assert names.explain_unknown("99.png") == "is not a frame of the dataset"
+        assert names.explain_unknown_name("99.png") == "is not a frame of the dataset"
 
     @pytest.mark.parametrize(
         "name",

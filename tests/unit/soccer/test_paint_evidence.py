@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.json_text import json_text
+from app.json_text import digest_content, json_text
 from app.soccer.paint_evidence import (
     PaintEvidence,
     PaintPoint,
@@ -54,6 +54,12 @@ class TestReading:
         assert (again, again.digest) == (READING, READING.digest)
         again = reading_from_canonical_json(READING.canonical_json)
         assert (again, again.digest) == (READING, READING.digest)
+
+    def test_the_digest_of_what_is_read_is_that_of_its_text(self):
+        spaced = READING.canonical_json.replace(":", ": ", 1)
+        again = reading_from_canonical_json(spaced)
+        assert again == READING
+        assert again.digest == digest_content(spaced.encode()) != READING.digest
 
     @pytest.mark.parametrize(
         "changes",

@@ -90,7 +90,9 @@ class TestEstimateLineNoise:
         assert 0.05 < found.value < 0.6 and found.high - found.low > 0.25
 
     def test_pixels_of_a_larger_image_count_as_those_of_the_smaller(self):
-        large = [evidence_of(0.3, 2.0, seed).rescaled_to_pixels(2.0) for seed in range(30)]
+        large = [
+            evidence_of(0.3, 2.0, seed).rescaled_to_reference_pixels(2.0) for seed in range(30)
+        ]
         small = [evidence_of(0.3, 1.0, seed) for seed in range(30)]
         assert estimate_line_noise(large).sigma.value == pytest.approx(
             estimate_line_noise(small).sigma.value

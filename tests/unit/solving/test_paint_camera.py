@@ -101,7 +101,7 @@ class TestCamera:
         """No click and no paint tells a crowned or a longer pitch from another camera."""
         found = first(read(clicked()))
         told, own = (np.sqrt(np.diag(np.reshape(item, (8, 8))))[3:6] for item in (
-            found.known_covariance, found.covariance
+            found.known_covariance_with_pitch, found.covariance
         ))  # fmt: skip
         assert 0.5 < np.linalg.norm(told) < 2 and np.linalg.norm(own) < 0.3
         assert camera_sigma(found).position_meters == pytest.approx(tuple(told))
