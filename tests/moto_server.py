@@ -33,6 +33,8 @@ _GONE = {
     "expired": (400, "ExpiredToken"),
     "broken": (503, "SlowDown"),
 }
+PATIENCE = 6.0
+"""Seconds after which the tests' stores give up; one that hangs takes longer."""
 
 
 @dataclass
@@ -94,7 +96,8 @@ def store_settings(proxy: StoreProxy, **more: object) -> ObjectStoreSettings:
         "key": "tests",
         "secret": "of-tests",
         "exports": True,
-        "seconds": 1.0,
+        # Long enough for an answer on a machine that is busy with other things.
+        "seconds": PATIENCE,
     }
     return ObjectStoreSettings.model_validate({**values, **more})
 
@@ -176,7 +179,7 @@ class _Passing(BaseHTTPRequestHandler):
             self.connection.shutdown(socket.SHUT_RDWR)
         else:
             if mode == "hangs":
-                time.sleep(3)
+                time.sleep(PATIENCE + 3)
             self._forward(proxy, body, cut=mode == "cuts")
 
     def _refuse(self, status: int, code: str) -> None:

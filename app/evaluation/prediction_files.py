@@ -390,7 +390,7 @@ def _add_coco_result(run: PredictionCollector, item: Any, known: _CocoImages) ->
         if problem := _describe_contradiction(run, own, identity, named, frame):
             raise FieldError("file_name", problem)
     elif named or isinstance(value["image_id"], str):
-        frame = run.find_frame(named or identity)
+        frame = run.find_frame_or_count_unknown(named or identity)
     else:
         frame = None
         run.count_unknown_frame(f"image {identity}", _NUMBER_ALONE)
