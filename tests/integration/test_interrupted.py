@@ -47,7 +47,7 @@ def test_solve_keeps_what_is_done_and_goes_on_from_there(tmp_path: Path) -> None
     kept = solved(home)
     assert (solving.returncode, 0 < kept < GROUPS) == (130, True), told
     *progress, last = told.splitlines()
-    assert last == f"stopped; {kept} groups are kept, {GROUPS - kept} are left to do"
+    assert last == f"stopped; {kept} solved groups are stored, {GROUPS - kept} are left to do"
     assert all(line.startswith("Solving: ") for line in progress), told
     run("solve", "--dataset", "demo", "--workers", "1")
     assert solved(home) == GROUPS

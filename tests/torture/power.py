@@ -32,7 +32,7 @@ from tests.torture.recording import (
 SECTOR = 512
 WEAK = """
 import app.features.imports.upload_queries as uploads
-uploads.sync = lambda path: None
+uploads.sync_to_disk = lambda path: None
 """
 """Lets an upload be acknowledged before its name is on the disk."""
 

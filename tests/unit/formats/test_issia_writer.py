@@ -79,5 +79,5 @@ class TestWriteIssia:
         assert group.views[0].extras.boxes[0]["ID"].startswith('"/><object')
 
     def test_other_datasets_are_refused(self, tmp_path: Path, soccer_group: Make) -> None:
-        with pytest.raises(InputError, match="not from ISSIA"):
+        with pytest.raises(InputError, match="cannot be from ISSIA"):
             write_issia(tmp_path, [soccer_group()])

@@ -297,7 +297,7 @@ class TestExport:
         assert (tmp_path / "out/issia_calibration.json").is_file()
 
     def test_groups_that_do_not_fit_the_format_leave_no_file(self, store, three, tmp_path) -> None:
-        with pytest.raises(InputError, match="not from ISSIA"):
+        with pytest.raises(InputError, match="cannot be from ISSIA"):
             export_dataset(store, "demo", "issia-3d", tmp_path / "out", everything=True)
         assert list(tmp_path.glob("*out*")) == []
 
