@@ -129,7 +129,7 @@ class TestExports:
         self, imported: Store, proxy: StoreProxy, tmp_path: Path
     ) -> None:
         closed = stored_settings(tmp_path / "closed", proxy, exports=False)
-        with pytest.raises(InputError, match="only read from"):
+        with pytest.raises(InputError, match="are not allowed"):
             export_dataset(
                 imported,
                 "league",
