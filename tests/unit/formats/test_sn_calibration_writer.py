@@ -94,7 +94,7 @@ class TestWriteSnCalibration:
         view = soccer_group(replays=0).views[0]
         keys = ("00002", "valid/00002")
         groups = [Group(key, (replace(view, key=key),), split="valid") for key in keys]
-        with pytest.raises(InputError, match="have the same path valid-1280x720/00002"):
+        with pytest.raises(InputError, match="would both be called valid-1280x720/00002"):
             write_sn_calibration(tmp_path, map(solved, groups))
 
     def test_two_frames_that_differ_in_their_ending_are_refused_and_none_is_dropped(
