@@ -53,7 +53,7 @@ function saveState() {
 function ConflictLink() {
 	const other = held.value.find(({ group }) => group !== groupDocument.value?.id);
 	if (!other) return null;
-	return html`<a class="save__conflict" href=${reviewAddress(other.group)}>Go to the group with the conflict</a>`;
+	return html`<a class="save__conflict" href=${reviewAddress(other.group)} title="The group whose changes were not saved">Go to the conflict</a>`;
 }
 
 export function SaveState() {
