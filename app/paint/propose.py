@@ -22,16 +22,8 @@ from app.paint.agreement import (
     measure_agreement_with_clear_paint,
     measure_strength_near_markings,
 )
-from app.paint.candidates import (
-    MAIN,
-    WIDE,
-    CameraSearchSpace,
-    make_search_space_of_known_cameras,
-)
-from app.paint.evidence import (
-    PreparedPicture,
-    prepare_picture,
-)
+from app.paint.candidates import MAIN, WIDE, CameraSearchSpace, make_search_space_of_known_cameras
+from app.paint.evidence import PreparedPicture, prepare_picture
 from app.paint.goal import measure_goal_height
 from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.ranking import (
@@ -49,10 +41,7 @@ from app.paint.ranking import (
     snap_with_known_position,
 )
 from app.paint.ridges import Strength, find_straight_pieces, measure_line_strength
-from app.paint.search import (
-    PictureToScore,
-    get_kernel_executor,
-)
+from app.paint.search import PictureToScore, get_kernel_executor
 from app.paint.snap import SnappedCamera
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize

@@ -20,19 +20,9 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.agreement import (
-    PaintAgreement,
-    measure_agreement,
-)
-from app.paint.candidates import (
-    KNOWN,
-    CameraSearchSpace,
-)
-from app.paint.evidence import (
-    PreparedPicture,
-    has_grass_beside,
-    trace_visible_markings,
-)
+from app.paint.agreement import PaintAgreement, measure_agreement
+from app.paint.candidates import KNOWN, CameraSearchSpace
+from app.paint.evidence import PreparedPicture, has_grass_beside, trace_visible_markings
 from app.paint.ridges import Strength
 from app.paint.search import (
     KAPPA_MEAN,

@@ -19,10 +19,7 @@ from app.errors import UnknownMarkingError
 from app.soccer.annotation import BallAnnotation, format_followed_from_group
 from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
-from app.soccer.group import (
-    MAX_NOTE,
-    Reason,
-)
+from app.soccer.group import MAX_NOTE, Reason
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.pitch import MARKINGS, canonical_marking
 

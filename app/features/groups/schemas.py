@@ -7,10 +7,7 @@ from datetime import datetime
 from typing import Any, Literal
 
 from fastapi import Response
-from pydantic import (
-    BaseModel,
-    Field,
-)
+from pydantic import BaseModel, Field
 
 from app.features.groups.edit_schemas import BoxNumbers, Point, PointNumbers
 from app.features.groups.solution_schemas import SolutionDocument
@@ -19,13 +16,7 @@ from app.features.policies.schemas import PolicyDocument
 from app.http.documents import Document, IdentityCache, ListDocument, make_document_response
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.choices import CalibrationChoice, VerdictState
-from app.soccer.group import (
-    Group,
-    View,
-    ViewExclusion,
-    is_numbered_in_time,
-    make_view_letter,
-)
+from app.soccer.group import Group, View, ViewExclusion, is_numbered_in_time, make_view_letter
 from app.soccer.picture import PictureGeometry
 from app.wording import plural
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Unpack
 
 from app.db.json_columns import Json
-from app.db.log import LogEntry as LogEntry
 from app.db.log import read_entry
 from app.db.session import Session
 from app.db.store import Store

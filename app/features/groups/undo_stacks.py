@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.db.log import (
-    list_group_entry_kinds,
-    list_newest_entry_kinds,
-    list_station_entry_kinds,
-)
+from app.db.log import list_group_entry_kinds, list_newest_entry_kinds, list_station_entry_kinds
 from app.db.session import Session
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}

@@ -12,14 +12,7 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, OverloadedError
 from app.features.audit.service import log_job_request
 from app.features.jobs.job_run import JobProgress, JobRun, Work
-from app.features.jobs.queries import (
-    CANCELLED,
-    DONE,
-    FAILED,
-    Job,
-    NewJob,
-    insert_job,
-)
+from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job, NewJob, insert_job
 from app.features.jobs.records import Then, record_cancellation, require_job
 from app.features.jobs.runner import CLOSE_SECONDS, JobRunner, Pool
 
