@@ -51,9 +51,10 @@ run: setup
 # so that the long ones (integration, security) come first and no process is left with one at the end.
 # Every line says which half speaks.
 PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
+# A process that ends is replaced once: its tests would be tried again and again.
 # What tests write lies in memory where that has much room: they wait for no disk.
 ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')
-PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --dist=loadfile --no-loadscope-reorder
+PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --dist=loadfile --no-loadscope-reorder --max-worker-restart=1
 
 # What proves the product on one machine. What numba compiles is compiled before: every process would do
 # it anew, until one has saved it.

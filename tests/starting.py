@@ -150,7 +150,11 @@ class Nursery:
     def end(self) -> None:
         """End it; what it has borne lives on."""
         self._line.close()
-        self._process.wait()
+        try:
+            self._process.wait(SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
         shutil.rmtree(self._folder)
 
 

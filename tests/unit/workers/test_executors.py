@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
-from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from multiprocessing import active_children
@@ -16,7 +16,24 @@ from app.config import Settings
 from app.errors import InputError
 from app.workers import executors
 from app.workers.executors import make_server_pool_opener, open_executor, open_process_pool
+from tests.starting import run
 from tests.waiting import SECONDS
+
+POOL_IN_A_CLOSED_FOLDER = """
+import os, sys
+from app.errors import InputError
+from app.workers.executors import open_process_pool
+
+os.chdir(sys.argv[1])
+os.chmod(".", 0)
+if os.getuid() == 0:
+    os.setuid(65534)
+try:
+    with open_process_pool(2):
+        pass
+except InputError as refused:
+    print(refused.message, refused.hint)
+"""
 
 
 @pytest.fixture
@@ -69,23 +86,15 @@ def test_where_a_cluster_is_named_it_solves_and_no_process_of_this_machine(
 
 class TestProcessPool:
     def test_who_stands_in_a_folder_that_they_may_not_enter_is_told_before_processes_start(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path
     ) -> None:
         """As with sudo from somebody else's home: each process would end with a traceback."""
-
-        def solve() -> str:
-            with pytest.raises(InputError) as refused, open_process_pool(2):
-                pass
-            return f"{refused.value.message} {refused.value.hint}"
-
-        closed = tmp_path / "closed"
-        closed.mkdir()
-        monkeypatch.chdir(closed)
-        closed.chmod(0)
-        said = as_nobody(solve)
-        closed.chmod(0o700)
-        assert "has no access to the current folder" in said
-        assert "cd /" in said
+        (tmp_path / "closed").mkdir()
+        command = [sys.executable, "-c", POOL_IN_A_CLOSED_FOLDER, str(tmp_path / "closed")]
+        told = run(command, timeout=SECONDS)
+        assert told.stderr == ""
+        assert "has no access to the current folder" in told.stdout
+        assert "cd /" in told.stdout
 
     def test_processes_end_with_the_work_that_fails_however_much_they_have_to_do(self) -> None:
         end = time.monotonic() + SECONDS
@@ -97,21 +106,3 @@ class TestProcessPool:
         while pid in {child.pid for child in active_children()}:
             time.sleep(0.01)
         assert time.monotonic() < end
-
-
-def as_nobody(work: Callable[[], str]) -> str:
-    """What a function says in a process of somebody else than root."""
-    read, write = os.pipe()
-    child = os.fork()
-    if not child:
-        try:
-            if os.getuid() == 0:
-                os.setuid(65534)
-            os.write(write, work().encode())
-        finally:
-            os._exit(0)
-    os.close(write)
-    with os.fdopen(read, encoding="utf-8") as said:
-        found = said.read()
-    os.waitpid(child, 0)
-    return found
