@@ -28,7 +28,7 @@ from app.db.recovery.preopen_check import (
     MAGIC,
     find_write_ahead_log_file,
     read_header,
-    read_write_ahead_log,
+    summarize_wal_file,
 )
 from app.durable import sync_to_disk
 from app.errors import DamagedError, InputError
@@ -156,7 +156,7 @@ def _copy_database_and_own_log(source: Path, folder: Path) -> bool:
             f"{source} is neither a backup of Touchline nor a database ({MAGIC[:13].decode()})",
             hint="Make a backup with touchline backup.",
         )
-    log = read_write_ahead_log(find_write_ahead_log_file(source))
+    log = summarize_wal_file(find_write_ahead_log_file(source))
     shutil.copyfile(source, folder / DATABASE)
     if log.commits and log.belongs_to(header):
         shutil.copyfile(

@@ -102,7 +102,7 @@ def read_cameras(
                 None,
                 f"holds no camera files ({_ENDINGS}), but {_format_first_suffixes(endings)}",
             )
-        places = _map_camera_files_to_frames(tree, names)
+        places = _map_camera_files_to_original_frames(tree, names)
         cameras = read_camera_files(tree, files, report, places, limits, sizes, covariances)
     report.imported += len(cameras)
     return cameras
@@ -139,7 +139,7 @@ class _CameraSizesAndCovariances(NamedTuple):
     covariances: dict[str, Any]
 
 
-def _map_camera_files_to_frames(tree: FileTree, names: list[str]) -> dict[str, str]:
+def _map_camera_files_to_original_frames(tree: FileTree, names: list[str]) -> dict[str, str]:
     """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
     found = {}
     # What is wrong with the file is no matter of cameras.

@@ -29,7 +29,7 @@ def position_from_diameter(
         DegenerateGeometryError: The diameter is not positive.
 
     Source: SoccerNet-v3D (arXiv 2504.10106), 3D ball localisation from its diameter; through a
-        wide lens ``sphere_pixels_per_radian``.
+        wide lens ``sphere_image_scale``.
     """
     center = require_shape(center, (2,), "center")
     if not diameter_px > 0:
@@ -39,7 +39,7 @@ def position_from_diameter(
     if camera.is_wide:
         ideal = camera.pixel_to_ideal(center[None])[0]
         ray = camera.rotation.T @ np.append(ideal, 1.0)
-        distance = diameter_m * sphere_pixels_per_radian(camera, ideal) / diameter_px
+        distance = diameter_m * sphere_image_scale(camera, ideal) / diameter_px
         return np.asarray(camera.position + distance / np.linalg.norm(ray) * ray)
     half = np.array([0.0, diameter_px / 2])
     ideal = camera.pixel_to_ideal(np.vstack([center, center + half, center - half]))
@@ -70,7 +70,7 @@ def optimal_diameter(
         DegenerateGeometryError: The point lies behind the camera.
 
     Source: closed form of the box optimisation of SoccerNet-v3D (arXiv 2504.10106); through a
-        wide lens ``sphere_pixels_per_radian``.
+        wide lens ``sphere_image_scale``.
     """
     center = require_shape(center, (2,), "center")
     ideal = camera.pixel_to_ideal(center[None])[0]
@@ -86,7 +86,7 @@ def optimal_diameter(
     off_ray = float(np.linalg.norm(offset - depth * ray))
     if camera.is_wide:
         distance = depth * float(np.linalg.norm(ray))
-        return diameter_m * sphere_pixels_per_radian(camera, ideal) / distance, off_ray
+        return diameter_m * sphere_image_scale(camera, ideal) / distance, off_ray
     # With skew, "vertical in the image" leans in normalised coordinates.
     upright = np.array([-camera.skew / camera.focal_length[0], 1.0])
     half = diameter_m / depth / 2 * upright / np.linalg.norm(upright)
@@ -96,7 +96,7 @@ def optimal_diameter(
     return float(np.hypot(*(ends[0] - ends[1]))), off_ray
 
 
-def sphere_pixels_per_radian(camera: Camera, ideal: FloatArray) -> float:
+def sphere_image_scale(camera: Camera, ideal: FloatArray) -> float:
     """Mean of width and height of a small sphere's image, pixels for each radian that it fills.
 
     A disc that is parallel to the image, which the paper measures a ball by, is seen from its

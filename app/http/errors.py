@@ -40,7 +40,7 @@ from app.http.problem import (
     SCHEME,
     TITLES,
     FieldProblem,
-    PresenceDocument,
+    GroupViewerDocument,
     make_problem,
     problem_response,
 )
@@ -156,7 +156,7 @@ async def _handle_review_error(request: Request, error: Exception) -> Response:
         hint=hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
-        here=[PresenceDocument.model_validate(one) for one in error.here]
+        here=[GroupViewerDocument.model_validate(one) for one in error.here]
         if isinstance(error, HeldGroupError)
         else None,
     )

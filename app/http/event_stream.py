@@ -37,7 +37,7 @@ from app.features.queue.changes import (
     read_newest_entry_id,
 )
 from app.http.documents import encode_document
-from app.http.problem import PresenceDocument
+from app.http.problem import GroupViewerDocument
 
 log = structlog.get_logger("touchline.events")
 PAUSE = 0.05
@@ -84,7 +84,7 @@ class AssignedGroupEvent(BaseModel):
     batch: int
     group: int
     dataset: str | None
-    here: list[PresenceDocument] = Field(description="People who have the group open now.")
+    here: list[GroupViewerDocument] = Field(description="People who have the group open now.")
 
 
 class MaintenanceEvent(BaseModel):
@@ -325,7 +325,7 @@ class EventPublisher:
         """Tell who has a group of a batch open."""
         if lease.group is None:
             return
-        here = [PresenceDocument.model_validate(one) for one in lease.here]
+        here = [GroupViewerDocument.model_validate(one) for one in lease.here]
         event = AssignedGroupEvent(
             batch=lease.batch.id, group=lease.group, dataset=lease.batch.dataset, here=here
         )

@@ -22,7 +22,7 @@ class FieldProblem(BaseModel):
     detail: str
 
 
-class PresenceDocument(Document):
+class GroupViewerDocument(Document):
     """Somebody who has a group of a batch open."""
 
     person: str
@@ -49,7 +49,7 @@ class Problem(BaseModel):
     station: int | None = Field(
         default=None, description="The station that owns the lines (409 on a static view)."
     )
-    here: list[PresenceDocument] | None = Field(
+    here: list[GroupViewerDocument] | None = Field(
         default=None, description="Who has the group of a batch open (409 on its lease)."
     )
     current: dict[str, Any] | None = Field(
@@ -92,7 +92,7 @@ def make_problem(
     pointer: str | None = None,
     errors: list[FieldProblem] | None = None,
     station: int | None = None,
-    here: list[PresenceDocument] | None = None,
+    here: list[GroupViewerDocument] | None = None,
 ) -> Problem:
     """A problem of that status, its kind, title and instance filled in."""
     kind, title = TITLES.get(status, ("http", "The request failed"))

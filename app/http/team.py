@@ -216,8 +216,8 @@ class TeamLogin:
             return PasskeySite(name, f"{url.scheme}://{name}{port}")
         raise ConflictError(
             "browsers do not support passkeys at this address",
-            hint="Passkeys need https and a host name (touchline serve --team --url), or"
-            " localhost.",
+            hint="Open Touchline by https and a host name (the operator sets it with"
+            " touchline serve --team --url), or on localhost.",
         )
 
     def get_session_token(self, request: Request) -> str | None:

@@ -78,7 +78,7 @@ def distance_from_place(camera, place, inside, px, py):
 
 
 @compiled
-def write_unexplained_paint(
+def write_unexplained_paint_cost(
     parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost
 ):
     """Writes the mean truncated distance of the paint to the nearest marking, 0 to 1."""

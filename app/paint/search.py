@@ -162,7 +162,7 @@ def _compute_unexplained_paint(
     cost = np.empty(len(parameters))
 
     def process_slice(part: slice) -> None:
-        kernels.write_unexplained_paint(
+        kernels.write_unexplained_paint_cost(
             parameters[part], points, m.shapes, m.nearest, m.origin, CELL_M,
             reach * picture.scale_from_960_wide, picture.half_diagonal, cost[part],
         )  # fmt: skip

@@ -24,9 +24,9 @@ from app.sample.render import (
     light_direction_in_image,
     light_gain_at,
     make_noise_tiles,
-    make_shading_camera,
-    make_shading_grass,
-    make_shading_stadium,
+    make_camera_shading_inputs,
+    make_grass_shading_inputs,
+    make_stadium_shading_inputs,
 )
 from app.sample.surface import shade_frame
 
@@ -142,13 +142,20 @@ def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
     background = np.empty((height, width), np.uint8)
     exposure, light = np.array(look.light.exposure), np.full((height, STRIP), 255, np.uint8)
     strip, behind = np.empty((height, STRIP, 3), np.uint8), np.empty((height, STRIP), np.uint8)
-    bowl = make_shading_stadium(cameras[0], look)
+    bowl = make_stadium_shading_inputs(cameras[0], look)
     for left in range(0, width, STRIP):
-        eye = make_shading_camera(
+        eye = make_camera_shading_inputs(
             _make_level_camera(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP)
         )
         shade_frame(
-            strip, behind, light, exposure, eye, make_shading_grass(look), bowl, *make_noise_tiles()
+            strip,
+            behind,
+            light,
+            exposure,
+            eye,
+            make_grass_shading_inputs(look),
+            bowl,
+            *make_noise_tiles(),
         )
         columns = min(STRIP, width - left)
         drawn.image[:, left : left + columns] = strip[:, :columns]

@@ -30,9 +30,9 @@ from app.sample.scene import Scene
 from app.sample.surface import (
     BOARD_HEIGHT,
     TILE,
-    ShadingCamera,
-    ShadingGrass,
-    ShadingStadium,
+    CameraShadingInputs,
+    GrassShadingInputs,
+    StadiumShadingInputs,
     shade_frame,
 )
 
@@ -252,9 +252,9 @@ def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> 
         background,
         shadow,
         exposure,
-        make_shading_camera(camera),
-        make_shading_grass(look),
-        make_shading_stadium(camera, look),
+        make_camera_shading_inputs(camera),
+        make_grass_shading_inputs(look),
+        make_stadium_shading_inputs(camera, look),
         *make_noise_tiles(),
     )
     # A long lens that is focused on the play shows the crowd out of focus.
@@ -264,19 +264,19 @@ def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> 
     return image
 
 
-def make_shading_camera(camera: Camera) -> ShadingCamera:
+def make_camera_shading_inputs(camera: Camera) -> CameraShadingInputs:
     """The camera as ``shade_frame`` takes it."""
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
-    return ShadingCamera(camera.rotation, camera.position, *lens)
+    return CameraShadingInputs(camera.rotation, camera.position, *lens)
 
 
-def make_shading_grass(look: MatchLook) -> ShadingGrass:
+def make_grass_shading_inputs(look: MatchLook) -> GrassShadingInputs:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
-    return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
+    return GrassShadingInputs(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def make_shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
+def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> StadiumShadingInputs:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = make_board_mipmap(look.seed)
@@ -285,7 +285,7 @@ def make_shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
     # A camera beyond a line stands before the boards of that side, or among the crowd.
     ends = [sign * x - HALF_LENGTH < beyond - 1.0 for sign in (1, -1)]
     sides = [sign * y - HALF_WIDTH < along - 2.0 for sign in (1, -1)]
-    return ShadingStadium(
+    return StadiumShadingInputs(
         seen=np.array([*ends, *sides]),
         beyond=beyond,
         along=along,

@@ -97,7 +97,7 @@ def write_sample(
         InputError: ``groups`` or ``seed`` is not usable, or ``out`` is a file.
     """
     if groups < 1 or seed < 0:
-        raise InputError("a sample needs at least one group and a seed from 0")
+        raise InputError("a sample needs at least one group and a seed of 0 or more")
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; the sample needs a folder")
     counts = group_counts_by_match(groups)
@@ -146,7 +146,7 @@ def _write_labels(
     temporary = out / f".{TRUTH}.part"
     with temporary.open("w", encoding="utf-8") as stream:
         writer = TruthWriter(stream, jobs[0].seed)
-        for labelled in run(_label_match, jobs):
+        for labelled in run(_write_match_labels, jobs):
             writer.write(labelled.truths)
             done += len(labelled.truths)
             views += labelled.views
@@ -158,7 +158,7 @@ def _write_labels(
     return SampleReport(len(jobs), done, views, faults)
 
 
-def _label_match(job: _GroupsJob) -> _LabelledMatch:
+def _write_match_labels(job: _GroupsJob) -> _LabelledMatch:
     scenes = make_match_scenes(job.match, job.groups, job.seed, job.faults)
     write_soccernet_v3(job.out, [scene.group for scene in scenes])
     truths = [

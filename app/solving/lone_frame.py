@@ -37,7 +37,7 @@ from app.solving.labels import GAMMA_SHARE, RELABELLED
 from app.solving.line_noise import compute_line_noise
 from app.solving.observations import Observations, pitch_curves
 from app.solving.picture_camera import undo_warp
-from app.solving.pitch_size import point_derivatives_by_pitch_size
+from app.solving.pitch_size import nearest_place_shifts_by_pitch_size
 from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
 
 SIZE_SIGMA_M = np.array([2.0, 1.0])
@@ -139,20 +139,20 @@ def estimate_lone_frame_uncertainty(
     try:
         if left_out:
             # What looks mislabelled on the pitch in use may lie where another pitch has it.
-            whole = _LoneFrameProblem(problem, observations, pitch, sigma).fit(parameters)
+            whole = _UnknownPitchProblem(problem, observations, pitch, sigma).fit(parameters)
             if (
                 whole.largest_distance_px(left_out)
                 <= RELABELLED * GAMMA_SHARE * problem.size.diagonal
             ):
                 return replace(whole.to_uncertainty(), explains=tuple(left_out))
         kept = observations.without(*left_out)
-        return _LoneFrameProblem(problem, kept, pitch, sigma).fit(parameters).to_uncertainty()
+        return _UnknownPitchProblem(problem, kept, pitch, sigma).fit(parameters).to_uncertainty()
     except np.linalg.LinAlgError:
         return None
 
 
 @dataclass(frozen=True)
-class _WeightedResiduals:
+class _RobustlyWeightedResiduals:
     """Weighted residuals at some unknowns, their slopes, and the points' distances, pixels."""
 
     apart: FloatArray
@@ -162,13 +162,13 @@ class _WeightedResiduals:
 
 
 @dataclass(frozen=True)
-class _LoneFrameFit:
+class _UnknownPitchFit:
     """Where the thirteen fit best, and how far that is from the camera in use, shapes (13,)."""
 
-    frame: _LoneFrameProblem
+    frame: _UnknownPitchProblem
     unknowns: FloatArray
     off: FloatArray
-    rows: _WeightedResiduals
+    rows: _RobustlyWeightedResiduals
 
     def largest_distance_px(self, markings: Collection[str]) -> float:
         """Largest distance of a point of some markings."""
@@ -190,7 +190,7 @@ class _LoneFrameFit:
 
 
 @dataclass(frozen=True)
-class _LoneFrameProblem:
+class _UnknownPitchProblem:
     problem: ResectionProblem
     observations: Observations
     pitch: Pitch
@@ -203,19 +203,19 @@ class _LoneFrameProblem:
             self.pitch, length=self.pitch.length + length, width=self.pitch.width + width
         )
 
-    def fit(self, parameters: FloatArray) -> _LoneFrameFit:
+    def fit(self, parameters: FloatArray) -> _UnknownPitchFit:
         """From the camera in use to where the thirteen fit best; linear where that is near."""
         start = np.append(parameters, np.zeros(WIDTH - PARAMETERS))
         rows = self._compute_residuals(start)
         step = self._compute_step(start, rows)
         if (np.abs(step[PARAMETERS:]) > LINEAR).any():
             unknowns, rows = self._minimize_cost(start, rows)
-            return _LoneFrameFit(self, unknowns, unknowns - start, rows)
+            return _UnknownPitchFit(self, unknowns, unknowns - start, rows)
         # Without what pulls the camera aside besides: priors, and the scale of the loss.
         off = step - self._compute_step(start, rows, PARAMETERS)
-        return _LoneFrameFit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
+        return _UnknownPitchFit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
 
-    def compute_covariance(self, rows: _WeightedResiduals) -> FloatArray:
+    def compute_covariance(self, rows: _RobustlyWeightedResiduals) -> FloatArray:
         """Covariance of the thirteen, shape (13, 13)."""
         # Residuals in units of a click, so that the prior weighs what it says.
         freedom = max(len(rows.apart) - PARAMETERS, 1)
@@ -229,10 +229,10 @@ class _LoneFrameProblem:
             rows.marking,
             self._prior_information(),
             known,
-            self._point_weights(rows),
+            self._marking_weights_by_row(rows),
         ).parameters
 
-    def _point_weights(self, rows: _WeightedResiduals) -> FloatArray:
+    def _marking_weights_by_row(self, rows: _RobustlyWeightedResiduals) -> FloatArray:
         return self.problem.row_weights(self.observations, rows.marking)
 
     def _prior_information(self) -> FloatArray:
@@ -242,7 +242,7 @@ class _LoneFrameProblem:
         return prior
 
     def _compute_step(
-        self, unknowns: FloatArray, rows: _WeightedResiduals, width: int = WIDTH
+        self, unknowns: FloatArray, rows: _RobustlyWeightedResiduals, width: int = WIDTH
     ) -> FloatArray:
         """To the minimum about some unknowns, the first ``width`` of them free, shape (13,)."""
         prior = (
@@ -255,7 +255,7 @@ class _LoneFrameProblem:
         free = rows.jacobian[:, :width]
         length = np.sqrt((free**2).sum(axis=0) + prior[:width])
         free = free / length
-        weighted = free.T * self._point_weights(rows)
+        weighted = free.T * self._marking_weights_by_row(rows)
         normal = weighted @ free + np.diag(prior[:width] / length**2)
         right = weighted @ rows.apart + pull[:width] / length
         step = np.zeros(WIDTH)
@@ -263,8 +263,8 @@ class _LoneFrameProblem:
         return step
 
     def _minimize_cost(
-        self, unknowns: FloatArray, rows: _WeightedResiduals
-    ) -> tuple[FloatArray, _WeightedResiduals]:
+        self, unknowns: FloatArray, rows: _RobustlyWeightedResiduals
+    ) -> tuple[FloatArray, _RobustlyWeightedResiduals]:
         """Where the fit ends, shape (13,), and the rows there."""
         cost = self._cost(unknowns, rows)
         for _ in range(ROUNDS):
@@ -284,7 +284,7 @@ class _LoneFrameProblem:
                 break
         return unknowns, rows
 
-    def _cost(self, unknowns: FloatArray, rows: _WeightedResiduals) -> float:
+    def _cost(self, unknowns: FloatArray, rows: _RobustlyWeightedResiduals) -> float:
         """Robust cost of the points and of the prior, in variances of a click."""
         click, scale = (
             CLICK_SIGMA_PX * self.problem.pixels_per_reference_pixel,
@@ -296,7 +296,7 @@ class _LoneFrameProblem:
         cost += (self._prior_information() * off**2).sum()
         return float(cost) if np.isfinite(cost) else np.inf
 
-    def _compute_residuals(self, unknowns: FloatArray) -> _WeightedResiduals:
+    def _compute_residuals(self, unknowns: FloatArray) -> _RobustlyWeightedResiduals:
         camera, warp = unknowns[:PARAMETERS], unknowns[WARP]
         seen = undo_warp(self.problem, self.observations, warp)
         seen = Observations(
@@ -319,7 +319,7 @@ class _LoneFrameProblem:
         slopes[:, :, 0] /= np.exp(warp[0])
         # A line's normal turns and shrinks when the picture is stretched.
         length = np.maximum(np.hypot(slopes[..., 0], slopes[..., 1]), 0.25)
-        moves = point_derivatives_by_pitch_size(self.problem, camera, seen, offsets[:, 1] != 0)
+        moves = nearest_place_shifts_by_pitch_size(self.problem, camera, seen, offsets[:, 1] != 0)
         foot = np.exp(warp[0]) * seen.pixels[:, None, 0]
         jacobian = (
             np.concatenate(
@@ -342,10 +342,12 @@ class _LoneFrameProblem:
         rows = np.append(np.arange(len(offsets)), beyond)
         jacobian = np.vstack([jacobian[:, 0], jacobian[beyond, 1]]) * weight[rows, None]
         apart = np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows]
-        return _WeightedResiduals(apart, jacobian, np.append(seen.marking, -1 - beyond), distance)
+        return _RobustlyWeightedResiduals(
+            apart, jacobian, np.append(seen.marking, -1 - beyond), distance
+        )
 
 
-def _camera_jacobian(rows: _WeightedResiduals) -> FloatArray:
+def _camera_jacobian(rows: _RobustlyWeightedResiduals) -> FloatArray:
     """From the thirteen to the camera's eight, shape (8, 13).
 
     What a picture does is carried by rotation and lens, never by the position, as in

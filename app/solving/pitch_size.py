@@ -295,7 +295,7 @@ class _FittedFrame:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        moves = point_derivatives_by_pitch_size(
+        moves = nearest_place_shifts_by_pitch_size(
             self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0
         )
         length, width = moves.T
@@ -314,19 +314,19 @@ class _FittedFrame:
         return gradient, information
 
 
-def point_derivatives_by_pitch_size(
+def nearest_place_shifts_by_pitch_size(
     problem: ResectionProblem,
     parameters: FloatArray,
     observations: Observations,
-    beyond: npt.NDArray[np.bool_],
+    past_end: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """How far each point's nearest place moves with length and width, shape (N, 2).
 
-    ``beyond`` are points beyond an end, shape (N,): their place is the end, and ends of the lines
+    ``past_end`` are points past the end of their marking, shape (N,): their place is the end, and ends of the lines
     that cross the pitch are its corners, or the middle line's ends.
     """
     moves: FloatArray = _SHARES[observations.marking].copy()
-    rows = np.flatnonzero(beyond & _CROSSING[observations.marking])
+    rows = np.flatnonzero(past_end & _CROSSING[observations.marking])
     if not len(rows):
         return moves
     center = np.array(principal_point(problem.size))

@@ -14,7 +14,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.sphere import sphere_pixels_per_radian
+from app.geometry.sphere import sphere_image_scale
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_3d import is_plausible_position
@@ -222,7 +222,7 @@ def _expected_ball_diameter_px(camera: Camera, point: FloatArray, diameter_m: fl
     in_camera = camera.pitch_to_camera(point[None])[0]
     depth = float(in_camera[2])
     if camera.is_wide:
-        scale = sphere_pixels_per_radian(camera, in_camera[:2] / depth)
+        scale = sphere_image_scale(camera, in_camera[:2] / depth)
         return diameter_m * scale / float(np.linalg.norm(in_camera))
     return diameter_m * camera.focal_length[1] / depth
 

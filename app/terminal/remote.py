@@ -377,7 +377,7 @@ def evaluate_on_server(
     sets = {
         name: _find_or_send_prediction_set(client, dataset, source)
         for name, source in named.items()
-        if not source.is_empty
+        if not source.names_no_file
     }
     found_sets = {name: found["id"] for name, found in sets.items()}
     body = {**vars(request.request), **found_sets, "version": request.version}

@@ -77,8 +77,8 @@ def set_current_server(url: str | None, token_file: Path | None, command: str | 
         )
     if parts.scheme == "http" and not is_local(parts.hostname):
         raise InputError(
-            f"{url} is not encrypted: a token must not be sent unencrypted",
-            hint="Write https://; http:// is for this machine alone.",
+            f"{url} is not encrypted, so the token could be read on its way",
+            hint="Use https://. http:// is allowed for this machine alone.",
         )
     _SERVER.set(ServerPlace(url.rstrip("/"), token_file))
 

@@ -150,7 +150,7 @@ def _estimate_noise_px(times: FloatArray, directions: FloatArray, scale: FloatAr
     if near.sum() < 5:
         return 1.0
     at, t = at[near], t[near]
-    weights = [_lagrange_weights(t[:, 1], t[:, [0, 2, 3]], which) for which in range(3)]
+    weights = [_lagrange_weight(t[:, 1], t[:, [0, 2, 3]], which) for which in range(3)]
     miss = directions[at] - sum(
         weight[:, None] * directions[at + step]
         for weight, step in zip(weights, (-1, 1, 2), strict=True)
@@ -161,7 +161,7 @@ def _estimate_noise_px(times: FloatArray, directions: FloatArray, scale: FloatAr
     return max(float(np.median(np.linalg.norm(miss, axis=1))) / 1.177, _LEAST_SIGMA_PX)
 
 
-def _lagrange_weights(x: FloatArray, nodes: FloatArray, which: int) -> FloatArray:
+def _lagrange_weight(x: FloatArray, nodes: FloatArray, which: int) -> FloatArray:
     value = np.ones(len(x))
     for other in range(nodes.shape[1]):
         if other != which:

@@ -100,7 +100,7 @@ def track_clip(
             raise InputError(
                 f"frame {number} is not in {clip.path.name}, whose frames are {clip.start} to "
                 f"{clip.start + clip.count - 1}",
-                hint="Frames count from 0, the first of the file.",
+                hint="Frames are numbered from 0, the first frame of the file.",
             )
         found = calibrate(drawn, pitch, clip.size, clicked)
         if found.camera is None:

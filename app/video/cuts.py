@@ -26,7 +26,7 @@ MOST_RETURN = 0.6
 """Share of a change that is left once a flash is over."""
 
 
-def measure_frame_change(rows: Measured) -> FloatArray:
+def combine_change_measures(rows: Measured) -> FloatArray:
     """How much each frame is another picture than the one before, shape (N,)."""
     return np.asarray(rows["residual"] * rows["histogram"], np.float64)
 
@@ -41,7 +41,7 @@ def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     Returns:
         Numbers of frames, ascending; shape (N,).
     """
-    change, cells = measure_frame_change(rows), rows["cells"]
+    change, cells = combine_change_measures(rows), rows["cells"]
     reach = max(round(FLASH_SECONDS / step), 2)
     flashed = np.zeros(len(rows), np.bool_)
     found = []

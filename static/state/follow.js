@@ -86,7 +86,7 @@ function tell(found) {
 	if (follow.value && found.items.length) {
 		follow.value = { ...follow.value, found };
 		const rest = unsure.value.length ? `, ${unsure.value.length} of them uncertain` : '';
-		announce(`The ball was followed into ${plural(found.items.length, 'view')}${rest}.`);
+		announce(`The ball was found in ${plural(found.items.length, 'more view')} of this camera${rest}.`);
 		return;
 	}
 	follow.value = null;

@@ -28,7 +28,7 @@ function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, mis
 		return [`The speed of the replay changes. ${source}.`, ...parts];
 	}
 	if (outcome === 'offset' && tooClose && reason) return [reason];
-	if (outcome === 'offset') return [`One linked instant tells the time of the replay, not its speed. The replay is assumed to run ${speedText(speed ?? 1)}.`, 'Link a second instant, as far from the first as you can.'];
+	if (outcome === 'offset') return [`One linked instant fixes when the replay starts, but not its speed. The replay is assumed to run ${speedText(speed ?? 1)}.`, 'Link a second instant, as far from the first as you can.'];
 	const known = sigma_s === null ? '' : ` Its times are known to ± ${sigmaText(sigma_s * fps)} live frames (one sigma, in the middle of the replay).`;
 	const missed = miss_m === null ? '' : ` The rays to the ball miss each other by ${miss_m.toFixed(2)} m.`;
 	return [`The replay runs ${speedText(speed ?? 1)} (speed ${(speed ?? 1).toFixed(3)}${speed_sigma === null ? '' : ` ± ${sigmaText(speed_sigma)}`}). ${source}.${known}${missed}`];

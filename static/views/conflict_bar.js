@@ -78,7 +78,7 @@ export function ConflictBar() {
 			</div>
 			<button class="button button--primary" type="button" onClick=${keepMine}>Keep mine</button>
 			<button class="button" type="button" onClick=${takeTheirs}>Take theirs</button>
-			${present.mergeable ? html`<button class="button" type="button" onClick=${mergeBoth}>Merge changes that do not overlap</button>` : null}
+			${present.mergeable ? html`<button class="button" type="button" onClick=${mergeBoth}>Keep both, theirs where they overlap</button>` : null}
 		</section>
 	`;
 }

@@ -140,7 +140,7 @@ export function ContactSheet({ pictures, policy }) {
 	const frames = useFrames(pictures.map(({ view }) => view));
 	const { columns, wide, tall, side } = layout(pictures.length, size.width, size.height);
 	return html`
-		<section class="card strip-card" aria-label="Ball, crops of one metre">
+		<section class="card strip-card" aria-label="Ball crops, each 1 m across">
 			<h2 title="The shorter side of every crop is one metre at the ball: the balls must look equally large">Ball, 1 m crops</h2>
 			<ul class="crops" ref=${ref} style=${{ gridTemplateColumns: `repeat(${columns}, max-content)` }}>
 				${side < SMALLEST ? null : pictures.map((picture) => html`

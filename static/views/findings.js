@@ -43,7 +43,7 @@ function Finding({ group, finding }) {
 
 /** Where something is seen whole that a finding says of a match or a track. @param {{finding: FindingJson | undefined, dataset: string}} props */
 export function FindingLink({ finding, dataset }) {
-	if (finding?.kind === 'pitch_size') return html`<p><a class="link" href=${pageAddress(dataset, 'statistics')}>Pitch sizes under Statistics</a></p>`;
+	if (finding?.kind === 'pitch_size') return html`<p><a class="link" href=${pageAddress(dataset, 'statistics')}>See pitch sizes on the Statistics page</a></p>`;
 	const at = finding?.kind === 'track_disagrees' ? groupTrack.value : null;
 	if (!at) return null;
 	return html`<p><a class="link" href=${address(`/tracks/${at.track.id}`, { frame: String(at.frame) })}>Its track at frame ${at.frame}</a>${at.track.stale ? ' (stale: groups have changed since it was made)' : ''}</p>`;

@@ -45,7 +45,7 @@ function stateOf(group, gate, before, uncertain) {
 function RemedyRow({ group, remedy }) {
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
-			<button class="remedy__sentence" type="button" title="Show the place in the picture" onClick=${() => pointTo(group, { ...remedy, ball: Boolean(remedy.guide?.looks) })}>${remedy.sentence}</button>
+			<button class="remedy__sentence" type="button" title="Show in the picture what this is about" onClick=${() => pointTo(group, { ...remedy, ball: Boolean(remedy.guide?.looks) })}>${remedy.sentence}</button>
 			<button data-needs="annotate" class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
 		</li>
 	`;

@@ -136,7 +136,7 @@ function InviteCard({ invite, mail, error }) {
 			<form class="form" onSubmit=${send}>
 				<div class="form__columns">
 					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; the history keeps it permanently.</small></div>
-					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} defaultSelected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of those above it.</small></div>
+					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} defaultSelected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of all roles before it in this list.</small></div>
 					${mail ? html`<div class="form__row"><label for="people-email">E-mail (optional)</label><input class="field" id="people-email" name="email" type="email" maxlength="254" autocomplete="off" /><small>The link is sent there. The address is not stored.</small></div>` : null}
 				</div>
 				<${FormError} error=${error} />

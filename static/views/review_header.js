@@ -110,7 +110,7 @@ function Place() {
 		<span class="header__place">
 			<a href=${queueAddress(group.dataset.name, query.value)} title=${`Back to the queue: ${queue}`}>${placeText(at)}</a>
 			<span class="header__queue"> in ${queue}</span>
-			${left !== null && done > 0 ? html`<span class="header__done" title=${`Since you began with this queue of ${count(at.total)}`}> · ${count(done)} done, ${count(left)} left</span>` : null}
+			${left !== null && done > 0 ? html`<span class="header__done" title=${`Counted since you began this queue, which then had ${count(at.total)} groups`}> · ${count(done)} done, ${count(left)} left</span>` : null}
 		</span>
 	`;
 }

@@ -141,7 +141,7 @@ function takeBall() {
 	if (selected.value?.kind !== 'prediction' && acceptFollowedHere(view)) return;
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
-	else if (!placeExpected(view)) announce(`The other views disagree about the place of the ball in view ${view.letter}. Press N to draw it.`);
+	else if (!placeExpected(view)) announce(`The other views do not tell where the ball is in view ${view.letter}. Press N to draw it.`);
 }
 
 /** Make the group of the view in hand, too. */

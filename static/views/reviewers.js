@@ -69,7 +69,7 @@ function Batches({ dataset }) {
 							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · undone by ${batch.undone_by}` : ''}${batch.redone ? ' · redone' : ''}</small>
 						</span>
 						${batch.undone ? null : html`<button data-needs="review" class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
-						${batch.undone && !batch.redone ? html`<button data-needs="review" class="button" type="button" title="Redo these verdicts; groups reviewed or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
+						${batch.undone && !batch.redone ? html`<button data-needs="review" class="button" type="button" title="Give these verdicts again, except to groups reviewed or edited since the undo" onClick=${() => redo(batch)}>Redo</button>` : null}
 					</li>`)}
 			</ul>
 		</section>

@@ -34,7 +34,7 @@ function RemarkLink({ group, solution, remark: { view, letter, marking } }) {
 		// The card of the view is there with the next frame.
 		requestAnimationFrame(() => document.querySelector(`[aria-label="Lines of view ${letter}"]`)?.scrollIntoView({ block: 'nearest' }));
 	}
-	return html`<button class="link-button" type="button" title=${`Show its lines: view ${letter}`} onClick=${lead}>${marking ? `“${marking}” of ${letter}` : `View ${letter}`}</button>`;
+	return html`<button class="link-button" type="button" title=${`Show the lines of view ${letter}`} onClick=${lead}>${marking ? `“${marking}” of ${letter}` : `View ${letter}`}</button>`;
 }
 
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */

@@ -45,7 +45,7 @@ function Parts({ diff, dataset }) {
 		<p class="note">${plural(counts.unchanged, 'group')} ${counts.unchanged === 1 ? 'is' : 'are'} the same in both.</p>
 		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => `before: ${words(item.why)}`} />
 		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => `now: ${words(item.why)}`} />
-		<${Part} title="Balls that moved" items=${diff.moved} all=${counts.moved} dataset=${dataset} tell=${(/** @type {any} */ item) => fixed(item.metres, 3, ' m')} />
+		<${Part} title="Moved balls" items=${diff.moved} all=${counts.moved} dataset=${dataset} tell=${(/** @type {any} */ item) => fixed(item.metres, 3, ' m')} />
 		<${Part} title="Changed" items=${diff.changed} all=${counts.changed} dataset=${dataset} tell=${(/** @type {any} */ item) => item.what.map(words).join(', ')} />
 	`;
 }

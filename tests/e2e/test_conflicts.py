@@ -209,7 +209,7 @@ class TestConflict:
         bar = mine.page.get_by_role("alert", name="Conflict")
         expect(bar).to_contain_text("both changed it")
         expect(bar).to_contain_text("only you changed it")
-        bar.get_by_role("button", name="Merge changes that do not overlap").click()
+        bar.get_by_role("button", name="Keep both, theirs where they overlap").click()
         expect(bar).to_have_count(0)
         mine.saved()
         after = mine.document()["views"][0]

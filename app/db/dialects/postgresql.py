@@ -205,7 +205,7 @@ class PostgreSQLDialect:
             )
         except (ImportError, NoSuchModuleError) as error:
             raise InputError(
-                "the driver of PostgreSQL is not installed",
+                "the PostgreSQL driver is not installed",
                 hint="Run pip install 'touchline[postgres]', or leave TOUCHLINE_DATABASE_URL unset.",
             ) from error
         dialect: Any = engine.dialect

@@ -116,7 +116,7 @@ def read_header(database: Path) -> DatabaseHeader | None:
         return DatabaseHeader.parse(file.read(_HEADER_BYTES))
 
 
-def read_write_ahead_log(path: Path) -> WriteAheadLog:
+def summarize_wal_file(path: Path) -> WriteAheadLog:
     """The log of a path; an empty one where there is none, or nothing whole in it."""
     try:
         with path.open("rb") as file:
@@ -216,7 +216,7 @@ def require_consistent_home_files(settings: Settings) -> None:
             _require_unused_home(settings)
             return
         header = read_header(database)
-        log = read_write_ahead_log(find_write_ahead_log_file(database))
+        log = summarize_wal_file(find_write_ahead_log_file(database))
     except OSError as error:
         raise StorageError(
             f"{error.filename or database} cannot be read ({error.strerror})",

@@ -96,12 +96,12 @@ def read_case(store: Store, group_id: int, *, actor: str) -> AdjudicationCase:
         )
         limits = read_limits(session, original.dataset_id)
     if row is None:
-        raise NotFoundError(f"group {group_id} does not wait for adjudication")
+        raise NotFoundError(f"group {group_id} is not waiting for adjudication")
     annotations = list_undecided_annotations(store, group_id, row.batch_id or None)
     if len(annotations) < 2:
         raise NotFoundError(
-            f"group {group_id} does not wait for adjudication: fewer than two annotations are"
-            " submitted"
+            f"group {group_id} is not waiting for adjudication: fewer than two annotations have"
+            " been submitted"
         )
     states = [load_solved_group(store, annotation.copy_id) for annotation in annotations]
     own = person_of_actor(actor) in {annotation.person for annotation in annotations}

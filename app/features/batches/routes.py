@@ -43,7 +43,7 @@ from app.http.documents import (
     respond_with,
 )
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import PresenceDocument, responses
+from app.http.problem import GroupViewerDocument, responses
 from app.http.route import Route
 from app.json_text import MAX_ID
 from app.soccer.actors import LOCAL_USER
@@ -180,7 +180,7 @@ class LeaseDocument(Document):
     group: int | None = Field(description="null: no group waits for them now.")
     part: BatchRole | None = Field(description="What they do with it.")
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
-    here: list[PresenceDocument] = Field(description="People who have the group open.")
+    here: list[GroupViewerDocument] = Field(description="People who have the group open.")
     submitted_by: str | None = Field(description="Person who submitted it; null: not submitted.")
     returned: ReturnedGroup | None = Field(
         description="Why its annotator has it back; null: they have not."
@@ -227,7 +227,7 @@ class TeamBatchDocument(Document):
 
     batch: WorkBatchDocument
     gold_every: int | None = Field(description="One gold group in N.")
-    here: list[PresenceDocument]
+    here: list[GroupViewerDocument]
     stalled: datetime | None = Field(
         description=(
             "Time of the last activity, if it is longer ago than the operator's setting "

@@ -194,14 +194,14 @@ def _iterate_gate_candidates(
             fix = SuggestedFix("include_view", view.key)
             yield _SuggestionCandidate(describe_condition(group, fix), fix)
         elif solved.failed == "jac":
-            yield from _iterate_undrawn_marking_candidates(group, view, solved)
+            yield from _suggest_drawing_or_hiding_markings(group, view, solved)
             yield from _iterate_line_candidates(group, view, solved)
     explained = any(finding.kind in BETTER_CAUSES for finding in solution.findings)
     if failing.name == "reprojection" and not explained:
         yield from _iterate_ball_candidates(group, solution)
 
 
-def _iterate_undrawn_marking_candidates(
+def _suggest_drawing_or_hiding_markings(
     group: Group, view: View, solved: ViewSolution
 ) -> Iterator[_SuggestionCandidate]:
     """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
@@ -253,9 +253,11 @@ def _iterate_line_candidates(
 ) -> Iterator[_SuggestionCandidate]:
     """Move or drop the worst point, or drop the marking, for each marking that does not count."""
     off = [
-        fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest_distance(fit)
+        fit
+        for fit in solved.calibration.markings
+        if fit.outcome != "tp" and _largest_point_distance_px(fit)
     ]
-    for fit in sorted(off, key=_largest_distance, reverse=True)[:MARKINGS_PER_VIEW]:
+    for fit in sorted(off, key=_largest_point_distance_px, reverse=True)[:MARKINGS_PER_VIEW]:
         index = max(range(len(fit.distances_px)), key=fit.distances_px.__getitem__)
         for action in ("move_point", "drop_point", "drop_marking"):
             if action == "drop_point" and len(fit.distances_px) <= MIN_POINTS_LEFT:
@@ -314,5 +316,5 @@ def _find_ball_nearest_to_ray(
     return ImagePoint(float(nearest[0]), float(nearest[1]))
 
 
-def _largest_distance(fit: MarkingFit) -> float:
+def _largest_point_distance_px(fit: MarkingFit) -> float:
     return max(fit.distances_px, default=0.0)

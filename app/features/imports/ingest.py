@@ -133,7 +133,7 @@ def import_groups(
     """
     report, seen, done = IngestReport(), set[str](), 0
     limits = GroupLimits(source, ReaderReport() if limit_report is None else limit_report)
-    sound, stations = _filter_storable_groups(groups, seen, report, limits), set[str]()
+    sound, stations = _prepare_storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(
@@ -205,7 +205,7 @@ def _find_and_report_missing_groups(
     return missing
 
 
-def _filter_storable_groups(
+def _prepare_storable_groups(
     groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
 ) -> Iterator[Group]:
     """Groups that can be stored, their media by absolute path."""

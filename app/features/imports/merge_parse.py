@@ -226,7 +226,7 @@ def _parse_group_record(value: Json, shared: Mapping[str, Station]) -> Group:
     for text in (group.key, group.match, group.split, group.label):
         _require_text(text, empty=text is not group.key)
     if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
-        raise InputError("has a pitch of an impossible size")
+        raise InputError("has a pitch whose length or width is not between 0 and 1000 m")
     for view, fields in zip(group.views, views, strict=True):
         _require_list(fields["balls"], MAX_BALLS)
         _parse_extras_record(fields["extras"])
@@ -265,7 +265,9 @@ def _validate_station(station: Station) -> Station:
                 f" {MAX_SIDE:,}"
             )
     if station.calibration not in CALIBRATIONS:
-        raise InputError(f"has a `calibration` that is none of {', '.join(CALIBRATIONS)}")
+        raise InputError(
+            f"has an unknown `calibration`; it must be one of {', '.join(CALIBRATIONS)}"
+        )
     _require_booleans(
         "a static camera whose `flipped` or `shared`", station.flipped, station.shared
     )
@@ -309,7 +311,9 @@ def _parse_dismissal_record(value: Json) -> Mapping[str, Any]:
             _require_text(values[name], most=MAX_NOTE)
     number = values["number"]
     if number is not None and (type(number) not in (int, float) or not math.isfinite(number)):
-        raise InputError("has a dismissed finding whose `number` is not a number")
+        raise InputError(
+            "has a dismissed finding whose `number` is neither null nor a finite number"
+        )
     if values["kind"] not in FINDING_KINDS or values["dismissed"] not in (True, False):
         raise InputError("has a dismissed finding that Touchline does not know")
     return values

@@ -36,7 +36,7 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
-from app.features.queue.queries import read_columns
+from app.features.queue.queries import read_columns_of_groups
 from app.json_text import Moment
 from app.soccer.actors import person_of_actor
 
@@ -70,7 +70,7 @@ def read_returned_groups(session: Session, group_ids: Sequence[int]) -> dict[int
     }
     names = {
         row.group_id: row.label or row.key
-        for row in read_columns(session, list(last), (), ("group_id", "label", "key"))
+        for row in read_columns_of_groups(session, list(last), (), ("group_id", "label", "key"))
     }
     return {
         group: ReturnedGroup(

@@ -53,7 +53,7 @@ from app.features.integrity.records import (
 )
 from app.features.integrity.transfer import find_null_characters, format_null_characters
 from app.features.people.provider import Provider
-from app.features.people.sign_on_rules import count_linked_admins, read_rules
+from app.features.people.sign_on_rules import count_active_admins_linked_to_sign_on, read_rules
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.solutions.service import list_stale_groups
 from app.features.what_if.service import examine_yield_cache
@@ -362,7 +362,7 @@ def _check_linked_admins(store: Store) -> CheckResult | None:
         return None
     if rules is None or not rules.only:
         return None
-    count = count_linked_admins(store, rules)
+    count = count_active_admins_linked_to_sign_on(store, rules)
     sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
     mend = (
         None if count else "touchline users reset NAME prints a link with which an admin is linked."

@@ -79,7 +79,7 @@ def put_maintenance_notice(new: NewBanner, store: AppStore, actor: Actor) -> Ban
 def delete_maintenance_notice(store: AppStore, actor: Actor) -> Response:
     """Take the notice away."""
     if not clear_banner(store, actor=actor):
-        raise NotFoundError("there is no notice of maintenance")
+        raise NotFoundError("no maintenance notice is set")
     return Response(status_code=204)
 
 

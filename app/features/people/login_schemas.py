@@ -50,7 +50,7 @@ class NewCredential(_Credential):
     response: Attestation
 
 
-class SignedCredential(_Credential):
+class PasskeyAssertion(_Credential):
     """A passkey that was used: `navigator.credentials.get()`, as far as it is needed."""
 
     response: Assertion
@@ -100,7 +100,7 @@ class PasskeyLogin(BaseModel):
         },
     )
 
-    credential: SignedCredential
+    credential: PasskeyAssertion
 
 
 class PasskeyCreationOptions(Document):

@@ -207,8 +207,8 @@ def change_person(
         loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
         if loses and not count_people_who_can_log_in(session, Role.ADMIN, but=person_id):
             raise ConflictError(
-                f"{person.name} is the only admin who can log in",
-                hint="Make another person admin first.",
+                f"without {person.name} no admin could log in any more",
+                hint="Make somebody admin first who can log in.",
             )
         if wanted is not person.role:
             log_account_event(session, actor, person.name, "role", wanted)

@@ -83,8 +83,8 @@ class SignOnRules:
             _claim_to_texts(claims.get(self.group_claim))
         ):
             raise NotLoggedInError(
-                f"you are in none of the groups of {self.label} that may log in here",
-                hint="The operator of this server knows which groups are allowed.",
+                f"your account of {self.label} is in none of the groups that may log in here",
+                hint="Ask the operator of this server which groups may log in.",
             )
 
     def make_user_name(self, claims: Mapping[str, Any]) -> str:
@@ -322,14 +322,14 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             raise NotFoundError("no account of a provider is linked with that person")
         if person.role == Role.ADMIN and not count_people_who_can_log_in(session, Role.ADMIN):
             raise ConflictError(
-                f"{person.name} is the only admin who can log in",
-                hint="Make another person admin first.",
+                f"without the linked account of {person.name} no admin could log in any more",
+                hint=f"Give {person.name} a password first, or make somebody admin who can log in.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
         log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)
 
 
-def count_linked_admins(store: Store, rules: SignOnRules) -> int:
+def count_active_admins_linked_to_sign_on(store: Store, rules: SignOnRules) -> int:
     """How many admins can come by the provider."""
     with store.read() as session:
         admins = [

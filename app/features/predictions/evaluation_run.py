@@ -151,7 +151,7 @@ class EvaluationRequest:
         if self.predictions is None and self.careful is None:
             raise InputError(
                 "the request names neither predictions nor reference boxes",
-                hint="Give `predictions`, `careful`, or both.",
+                hint="Give `predictions`, `careful` (the set of reference boxes), or both.",
                 pointer="/predictions",
             )
         if self.boxes not in BOX_KINDS:
@@ -375,7 +375,7 @@ def _require_common_frames(
             raise InputError(
                 f'none of the {len(predicted)} frames of "{sets[name].name}" is among the'
                 f" {len(frames)} frames to evaluate",
-                hint="Name the split or the version that the predictions were made for.",
+                hint="Name the split or the version whose frames this set covers.",
                 pointer=f"/{name}",
             )
 
@@ -449,7 +449,7 @@ def evaluate_sources(
     pinned = None if wanted.version is None else find_version(store, dataset, wanted.version).id
     found, drawn = (
         None
-        if source.is_empty
+        if source.names_no_file
         else read_or_find_prediction_set(store, dataset, source, actor=actor)
         for source in (wanted.predictions, wanted.careful)
     )

@@ -72,8 +72,8 @@ class PredictionFiles:
         return found
 
     @property
-    def is_empty(self) -> bool:
-        """Whether it names nothing at all."""
+    def names_no_file(self) -> bool:
+        """Whether neither a file of boxes nor one of cameras is named."""
         return self.path is None and self.cameras is None
 
     def refuse_unused_options(self, prefix: str = "") -> None:

@@ -419,7 +419,7 @@ def read_rows(session: Session, ids: Sequence[int], order: RowOrder) -> Sequence
     return session.execute(_select_rows(order).where(QueueModel.group_id.in_(ids))).all()
 
 
-def read_columns(
+def read_columns_of_groups(
     session: Session, ids: Sequence[int], conditions: Iterable[Condition], names: Iterable[str]
 ) -> Sequence[Any]:
     """Some columns of those among some groups of one dataset that fulfil conditions, by number."""

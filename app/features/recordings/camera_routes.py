@@ -99,9 +99,7 @@ def get_stretch(
     found = get_shot_cameras(store, recording, frame)
     digest = found.digest_before if before else found.digest
     if digest is None:
-        raise NotFoundError(
-            "there are no earlier cameras of these frames: they were tracked only once"
-        )
+        raise NotFoundError("no earlier cameras of these frames are kept")
     pitch = get_pitch_of_recording(store, recording)
     tag = f'"{digest}-{pitch.length:g}-{pitch.width:g}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}

@@ -122,7 +122,7 @@ def detect_in_frames(
         boxes = model.detect(image[:, :, ::-1], min_score=min_score, most=MOST)
         # YOLO counts from the corner of the first pixel.
         found[number] = [Detection(box_from_corner_origin(one.box), one.score) for one in boxes]
-    return _save_boxes(store, recording, name, found, len(frames), 0, actor)
+    return _replace_box_set(store, recording, name, found, len(frames), 0, actor)
 
 
 def import_boxes_from_file(
@@ -151,7 +151,7 @@ def import_boxes_from_file(
         number: [one for one in boxes if one.score >= min_score]
         for number, boxes in read.detections.items()
     }
-    return _save_boxes(store, recording, name, sure, count, len(read.unknown), actor)
+    return _replace_box_set(store, recording, name, sure, count, len(read.unknown), actor)
 
 
 def read_detected_balls_in_frames(
@@ -171,7 +171,7 @@ def read_detected_balls_in_frames(
     return {frame: tuple(balls) for frame, balls in found.items()}
 
 
-def _save_boxes(
+def _replace_box_set(
     store: Store,
     recording: Recording,
     name: str,

@@ -20,7 +20,7 @@ from app.errors import ConflictError
 from app.features.independent_annotations.queries import list_closed_copies
 from app.features.people.visibility_queries import COPIES, sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
-from app.features.queue.queries import GroupListing, read_columns
+from app.features.queue.queries import GroupListing, read_columns_of_groups
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.queue.refresh_queries import filter_edited_groups, refresh_verdict_columns
 from app.features.solutions.queries import list_unsolved_groups, read_current_solution_keys
@@ -187,7 +187,7 @@ def give_verdicts(
     for start in range(0, max(len(places), 1), CHUNK):
         chunk = places[start : start + CHUNK]
         with store.write() as session:
-            rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
+            rows = read_columns_of_groups(session, [group for _, group in chunk], conditions, ASKED)
             run.save_chunk(
                 session, select_groups_for_verdict(session, dataset_id, rows, verdict).change
             )

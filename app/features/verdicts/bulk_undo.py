@@ -10,7 +10,7 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.queue.queries import read_columns
+from app.features.queue.queries import read_columns_of_groups
 from app.features.solutions.queries import read_current_solution_keys
 from app.features.verdicts.bulk import (
     ASKED,
@@ -205,7 +205,7 @@ def redo_bulk_verdict(store: Store, batch_id: int, *, actor: str) -> RedoReport:
         with store.write() as session:
             run.batch = _unfinished_redo(session, batch_id, actor)
             ids = _list_unchanged_groups(session, batch.spans, first, last)
-            rows = read_columns(session, ids, (), ASKED)
+            rows = read_columns_of_groups(session, ids, (), ASKED)
             found = select_groups_for_verdict(session, batch.dataset_id, rows, verdict)
             run.save_chunk(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})

@@ -25,7 +25,7 @@ from app.features.groups.revision_queries import (
     find_newest_change_id,
     list_changed_group_ids,
 )
-from app.features.queue.queries import read_columns, read_columns_after
+from app.features.queue.queries import read_columns_of_groups, read_columns_after
 from app.features.queue.statistics import (
     COLUMNS,
     Statistics,
@@ -173,7 +173,9 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     rows = [
         row
         for start in range(0, len(ids), CHUNK)
-        for row in read_columns(session, ids[start : start + CHUNK], (), ("group_id", *COLUMNS))
+        for row in read_columns_of_groups(
+            session, ids[start : start + CHUNK], (), ("group_id", *COLUMNS)
+        )
     ]
     new = np.array([row[0] for row in rows], np.int64)
     stays = ~np.isin(kept.group_id, np.array(ids, np.int64))

@@ -224,7 +224,7 @@ function BatchChoice({ dataset, batch, choose }) {
 function LeadCards({ dataset }) {
 	const [batch, setBatch] = useState(/** @type {number | null} */ (null));
 	const found = useResource((signal) => getAgreement(dataset, signal, batch), [dataset, batch]);
-	if (found.error) return html`<${Trouble} title="The agreement cannot be shown" error=${found.error} retry=${found.reload} />`;
+	if (found.error) return html`<${Trouble} title="The agreement between annotators cannot be shown" error=${found.error} retry=${found.reload} />`;
 	if (!found.value) return html`<${Loading} what="the agreement" />`;
 	return html`
 		<${BatchChoice} dataset=${dataset} batch=${batch} choose=${setBatch} />

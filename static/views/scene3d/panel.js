@@ -110,7 +110,7 @@ export function Stage({ scene, images, habits }) {
 
 	return html`
 		<div class="scene3d__stage" ref=${ref} data-ready=${ready}>
-			<canvas ref=${canvas} role="img" tabindex="0" onMouseDown=${habits ? keepFocus : undefined} aria-label="The scene in 3D. Arrow keys turn it, plus and minus come closer. The table says the same in words."></canvas>
+			<canvas ref=${canvas} role="img" tabindex="0" onMouseDown=${habits ? keepFocus : undefined} aria-label="The scene in 3D. The arrow keys turn it; plus moves closer and minus moves away. The table gives the same information in words."></canvas>
 			${missing ? html`<p class="scene3d__missing" role="status">This browser shows no 3D graphics (WebGL 2). The table below says the same in words.</p>` : html`
 				<div class="scene3d__labels" ref=${labels}>
 					<svg class="scene3d__leaders" aria-hidden="true">${scene.stands.map(({ letter }) => html`<path key=${letter} data-leader=${letter} />`)}</svg>

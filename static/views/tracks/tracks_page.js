@@ -45,7 +45,7 @@ function ListTools({ values: { show, mine, batch, sort } }) {
 			<label>Show <select class="field" value=${show} onChange=${withValue((text) => listAs({ show: text }))}>${SHOWN.map((one) => html`<option key=${one.show} value=${one.show}>${one.label}</option>`)}</select></label>
 			<label>Order <select class="field" value=${sort || SORTS[0].sort} onChange=${withValue((text) => listAs({ sort: text === SORTS[0].sort ? '' : text }))}>${SORTS.map((one) => html`<option key=${one.sort} value=${one.sort}>${one.label}</option>`)}</select></label>
 			<button class="button" type="button" aria-pressed=${mine !== ''} onClick=${() => listAs({ mine: mine ? '' : '1' })}>Assigned to me</button>
-			${batch ? html`<button class="button" type="button" onClick=${() => listAs({ batch: '' })}>Show all batches</button>` : null}
+			${batch ? html`<button class="button" type="button" onClick=${() => listAs({ batch: '' })}>Show tracks of all batches</button>` : null}
 		</div>
 	`;
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 import pysqlite3.dbapi2 as sqlite
 import pytest
 
-from app.db.recovery.preopen_check import read_header, read_write_ahead_log
+from app.db.recovery.preopen_check import read_header, summarize_wal_file
 
 COMMITS = 30
 
@@ -42,7 +42,7 @@ def log(path: Path) -> Path:
 
 class TestReadLog:
     def test_knows_every_commit_and_what_it_counted(self, tmp_path: Path) -> None:
-        found = read_write_ahead_log(log(database(tmp_path / "a.db")))
+        found = summarize_wal_file(log(database(tmp_path / "a.db")))
         assert found.commits == COMMITS
         assert [header.count for header in found.headers] == list(range(2, COMMITS + 2))
 
@@ -51,17 +51,17 @@ class TestReadLog:
         path = log(database(tmp_path / "a.db"))
         whole = path.read_bytes()
         path.write_bytes(whole[:-lost])
-        cut = read_write_ahead_log(path).commits
+        cut = summarize_wal_file(path).commits
         torn = bytearray(whole)
         torn[-lost] ^= 1
         path.write_bytes(torn)
-        assert read_write_ahead_log(path).commits == cut < COMMITS
+        assert summarize_wal_file(path).commits == cut < COMMITS
 
     def test_nothing_is_an_empty_log(self, tmp_path: Path) -> None:
-        assert read_write_ahead_log(tmp_path / "none").commits == 0
+        assert summarize_wal_file(tmp_path / "none").commits == 0
         for content in (b"", b"x" * 20, b"x" * 5000):
             (tmp_path / "log").write_bytes(content)
-            assert read_write_ahead_log(tmp_path / "log").commits == 0
+            assert summarize_wal_file(tmp_path / "log").commits == 0
 
 
 class TestBelongsTo:
@@ -70,11 +70,11 @@ class TestBelongsTo:
         path = database(tmp_path / "a.db", checkpointed=checkpointed)
         header = read_header(path)
         assert header is not None
-        assert read_write_ahead_log(log(path)).belongs_to(header)
+        assert summarize_wal_file(log(path)).belongs_to(header)
 
     def test_and_still_does_when_some_of_it_was_taken_over(self, tmp_path: Path) -> None:
         path = database(tmp_path / "a.db")
-        found = read_write_ahead_log(log(path))
+        found = summarize_wal_file(log(path))
         content = path.read_bytes()
         path.write_bytes(found.headers[10].raw + content[100:])
         header = read_header(path)
@@ -83,7 +83,7 @@ class TestBelongsTo:
 
     def test_an_earlier_state_of_the_same_database_is_another_one(self, tmp_path: Path) -> None:
         early = read_header(database(tmp_path / "early.db", checkpointed=5))
-        late = read_write_ahead_log(log(database(tmp_path / "late.db", checkpointed=7)))
+        late = summarize_wal_file(log(database(tmp_path / "late.db", checkpointed=7)))
         assert early is not None
         assert not late.belongs_to(early)
 
@@ -95,4 +95,4 @@ class TestBelongsTo:
             connection.execute("PRAGMA user_version = 1")
         header = read_header(other)
         assert header is not None
-        assert not read_write_ahead_log(log(database(tmp_path / "a.db"))).belongs_to(header)
+        assert not summarize_wal_file(log(database(tmp_path / "a.db"))).belongs_to(header)

@@ -168,7 +168,7 @@ class TestDecide:
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "lea")
         said = kinds(store, state.id)
         assert ("edit", "ben") in said and ("agreement", "lea") in said
-        with pytest.raises(NotFoundError, match="does not wait for adjudication"):
+        with pytest.raises(NotFoundError, match="is not waiting for adjudication"):
             adjudicate_case(store, state.id, takes[0].id, actor="lea")
         assert [str(check) for check in examine_database(store) if not check.ok] == []
 

@@ -19,7 +19,7 @@ from app.features.queue.queries import (
     compare_condition,
     count_states,
     find_dataset_and_sort_keys,
-    read_columns,
+    read_columns_of_groups,
     read_rows,
 )
 from app.features.queue.tables import QueueModel
@@ -71,7 +71,7 @@ class TestReadColumns:
         assert [tuple(row) for row in rows] == [(1, None), (2, 0.5), (3, 0.1)]
 
     def test_of_some_groups_alone(self, session: Session) -> None:
-        rows = read_columns(session, [4, 3, 9, 1], OPEN, ("group_id",))
+        rows = read_columns_of_groups(session, [4, 3, 9, 1], OPEN, ("group_id",))
         assert [row.group_id for row in rows] == [1, 3]
 
 
