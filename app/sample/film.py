@@ -23,9 +23,9 @@ from app.sample.props import Image, draw_ball, draw_goal_posts, draw_net
 from app.sample.render import (
     light_direction_in_image,
     light_gain_at,
-    make_noise_tiles,
     make_camera_shading_inputs,
     make_grass_shading_inputs,
+    make_noise_tiles,
     make_stadium_shading_inputs,
 )
 from app.sample.surface import shade_frame

@@ -21,7 +21,7 @@ test('a map says its speed and how well its times are known', () => {
 	assert.deepEqual(mapText({ ...MAP, ball_reason: 'The ball rests.' }, 50).slice(1), ['The times could not be found from the ball. The ball rests.']);
 	const close = mapText({ ...MAP, outcome: 'offset', reason: 'Too close together; 1 is assumed.', speed: 1, too_close: true }, 50);
 	assert.deepEqual(close, ['Too close together; 1 is assumed.']);
-	assert.match(mapText({ ...MAP, outcome: 'offset', reason: 'One; 1 is assumed.', speed: 1 }, 50)[0], /^One linked instant tells/);
+	assert.match(mapText({ ...MAP, outcome: 'offset', reason: 'One; 1 is assumed.', speed: 1 }, 50)[0], /^One linked instant fixes/);
 	assert.deepEqual(mapText({ ...MAP, outcome: 'unobservable', reason: 'The ball rests.' }, 50), ['The ball rests.']);
 });
 

@@ -25,7 +25,7 @@ from app.features.groups.revision_queries import (
     find_newest_change_id,
     list_changed_group_ids,
 )
-from app.features.queue.queries import read_columns_of_groups, read_columns_after
+from app.features.queue.queries import read_columns_after, read_columns_of_groups
 from app.features.queue.statistics import (
     COLUMNS,
     Statistics,
