@@ -32,7 +32,7 @@ from app.paint.search import (
     VisiblePaint,
     find_visible_paint,
     get_kernel_executor,
-    is_same_or_half_turned_view,
+    is_view_among,
     search_cameras,
 )
 from app.paint.snap import SnappedCamera, snap_to_prepared_picture
@@ -295,7 +295,7 @@ def merge_ranked_cameras(
         camera = item.snapped.camera
         if (height, width) != (rows, columns):
             camera = camera.scaled(columns / width, rows / height)
-        if not any(is_same_or_half_turned_view(old, camera, frame.picture) for old in shown):
+        if not is_view_among(shown, camera, frame.picture):
             kept.append(item)
             shown.append(find_visible_paint(camera, frame.picture))
     return kept

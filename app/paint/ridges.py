@@ -131,15 +131,14 @@ def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatAr
     paint = np.column_stack([columns, rows]).astype(np.float64)
     free = np.ones(len(paint), dtype=bool)
     ends = found.reshape(-1, 4).astype(np.float64)
+    beside = np.array([_find_paint_beside_piece(paint, end, unit) for end in ends])
+    support = np.count_nonzero(beside, axis=1)
     pieces: list[FloatArray] = []
     for _ in range(most):
-        support = np.array(
-            [np.count_nonzero(free & _find_paint_beside_piece(paint, end, unit)) for end in ends]
-        )
         best = int(np.argmax(support))
         if support[best] < LEAST_PIXELS or support[best] < 0.6 * SHORTEST_PX * unit:
             break
-        taken = free & _find_paint_beside_piece(paint, ends[best], unit)
+        taken = free & beside[best]
         for _ in range(2):
             taken = free & _extend_piece(paint, _fit_segment(paint[taken]), unit)
             if np.count_nonzero(taken) < LEAST_PIXELS:
@@ -148,9 +147,7 @@ def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatAr
             break
         pieces.append(_fit_segment(paint[taken]))
         free &= ~taken
-        ends = ends[support >= 0.4 * SHORTEST_PX * unit]
-        if len(ends) == 0:
-            break
+        support = support - np.count_nonzero(beside[:, taken], axis=1)
     return np.array(pieces).reshape(-1, 4)
 
 

@@ -338,7 +338,7 @@ def _select_distinct_cameras(
         if len(found) == most or score[index] <= 0 or not np.isfinite(rows[index]).all():
             break
         camera = camera_from_parameters(rows[index], (x0, y0), picture.half_diagonal)
-        if not any(is_same_or_half_turned_view(other, camera, picture) for other in shown):
+        if not is_view_among(shown, camera, picture):
             found.append(FoundCamera(rows[index], camera, float(score[index])))
             shown.append(find_visible_paint(camera, picture))
     return found
@@ -366,20 +366,22 @@ def find_visible_paint(camera: Camera, picture: PictureToScore) -> VisiblePaint:
     return VisiblePaint(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def is_same_or_half_turned_view(
-    shown: VisiblePaint, other: Camera, picture: PictureToScore
-) -> bool:
-    """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
-    if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
+def is_view_among(shown: Sequence[VisiblePaint], other: Camera, picture: PictureToScore) -> bool:
+    """Whether a camera sees the same places as one of those, or those of the pitch turned by half a turn."""
+    shown = [item for item in shown if len(item.pixels) >= len(picture.few[:COMPARED]) / 2]
+    if not shown:
         return False
-    for turn in (1.0, -1.0):
-        apart = np.hypot(*(other.project(shown.ground * (turn, turn, 1.0)) - shown.pixels).T)
-        if (
-            np.median(np.where(np.isfinite(apart), apart, np.inf))
-            < SAME_PX * picture.scale_from_960_wide
-        ):
-            return True
-    return False
+    counts = np.array([len(item.pixels) for item in shown])
+    ground = np.vstack([item.ground for item in shown])
+    pixels = np.vstack([item.pixels for item in shown])
+    apart = np.full((2, len(shown), counts.max()), np.inf)
+    within = np.arange(counts.max()) < counts[:, None]
+    for row, turn in zip(apart, (1.0, -1.0), strict=True):
+        row[within] = np.hypot(*(other.project(ground * (turn, turn, 1.0)) - pixels).T)
+    apart = np.sort(np.where(np.isfinite(apart), apart, np.inf))
+    each = np.arange(len(shown))
+    middle = 0.5 * (apart[:, each, (counts - 1) // 2] + apart[:, each, counts // 2])
+    return bool((middle < SAME_PX * picture.scale_from_960_wide).any())
 
 
 @cache

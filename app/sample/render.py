@@ -30,9 +30,9 @@ from app.sample.scene import Scene
 from app.sample.surface import (
     BOARD_HEIGHT,
     TILE,
-    CameraShadingInputs,
-    GrassShadingInputs,
-    StadiumShadingInputs,
+    ShadingCamera,
+    ShadingGrass,
+    ShadingStadium,
     shade_frame,
 )
 
@@ -264,19 +264,19 @@ def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> 
     return image
 
 
-def make_camera_shading_inputs(camera: Camera) -> CameraShadingInputs:
+def make_camera_shading_inputs(camera: Camera) -> ShadingCamera:
     """The camera as ``shade_frame`` takes it."""
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
-    return CameraShadingInputs(camera.rotation, camera.position, *lens)
+    return ShadingCamera(camera.rotation, camera.position, *lens)
 
 
-def make_grass_shading_inputs(look: MatchLook) -> GrassShadingInputs:
+def make_grass_shading_inputs(look: MatchLook) -> ShadingGrass:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
-    return GrassShadingInputs(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
+    return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> StadiumShadingInputs:
+def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = make_board_mipmap(look.seed)
@@ -285,7 +285,7 @@ def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> StadiumShadi
     # A camera beyond a line stands before the boards of that side, or among the crowd.
     ends = [sign * x - HALF_LENGTH < beyond - 1.0 for sign in (1, -1)]
     sides = [sign * y - HALF_WIDTH < along - 2.0 for sign in (1, -1)]
-    return StadiumShadingInputs(
+    return ShadingStadium(
         seen=np.array([*ends, *sides]),
         beyond=beyond,
         along=along,

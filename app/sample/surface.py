@@ -100,7 +100,8 @@ _GROUND, _BOARD = -1, 0
 _WALL, _CROWD = 0, 1
 
 
-class CameraShadingInputs(NamedTuple):
+# Caches of compiled code name these classes, also those of earlier versions: their names stay.
+class ShadingCamera(NamedTuple):
     """The camera: R, position in the pitch frame, and lens (pixels; first radial coefficient)."""
 
     rotation: FloatArray
@@ -111,7 +112,7 @@ class CameraShadingInputs(NamedTuple):
     k1: float
 
 
-class GrassShadingInputs(NamedTuple):
+class ShadingGrass(NamedTuple):
     """The grass: its colour, and how it is mown.
 
     ``across``: in bands across the pitch, or along it; ``band`` is their width, metres. ``edge``
@@ -130,7 +131,7 @@ class GrassShadingInputs(NamedTuple):
     darkness: float
 
 
-class StadiumShadingInputs(NamedTuple):
+class ShadingStadium(NamedTuple):
     """What stands around the grass.
 
     ``seen``: for +x, -x, +y, -y whether the side has boards and stands (it has none where the
@@ -294,7 +295,7 @@ def _shade_crowd(
 @_jit
 def _shade_grass(
     out: np.ndarray, gx: float, gy: float, distance: float, foot: float, wx: float, wy: float,
-    view_x: float, view_y: float, turf: GrassShadingInputs, coarse: np.ndarray, fine: np.ndarray,
+    view_x: float, view_y: float, turf: ShadingGrass, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Colour of the grass without lines and shadows."""
     # Mown grass bends: a band shines when one looks along the way the mower went.
@@ -321,7 +322,7 @@ def _shade_grass(
 @_jit
 def _shade_grass_with_lines(
     out: np.ndarray, gx: float, gy: float, ray: np.ndarray, t: float,
-    R: np.ndarray, focal: float, turf: GrassShadingInputs, coarse: np.ndarray, fine: np.ndarray,
+    R: np.ndarray, focal: float, turf: ShadingGrass, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Colour of a place on the grass, with its lines and the shadow of the stand."""
     dx, dy, dz = ray[0], ray[1], ray[2]
@@ -410,7 +411,7 @@ def _shade_sky(out: np.ndarray, ray: np.ndarray, sky: np.ndarray) -> None:
 @_jit
 def shade_frame(
     image: np.ndarray, background: np.ndarray, shadow: np.ndarray, exposure: np.ndarray,
-    eye: CameraShadingInputs, turf: GrassShadingInputs, bowl: StadiumShadingInputs, coarse: np.ndarray, fine: np.ndarray,
+    eye: ShadingCamera, turf: ShadingGrass, bowl: ShadingStadium, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Paint the whole frame.
 
