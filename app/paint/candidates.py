@@ -164,65 +164,82 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 @compiled
 def find_level_cameras_on_pieces(stands, focals, pieces, markings, slack, low, high):
-    """Every camera that lays a marking on a piece; shape (N, 8)."""
+    """Every camera that lays a marking on a piece; shape (N, 8).
+
+    The plane through camera and marking has a normal n in the pitch frame and m in the camera's,
+    known up to its sign. Pan turns n about the vertical until its first coordinate is m's, tilt
+    turns the other two. As the cosine of the angle from n to that pan is known, its sine needs no arc.
+    """
     most = 2 * len(stands) * len(focals) * len(pieces) * len(markings)
     found = np.empty((most, 8))
+    across, raised = measure_piece_planes(pieces, focals)
     count = 0
     for s in range(len(stands)):
-        for m in range(len(markings)):
+        for marking in range(len(markings)):
+            nx, ny, nz = marking_plane(stands[s], markings[marking])
+            level = np.sqrt(nx * nx + ny * ny)
+            if level < 1e-9:
+                continue
+            nx, ny = nx / level, ny / level
             for f in range(len(focals)):
                 for piece in range(len(pieces)):
-                    count = write_level_cameras(
-                        stands[s], markings[m], focals[f], pieces[piece], slack, low, high,
-                        found, count,
-                    )  # fmt: skip
+                    cosine = across[f, piece] / level
+                    if abs(cosine) > 1.0:
+                        continue
+                    sine = np.sqrt(1.0 - cosine * cosine)
+                    for side in (-1.0, 1.0):
+                        upward = np.arctan2(nz, -side * level * sine) - raised[f, piece]
+                        for sign in (-1.0, 1.0):
+                            tilt = upward if sign > 0 else upward + np.pi
+                            if tilt > np.pi:
+                                tilt -= 2 * np.pi
+                            elif tilt < -np.pi:
+                                tilt += 2 * np.pi
+                            if not low <= tilt <= high:
+                                continue
+                            sp = ny * sign * cosine + nx * side * sine
+                            cp = nx * sign * cosine - ny * side * sine
+                            st, ct = np.sin(tilt), np.cos(tilt)
+                            if not is_piece_on_marking(
+                                stands[s], markings[marking], focals[f], pieces[piece], slack,
+                                sp, cp, st, ct,
+                            ):  # fmt: skip
+                                continue
+                            if count == most:
+                                return found
+                            row = found[count]
+                            row[0], row[1], row[2] = np.arctan2(sp, cp), tilt, 0.0
+                            row[3:6] = stands[s]
+                            row[6], row[7] = np.log(focals[f]), 0.0
+                            count += 1
     return found[:count].copy()
 
 
 @compiled
-def write_level_cameras(stand, marking, focal, piece, slack, low, high, found, count):
-    """Writes the level cameras at a stand that see the marking along the piece.
-
-    The plane through camera and marking has a normal n in the pitch frame and m in the camera's,
-    known up to its sign. Pan turns n about the vertical until its first coordinate is m's, tilt
-    turns the other two.
-    """
+def marking_plane(stand, marking):
+    """Unit normal of the plane through camera and marking, pitch frame."""
     ax, ay = marking[0] - stand[0], marking[1] - stand[1]
     bx, by = marking[2] - stand[0], marking[3] - stand[1]
     z = -stand[2]
     nx, ny, nz = (ay - by) * z, (bx - ax) * z, ax * by - ay * bx
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
-    nx, ny, nz = nx / length, ny / length, nz / length
-    mx = (piece[1] - piece[3]) * focal
-    my = (piece[2] - piece[0]) * focal
-    mz = piece[0] * piece[3] - piece[1] * piece[2]
-    length = np.sqrt(mx * mx + my * my + mz * mz)
-    mx, my, mz = mx / length, my / length, mz / length
-    level = np.sqrt(nx * nx + ny * ny)
-    if level < 1e-9 or abs(mx) > level:
-        return count
-    facing = np.arctan2(ny, nx)
-    for sign in (-1.0, 1.0):
-        for side in (-1.0, 1.0):
-            pan = facing + side * np.arccos(sign * mx / level)
-            sp, cp = np.sin(pan), np.cos(pan)
-            across = -sp * nx + cp * ny
-            tilt = np.arctan2(nz, across) - np.arctan2(sign * mz, sign * my)
-            tilt = (tilt + np.pi) % (2 * np.pi) - np.pi
-            if not low <= tilt <= high:
-                continue
-            st, ct = np.sin(tilt), np.cos(tilt)
-            if not is_piece_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
-                continue
-            if count == len(found):
-                return count
-            row = found[count]
-            row[0] = (pan + np.pi) % (2 * np.pi) - np.pi
-            row[1], row[2] = tilt, 0.0
-            row[3:6] = stand
-            row[6], row[7] = np.log(focal), 0.0
-            count += 1
-    return count
+    return nx / length, ny / length, nz / length
+
+
+@compiled
+def measure_piece_planes(pieces, focals):
+    """Of the unit normals of the planes through camera and pieces: their first coordinate in the camera's
+    frame, and the angle of the other two, shapes (F, L)."""
+    across, raised = np.empty((2, len(focals), len(pieces)))
+    for f in range(len(focals)):
+        for n in range(len(pieces)):
+            piece = pieces[n]
+            mx = (piece[1] - piece[3]) * focals[f]
+            my = (piece[2] - piece[0]) * focals[f]
+            mz = piece[0] * piece[3] - piece[1] * piece[2]
+            across[f, n] = mx / np.sqrt(mx * mx + my * my + mz * mz)
+            raised[f, n] = np.arctan2(mz, my)
+    return across, raised
 
 
 @compiled

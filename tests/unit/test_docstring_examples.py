@@ -3,17 +3,15 @@
 import ast
 import doctest
 import importlib
-import pkgutil
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-
-import app
-import touchline
 
 ROOT = Path(__file__).parents[2]
 NAME = re.compile(r"``([a-z_]\w*(?:\.[a-z_]\w*)*)(?:\(\))?``")
 MEMBER = re.compile(r"``([A-Z]\w*)\.([a-z_]\w*)(?:\(\))?``")
+SCRIPTS = ("api", "state", "views", "overlays", "lib", "geometry")
 OF_OTHERS = {"camera_00012.json", "instances_Train.json"}
 """Names in docstrings that are not of the code: files of an example."""
 
@@ -21,26 +19,23 @@ OF_OTHERS = {"camera_00012.json", "instances_Train.json"}
 def test_the_examples_of_docstrings_come_out_as_they_say() -> None:
     finder, runner = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner(verbose=False)
     failed: list[str] = []
-    for package in (app, touchline):
-        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if found.name.endswith("__main__"):
-                continue
-            for example in finder.find(importlib.import_module(found.name), found.name):
+    for path, text in _sources().items():
+        if ">>> " in text:
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            for example in finder.find(importlib.import_module(name), name):
                 runner.run(example, out=failed.append)
     assert not failed, "".join(failed)
     assert runner.tries > 50
 
 
 def test_names_in_docstrings_are_names_of_the_code() -> None:
-    sources = {
-        path: path.read_text("utf-8") for part in ("app", "touchline") for path in _files(part)
-    }
+    sources = _sources()
     known = {part for path in sources for part in re.split(r"[/.]", str(path))}
-    for path in [*sources, *_files("tests"), *_files("migrations")]:
-        known |= set(_names(ast.parse(path.read_text("utf-8"))))
-    for path in [*(ROOT / "static").glob("*/**/*.js"), ROOT / "pyproject.toml"]:
-        if not {"node_modules", "built"} & set(path.parts):
-            known |= set(re.findall(r"\w+", path.read_text("utf-8")))
+    for path in sources:
+        known |= set(_names(_tree(path)))
+    scripts = [path for part in SCRIPTS for path in (ROOT / "static" / part).rglob("*.js")]
+    for path in [*scripts, *_files("tests"), *_files("migrations"), ROOT / "pyproject.toml"]:
+        known |= set(re.findall(r"\w+", NAME.sub("", path.read_text("utf-8"))))
     gone = [
         f"{path.relative_to(ROOT)}: {name}"
         for path, text in sources.items()
@@ -53,9 +48,8 @@ def test_names_in_docstrings_are_names_of_the_code() -> None:
 def test_members_in_docstrings_are_members_of_their_class() -> None:
     members: dict[str, set[str]] = {}
     bases: dict[str, set[str]] = {}
-    texts = {path: path.read_text("utf-8") for path in _files("app")}
-    for text in texts.values():
-        for node in ast.walk(ast.parse(text)):
+    for path in _files("app"):
+        for node in ast.walk(_tree(path)):
             if isinstance(node, ast.ClassDef):
                 members.setdefault(node.name, set()).update(_names(node))
                 above = {name for base in node.bases for name in _names(base)}
@@ -68,11 +62,22 @@ def test_members_in_docstrings_are_members_of_their_class() -> None:
 
     gone = [
         f"{path.relative_to(ROOT)}: {owner}.{name}"
-        for path, text in texts.items()
+        for path, text in _sources().items()
         for owner, name in MEMBER.findall(text)
         if owner in members and not has(owner, name)
     ]
     assert not gone, gone
+
+
+@cache
+def _sources() -> dict[Path, str]:
+    """What every module of the product says."""
+    return {path: path.read_text("utf-8") for part in ("app", "touchline") for path in _files(part)}
+
+
+@cache
+def _tree(path: Path) -> ast.AST:
+    return ast.parse(_sources()[path])
 
 
 def _files(part: str) -> Iterator[Path]:
