@@ -183,10 +183,13 @@ def _add_track_to_comparison(
     there = track.has_ball
     rows = np.full(len(track.frames), -1)
     if predicted is not None:
-        place = _match_predictions_to_rows(track, predicted)
+        place, apart = _match_predictions_to_rows(track, predicted)
         known = np.flatnonzero(place >= 0)
-        rows[place[known[::-1]]] = known[::-1]
-        found.beside += len(place) - int((there & (rows >= 0)).sum())
+        # The nearest comes last, and stays; of two that are equally near the first.
+        known = known[np.lexsort((-known, -apart[known]))]
+        rows[place[known]] = known
+        near = place[place >= 0]
+        found.beside += len(place) - int(there[near].sum())
         if predicted.events is not None:
             found.events.append(_collect_track_events(track, predicted))
     position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)
@@ -202,18 +205,22 @@ def _add_track_to_comparison(
         found.mode.append(track.mode[row])
 
 
-def _match_predictions_to_rows(track: GroundTruthTrack, predicted: PredictedTrack) -> IntArray:
-    """The row of the true track of each predicted ball, -1 where there is none, shape (M,)."""
+def _match_predictions_to_rows(
+    track: GroundTruthTrack, predicted: PredictedTrack
+) -> tuple[IntArray, FloatArray]:
+    """The row of the true track of each predicted ball, -1 where there is none, and how far from its time
+    the prediction is, seconds, 0 where both have frame numbers, shapes (M,)."""
     by_frame = {int(frame): row for row, frame in enumerate(track.frames)}
     half = _estimate_frame_interval_s(track) / 2
-    found = np.full(len(predicted.position), -1)
+    found, apart = np.full(len(predicted.position), -1), np.zeros(len(predicted.position))
     for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True)):
         if frame is not None:
             found[at] = by_frame.get(frame, -1)
         elif time is not None:
             row = int(np.abs(track.times - time).argmin())
-            found[at] = row if abs(track.times[row] - time) <= half else -1
-    return found
+            apart[at] = abs(track.times[row] - time)
+            found[at] = row if apart[at] <= half else -1
+    return found, apart
 
 
 def _estimate_frame_interval_s(track: GroundTruthTrack) -> float:

@@ -13,6 +13,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import read_dataset_head
+from app.features.people.visibility_queries import has_hidden_groups
 from app.features.tracks.codec import TrackInputs, make_partial_track
 from app.features.tracks.findings import map_groups_by_frame
 from app.features.tracks.making import read_export_records
@@ -24,6 +25,7 @@ from app.features.tracks.queries import (
     list_track_rows,
     read_group_states_by_match,
     read_groups_by_match,
+    read_recording_shots,
 )
 from app.features.tracks.run_measurements import (
     collect_accepted_run_observations,
@@ -65,6 +67,8 @@ class TrackOfGroup:
 def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
     """The tracks that a group is in: at most one, unless stretches have changed.
 
+    Who does not see all groups is told of none: a track says what was made of the others.
+
     Raises:
         NotFoundError: There is no such group.
     """
@@ -72,6 +76,8 @@ def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
         place = find_dataset_match_and_key(session, group_id)
         if place is None:
             raise NotFoundError.group(group_id)
+        if has_hidden_groups(place.dataset_id):
+            return []
         frame = parse_frame_number(place.key)
         rows = [
             row
@@ -83,8 +89,9 @@ def find_tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
         head = read_dataset_head(session, place.dataset_id)
         groups = read_group_states_by_match(session, head.id, [place.match]).get(place.match, [])
         runs = list_accepted_runs(session, head.id).get(place.match, ())
+        shots = read_recording_shots(session, head.id).get(place.match)
         return [
-            TrackOfGroup(build_track_from_row(row, head.policy, groups, runs), frame)
+            TrackOfGroup(build_track_from_row(row, head.policy, groups, runs, shots), frame)
             for row in rows
         ]
 

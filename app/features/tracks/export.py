@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from app.features.tracks.stretches import (
 from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
 from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
 from app.soccer.policy import Policy
 from app.tracking.ball_track import BallTrack, EventCorrection
 
@@ -45,6 +47,7 @@ class StoredStretchTrack:
         track: The track, with its corrections; None where nobody accepted it.
         verdict: ``accepted``, ``rejected`` or None.
         corrections: What people said of its events.
+        inputs: What a frozen track was made of; None of another.
     """
 
     key: str
@@ -55,6 +58,7 @@ class StoredStretchTrack:
     track: BallTrack | None
     verdict: str | None
     corrections: tuple[EventCorrection, ...] = ()
+    inputs: TrackInputs | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,8 @@ class TrackSource:
         """
         taken = (item for item in records if self.everything or item.verdict != "rejected")
         stretches = gather_stretches(taken, self.policy, self.shots, self.followed)
+        if self.frozen:
+            stretches = _restore_frozen_stretches(self.known, stretches)
         require_any_stretch(self.dataset, stretches)
         if self.try_only:
             return
@@ -113,9 +119,7 @@ class TrackSource:
         if self.frozen:
             if known is None or known.track is None:
                 return "its track was not accepted when the version was frozen"
-            return self._build_track_record(
-                replace(stretch, key=known.key), known.track, "accepted"
-            )
+            return self._build_track_record(stretch, known.track, "accepted")
         verdict, track = "unreviewed", None
         if known is not None and known.digest == digest_inputs(TrackInputs.of(stretch)):
             if known.verdict == "rejected" and not self.everything:
@@ -138,6 +142,64 @@ class TrackSource:
         )
 
 
+def _restore_frozen_stretches(
+    known: Iterable[StoredStretchTrack], stretches: Sequence[Stretch]
+) -> list[Stretch]:
+    """The stretches of frozen tracks as they were, and those of groups that none of them is of.
+
+    Args:
+        known: The frozen tracks.
+        stretches: Of the groups of the version as the shots of recordings are now: cameras, and balls that are no
+            measurement, are theirs.
+    """
+    found, left = [], [*stretches]
+    for stored in known:
+        if stored.inputs is None:
+            continue
+        inside = [
+            one
+            for one in stretches
+            if one.match == stored.match and one.first <= stored.last and stored.first <= one.last
+        ]
+        left = [one for one in left if one not in inside]
+        found.append(_restore_frozen_stretch(stored, stored.inputs, inside))
+    return sorted([*found, *left], key=lambda one: (one.match, one.first))
+
+
+def _restore_frozen_stretch(
+    stored: StoredStretchTrack, inputs: TrackInputs, inside: Sequence[Stretch]
+) -> Stretch:
+    frames = range(stored.first, stored.last + 1)
+    cameras: dict[str, dict[int, Camera]] = {}
+    for view, frame, camera in (
+        (view, frame, camera)
+        for one in inside
+        for view, of_view in one.cameras.items()
+        for frame, camera in of_view.items()
+        if frame in frames
+    ):
+        cameras.setdefault(view, {})[frame] = camera
+    measured = inputs.measurements
+    for view, frame, camera in zip(
+        measured.views, measured.frames.tolist(), measured.cameras, strict=True
+    ):
+        cameras.setdefault(view, {}).setdefault(frame, camera)
+    span = float(inputs.times[-1] - inputs.times[0])
+    is_rig = stored.key == stored.match
+    return Stretch(
+        key=stored.key,
+        match=stored.match,
+        rate=RATE if is_rig or span <= 0 else (len(inputs.frames) - 1) / span,
+        frames=inputs.frames,
+        times=inputs.times,
+        pitch=inputs.pitch,
+        measurements=measured,
+        groups={},
+        cameras=cameras,
+        unused=dict(sum((Counter(one.unused) for one in inside), Counter[str]())),
+    )
+
+
 def parse_frozen_track(key: str, value: Mapping[str, Any]) -> StoredStretchTrack:
     """What a frozen version has of a stretch.
 
@@ -145,12 +207,11 @@ def parse_frozen_track(key: str, value: Mapping[str, Any]) -> StoredStretchTrack
         key: Of the stretch, as it was frozen.
         value: As ``codec.frozen_track_to_json`` made it.
     """
-    track = track_from_json(value["track"])
+    track, inputs = track_from_json(value["track"]), inputs_from_json(value["inputs"])
     # Versions of earlier software do not say the match: a recording's stretches end in their frames.
     match = value.get("match") or _FRAMES.sub("", key)
-    return StoredStretchTrack(
-        key, match, int(track.frames[0]), int(track.frames[-1]), "", track, "accepted"
-    )
+    bounds = int(inputs.frames[0]), int(inputs.frames[-1])
+    return StoredStretchTrack(key, match, *bounds, "", track, "accepted", inputs=inputs)
 
 
 def list_frozen_track_records(frozen: Mapping[str, Mapping[str, Any]]) -> list[TrackRecord]:

@@ -264,12 +264,15 @@ def read_tracked_ball_positions(
 ) -> dict[int, FloatArray]:
     """Where tracks put the ball in frames of a shot, pitch frame, metres, shape (3,), by frame.
 
-    Tracks that are stale, or in which a view of the link takes part, say nothing: their times come from it.
+    Tracks that were rejected or are stale say nothing, nor do those in which a view of the link takes part: their
+    times come from it.
     """
     found: dict[int, FloatArray] = {}
     for track in list_tracks(store, recording.dataset_id):
         overlaps = track.first <= shot.last and shot.first <= track.last
         if track.match != recording.name or not overlaps or track.stale or track.summary.reason:
+            continue
+        if track.verdict == "rejected":
             continue
         try:
             detail = read_track_detail(store, track.id)

@@ -58,8 +58,7 @@ from app.features.tracks.stretches import (
 from app.formats.export_record import ExportRecord
 from app.json_text import canonical_json_text
 from app.progress import ReportProgress
-from app.tracking.ball_track import BallTrack, ViewJump
-from app.wording import plural
+from app.tracking.ball_track import BallTrack
 
 BATCH = 200
 
@@ -121,7 +120,11 @@ def make_tracks(
     require_any_stretch(found.name, stretches)
     for tracked, stretch in enumerate(stretches, 1):
         stamp = compute_track_stamp(
-            found.policy, groups[stretch.match], stretch, runs.get(stretch.match, ())
+            found.policy,
+            groups[stretch.match],
+            stretch,
+            runs.get(stretch.match, ()),
+            shots.get(stretch.match),
         )
         is_new, reason = _track_stretch(
             store, found, stretch, stored.get(stretch.key), stamp, actor
@@ -202,15 +205,12 @@ def _compute_columns(
     whole = replace(inputs, corrections=corrections_from_json(parse_json_column(said)))
     patches = solve_corrected_parts(whole, base)
     track = apply_corrections(whole, base, patches)
-    told = format_unused_balls(stretch.unused), format_view_jumps(track.jumps)
-    warnings = [*filter(None, told), *(item.sentence for item in track.untracked)]
     summary = summarize_track(
         track,
         TrackSummary(
             *(0, {}, {}, len(inputs.measurements), 0, None, None, None, None),
             rate=stretch.rate,
             unused=dict(stretch.unused),
-            warnings=warnings,
         ),
     )
     return {
@@ -222,23 +222,6 @@ def _compute_columns(
         "first": stretch.first,
         "last": stretch.last,
     }
-
-
-def format_unused_balls(unused: Mapping[str, int]) -> str | None:
-    """Which balls took no part, a sentence; None: all did."""
-    parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
-    return f"Not measured: {', '.join(parts)}." if parts else None
-
-
-def format_view_jumps(jumps: Sequence[ViewJump]) -> str | None:
-    """Where views that take over put the ball elsewhere, a sentence; None: nowhere."""
-    if not jumps:
-        return None
-    metres = sorted(jump.metres for jump in jumps)
-    return (
-        f"The ball jumps where the views change, {plural(len(jumps), 'time')}, by {metres[len(metres) // 2]:.1f} m "
-        f"in the median and {metres[-1]:.1f} m at most: their cameras contradict each other there."
-    )
 
 
 def _collect_corrections(

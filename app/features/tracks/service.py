@@ -117,9 +117,14 @@ def list_tracks(store: Store, dataset: str | int) -> list[Track]:
             else {}
         )
         runs = list_accepted_runs(session, found.id) if rows else {}
+        shots = read_recording_shots(session, found.id) if rows else {}
         return [
             build_track_from_row(
-                row, found.policy, groups.get(row.match, ()), runs.get(row.match, ())
+                row,
+                found.policy,
+                groups.get(row.match, ()),
+                runs.get(row.match, ()),
+                shots.get(row.match),
             )
             for row in rows
         ]
@@ -179,7 +184,7 @@ def review_track(
         values: dict[str, Any] = {"revision": track.revision + 1, **solved}
         if change.verdict is not None:
             if change.verdict == "accepted":
-                _require_acceptable(track)
+                _require_acceptable(replace(track, summary=_get_new_summary(solved, track)))
             if change.verdict == "none":
                 values |= UNJUDGED
             else:
@@ -225,9 +230,10 @@ def collect_accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str,
         read_group_states_by_match(session, dataset.id, {row.match for row in rows}) if rows else {}
     )
     runs = list_accepted_runs(session, dataset.id) if rows else {}
+    shots = read_recording_shots(session, dataset.id) if rows else {}
     found = {}
     for row in rows:
-        of_match = groups.get(row.match, ()), runs.get(row.match, ())
+        of_match = groups.get(row.match, ()), runs.get(row.match, ()), shots.get(row.match)
         track = build_track_from_row(row, dataset.policy, *of_match)
         if track.stale:
             continue
@@ -284,7 +290,8 @@ def _read_track_and_groups(session: Session, track_id: int) -> tuple[Track, list
     found = read_dataset_head(session, int(row.dataset_id))
     groups = read_groups_by_match(session, found.id, [row.match]).get(row.match, [])
     runs = list_accepted_runs(session, found.id).get(row.match, ())
-    return build_track_from_row(row, found.policy, groups, runs), groups
+    shots = read_recording_shots(session, found.id).get(row.match)
+    return build_track_from_row(row, found.policy, groups, runs, shots), groups
 
 
 def _build_ball_track(
@@ -322,6 +329,13 @@ def _recompute_corrected_track(
         **UNJUDGED,
     }
     return columns, inputs, ball
+
+
+def _get_new_summary(solved: Mapping[str, Any], track: Track) -> TrackSummary:
+    """What a list says of a track once a change is made."""
+    if "summary" not in solved:
+        return track.summary
+    return TrackSummary(**parse_json_column(solved["summary"]))
 
 
 def _require_acceptable(track: Track) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -12,11 +12,12 @@ from app.db.json_columns import parse_json_column, translate_shape_errors_to_dam
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
 from app.features.tracks.queries import GroupForTracking, GroupStateForTracking
 from app.features.tracks.run_measurements import AcceptedRun, list_run_states
-from app.features.tracks.stretches import StoredStretch, parse_frame_number
+from app.features.tracks.stretches import StoredStretch, find_shot_at_frame, parse_frame_number
 from app.soccer.codec import digest_json
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
-from app.tracking.ball_track import BallTrack, EventCorrection
+from app.tracking.ball_track import BallTrack, EventCorrection, ViewJump
+from app.wording import plural
 
 Verdict = Literal["accepted", "rejected"]
 UNJUDGED: dict[str, None] = dict.fromkeys(("verdict", "note", "judged_by", "judged_at"))
@@ -99,12 +100,13 @@ def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
 
     Args:
         track: With its corrections.
-        like: Has what the track does not say: measurements, rate, balls that are none, warnings.
+        like: Has what the track does not say: measurements, rate, balls that are none.
     """
     left, worst = track.left_out, None
     if left is not None and np.isfinite(left.by_frame).any():
         worst = int(track.frames[np.nanargmax(left.by_frame)])
     kinds = [event.kind for event in track.events]
+    told = format_unused_balls(like.unused), format_view_jumps(track.jumps)
     return replace(
         like,
         frames=len(track.frames),
@@ -117,6 +119,24 @@ def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
         reason=track.reason,
         noise=dict(track.noise),
         late=dict(track.offsets),
+        warnings=[*filter(None, told), *(item.sentence for item in track.untracked)],
+    )
+
+
+def format_unused_balls(unused: Mapping[str, int]) -> str | None:
+    """Which balls took no part, a sentence; None: all did."""
+    parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
+    return f"Not measured: {', '.join(parts)}." if parts else None
+
+
+def format_view_jumps(jumps: Sequence[ViewJump]) -> str | None:
+    """Where views that take over put the ball elsewhere, a sentence; None: nowhere."""
+    if not jumps:
+        return None
+    metres = sorted(jump.metres for jump in jumps)
+    return (
+        f"The ball jumps where the views change, {plural(len(jumps), 'time')}, by {metres[len(metres) // 2]:.1f} m "
+        f"in the median and {metres[-1]:.1f} m at most: their cameras contradict each other there."
     )
 
 
@@ -125,8 +145,9 @@ def build_track_from_row(
     policy: Policy,
     groups: Iterable[GroupForTracking | GroupStateForTracking],
     runs: Sequence[AcceptedRun] = (),
+    shots: Sequence[tuple[int, int]] | None = None,
 ) -> Track:
-    """A row of the table without what is large, with the groups and accepted ball runs of its match."""
+    """A row of the table without what is large, with the groups, accepted ball runs and shots of its match."""
     return Track(
         id=row.id,
         dataset_id=row.dataset_id,
@@ -135,7 +156,7 @@ def build_track_from_row(
         match=row.match,
         first=row.first,
         last=row.last,
-        stale=row.stamp != compute_track_stamp(policy, groups, row, runs),
+        stale=row.stamp != compute_track_stamp(policy, groups, row, runs, shots),
         verdict=row.verdict,
         note=row.note,
         judged_by=row.judged_by,
@@ -171,22 +192,26 @@ def compute_track_stamp(
     groups: Iterable[GroupForTracking | GroupStateForTracking],
     place: StoredStretch,
     runs: Sequence[AcceptedRun] = (),
+    shots: Sequence[tuple[int, int]] | None = None,
 ) -> str:
     """A digest of what a stretch's track depends on, without computing it.
 
     Args:
         policy: Of the dataset.
         groups: Of the match.
-        place: The stretch: of a rig all groups of the match, of a recording those of its frames.
+        place: The stretch: of a rig all groups of the match, of a recording those of its shot, or of its frames
+            where no shot is known.
         runs: Accepted ball runs that show the ball of the match.
+        shots: First and last frames of the shots of the match, where it is a recording.
     """
     whole = place.key == place.match
+    first, last = find_shot_at_frame(place.first, shots) or (place.first, place.last)
     states = [
         [group.key, *group.state]
         for group in groups
         if (frame := parse_frame_number(group.key)) is not None
-        and (whole or place.first <= frame <= place.last)
+        and (whole or first <= frame <= last)
     ]
-    followed = list_run_states(runs, place.first, place.last)
+    followed = list_run_states(runs, first, last)
     said = [followed] if followed else []
     return digest_json([TRACK_VERSION, SOLVER_VERSION, policy.hash, states, *said])

@@ -190,7 +190,7 @@ def gather_stretches(
             key, beside = name, list[AcceptedRunObservation]()
             if match.recorded:
                 first, last = rows[0].instant.frame, rows[-1].instant.frame
-                first, last = _find_shot_at_frame(first, of_match) or (first, last)
+                first, last = find_shot_at_frame(first, of_match) or (first, last)
                 key = f"{name} {first}-{last}"
                 every = (followed or {}).get(name, ())
                 beside = [one for one in every if first <= one.frame <= last]
@@ -313,7 +313,7 @@ def _split_into_stretches(
     for row in match.rows:
         frame = row.instant.frame
         if match.recorded and shots:
-            here: object = _find_shot_at_frame(frame, shots)
+            here: object = find_shot_at_frame(frame, shots)
             new = here is None or here != place
             place = here
         else:
@@ -332,7 +332,7 @@ def _split_into_stretches(
     return parts
 
 
-def _find_shot_at_frame(
+def find_shot_at_frame(
     frame: int, shots: Sequence[tuple[int, int]] | None
 ) -> tuple[int, int] | None:
     """The shot that a frame is of; None: none, as in a transition."""

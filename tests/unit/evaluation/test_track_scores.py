@@ -95,6 +95,23 @@ class TestEvaluateTracks:
         assert value(found, "all", "mae_m") == pytest.approx(0.1)
         assert found.counts["track_frames_compared"] == 40
 
+    @pytest.mark.parametrize("rate", [50, 100])
+    def test_of_several_predictions_of_a_frame_the_nearest_in_time_is_compared(
+        self, rate: int
+    ) -> None:
+        times = np.arange(TIMES[0] - 0.1, TIMES[-1], 1 / rate)
+        x = np.interp(times, TIMES, PLACES[:, 0])
+        dense = PredictedTrack(
+            (None,) * len(times),
+            tuple(times.tolist()),
+            tuple((float(at), 0.0, -1.0) for at in x),
+            (None,) * len(times),
+            None,
+        )
+        found = evaluate_tracks([TRUTH], {"": dense})
+        assert value(found, "all", "mae_m") == pytest.approx(0, abs=1e-9)
+        assert found.counts["predicted_frames_without_truth"] < len(times) / 3
+
 
 class TestJoins:
     """What misses is counted and named."""

@@ -12,6 +12,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.groups.submit import load_group_state
+from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.tracks.around import AROUND, compute_track_excerpt, find_tracks_of_group
 from app.features.tracks.codec import TrackInputs, make_partial_track
 from app.features.tracks.making import read_export_records
@@ -142,3 +143,15 @@ class TestTracksOfGroup:
         assert find_tracks_of_group(store, flight[7]) == []
         with pytest.raises(NotFoundError):
             find_tracks_of_group(store, 999)
+
+
+def test_who_does_not_see_all_groups_is_told_of_no_track(
+    store: Store, flight: list[int], track: int
+) -> None:
+    assert [one.track.id for one in find_tracks_of_group(store, flight[AT])] == [track]
+    dataset = list_tracks(store, "demo")[0].dataset_id
+    token = READER.set(RestrictedReader("bo", {dataset: frozenset({1})}, lambda _: False))
+    try:
+        assert find_tracks_of_group(store, flight[AT]) == []
+    finally:
+        READER.reset(token)

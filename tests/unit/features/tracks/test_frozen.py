@@ -13,10 +13,20 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
+from app.features.datasets.service import read_dataset_head
 from app.features.exports.service import export_dataset
 from app.features.integrity.records import examine_versions
 from app.features.tracks.codec import TRACK_VERSION, recompute_frozen_track
-from app.features.tracks.service import TrackReview, list_tracks, make_tracks, review_track
+from app.features.tracks.export import TrackSource, parse_frozen_track
+from app.features.tracks.making import read_export_records
+from app.features.tracks.queries import read_groups_by_match
+from app.features.tracks.service import (
+    TrackReview,
+    collect_accepted_tracks,
+    list_tracks,
+    make_tracks,
+    review_track,
+)
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, decode_frozen_json, read_frozen
@@ -151,6 +161,30 @@ class TestExport:
             ]
             == 1
         )
+
+    def test_every_frozen_track_goes_out_as_it_was_whichever_groups_and_shots_there_are(
+        self, store, accepted
+    ) -> None:
+        """Of a track no group has to be in the version, and its recording may have other shots by then."""
+        with store.read() as session:
+            head = read_dataset_head(session, "demo")
+            (value,) = collect_accepted_tracks(session, head).values()
+            groups = read_groups_by_match(session, head.id, None)["rig"]
+            some = [*read_export_records(session, groups[:20])]
+        inputs = {**value["inputs"], "times": [time / 2 for time in value["inputs"]["times"]]}
+        other = parse_frozen_track("final 0-99", {**value, "match": "final", "inputs": inputs})
+        known = [parse_frozen_track("rig", value), other]
+        for records in ([], some):
+            source = TrackSource("demo", head.policy, {"final": [(0, 9)]}, known, frozen=True)
+            written = [*source.make_track_records(records)]
+            assert [(one.key, len(one.track.frames)) for one in written] == [
+                ("final 0-99", 60),
+                ("rig", 60),
+            ]
+            assert [one.rate for one in written] == [pytest.approx(50), 25]
+            assert [fact["measurements"] for fact in source.facts] == [
+                len(other.inputs.measurements)
+            ] * 2
 
 
 class TestCheck:

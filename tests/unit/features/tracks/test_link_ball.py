@@ -22,6 +22,7 @@ from app.features.recordings.service import get_recording
 from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
 from app.features.tracks.link_ball import _iterate_balls_of_groups, read_tracked_ball_positions
 from app.features.tracks.queries import insert_track
+from app.features.tracks.service import TrackReview, list_tracks, review_track
 from app.features.tracks.stored import TrackSummary, compute_track_stamp
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical_json_text
@@ -194,6 +195,16 @@ class TestOfTracks:
         recording, shot = get_recording(store, 1), get_link(store, 1, 1).live
         assert read_tracked_ball_positions(store, recording, shot, 1) == {}
         assert len(read_tracked_ball_positions(store, recording, shot, 2)) == LIVE
+
+    def test_a_track_that_a_person_rejected_says_nothing(
+        self, api: Any, store: Store, link: str
+    ) -> None:
+        insert_track_of(store, made_ball(8.0, seed=3), np.arange(LIVE) / FPS)
+        recording, shot = get_recording(store, 1), get_link(store, 1, 1).live
+        assert len(read_tracked_ball_positions(store, recording, shot, 1)) == LIVE
+        (track,) = list_tracks(store, recording.dataset_id)
+        review_track(store, track.id, TrackReview("rejected"), track.etag, actor="ann")
+        assert read_tracked_ball_positions(store, recording, shot, 1) == {}
 
 
 def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str = "final") -> None:

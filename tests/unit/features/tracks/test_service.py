@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +16,8 @@ from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.solutions.service import solve_dataset
+from app.features.tracks import service
+from app.features.tracks.queries import GroupStateForTracking
 from app.features.tracks.service import (
     MadeTracks,
     Track,
@@ -24,9 +28,11 @@ from app.features.tracks.service import (
     read_track_detail,
     review_track,
 )
+from app.features.tracks.stored import compute_track_stamp, summarize_track
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
+from app.soccer.policy import PAPER
 from app.tracking.ball_track import EventCorrection
 from tests.flights import FIRST, flight_groups, places
 from tests.unit.features.tracks.test_stretches import recorded
@@ -179,8 +185,30 @@ class TestStretchesThatChange:
         import_groups(store, "demo", flight_groups(62)[60:], source="test", actor="ann")
         assert only(store).stale
 
+    def test_groups_that_its_shot_gained_or_lost_make_a_track_stale(self) -> None:
+        groups = [
+            GroupStateForTracking(f"final/{frame}.png", ("hash", True, False))
+            for frame in (*range(20), 30)
+        ]
+        place = SimpleNamespace(key="final 0-19", match="final", first=0, last=19)
+
+        def stamp(of: Sequence[GroupStateForTracking], *shots: tuple[int, int]) -> str:
+            return compute_track_stamp(PAPER, of, place, (), shots)
+
+        made = stamp(groups[:20], (0, 40))
+        assert made == stamp(groups[:20]) == stamp(groups, (0, 25), (26, 40))
+        assert made != stamp(groups, (0, 40))
+        assert made != stamp(groups[:20], (0, 9), (10, 40))
+
 
 class TestWarnings:
+    def test_they_are_of_the_track_as_it_is_corrected(self, store, flight) -> None:
+        make(store)
+        track = only(store)
+        ball = read_track_detail(store, track.id).ball
+        like = replace(track.summary, unused={"not solved": 2}, warnings=["of another time"])
+        assert summarize_track(ball, like).warnings == ["Not measured: 2 balls (not solved)."]
+
     def test_a_run_that_fits_no_ball_is_named_beside_a_good_one(self, store, fill) -> None:
         groups = flight_groups(60)
         far = [replace(item, key=str(FIRST + 200 + at)) for at, item in enumerate(groups[:20])]
@@ -252,6 +280,18 @@ class TestChangeTrack:
         ) as error:
             change(store, TrackReview(corrections=(EventCorrection(3, "out", True),)))
         assert error.value.pointer == "/corrections/0/frame"
+
+    def test_what_is_corrected_and_accepted_at_once_is_judged_as_it_becomes(
+        self, store, flight, monkeypatch
+    ) -> None:
+        make(store)
+        monkeypatch.setattr(
+            service, "summarize_track", lambda _, like: replace(like, reason="too little is seen")
+        )
+        asked = TrackReview("accepted", corrections=(EventCorrection(FIRST + 9, "kick", True),))
+        with pytest.raises(ConflictError, match="has no track"):
+            change(store, asked)
+        assert only(store).verdict is None
 
     def test_two_people_do_not_overwrite_each_other(self, store, flight) -> None:
         make(store)

@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.tracks.codec import TrackInputs, make_track
-from app.features.tracks.making import format_unused_balls
+from app.features.tracks.stored import format_unused_balls
 from app.features.tracks.stretches import (
     RATE,
     Stretch,
