@@ -120,13 +120,12 @@ def _read_rows(
                 boxed["conf"] = ""
             yield line - 1, boxed
         return
-    first = content[:65536].split(b"\n", 1)[0]
-    delimiter = max(",;\t", key=lambda sign: first.count(sign.encode()))
+    delimiter, _ = _read_header(content)
     for line, cells in read_rows(content, shown, (), limits, delimiter=delimiter):
         yield (
             line,
             {
-                re.sub(r"[\s.-]+", "_", name.strip().lower()): (
+                _plain_column_name(name): (
                     text.replace(",", ".")
                     if delimiter != "," and _DECIMAL_COMMA.fullmatch(text)
                     else text
@@ -134,6 +133,17 @@ def _read_rows(
                 for name, text in cells.items()
             },
         )
+
+
+def _read_header(content: bytes) -> tuple[str, list[str]]:
+    """What stands between the cells of a table, and the plain names of its columns."""
+    first = content[:65536].split(b"\n", 1)[0].decode("utf-8-sig", "replace")
+    delimiter = max(",;\t", key=first.count)
+    return delimiter, [_plain_column_name(name.strip('"\r ')) for name in first.split(delimiter)]
+
+
+def _plain_column_name(name: str) -> str:
+    return re.sub(r"[\s.-]+", "_", name.strip().lower())
 
 
 def _find_column_problem(columns: Iterable[str]) -> str | None:
@@ -246,8 +256,7 @@ _MOST_FRAME = 2**31
 
 def is_ball_track_table(content: bytes) -> bool:
     """Whether a CSV is of balls in 3D over time, by its header."""
-    header = content[:4096].split(b"\n", 1)[0].decode("utf-8", "replace").lower()
-    return set(_PLACE) <= {name.strip() for name in header.split(",")}
+    return set(_PLACE) <= {*_read_header(content)[1]}
 
 
 def read_tracks(
@@ -292,10 +301,14 @@ def _process_track_rows(
     add: Callable[[Mapping[str, str]], object],
 ) -> None:
     """Hand on the rows of a table; what is wrong with one is noted."""
-    shown = tree.shown(name)
-    for line, row in read_rows(tree.read_bytes(name), shown, columns, limits):
-        if "frame" not in row and "time_s" not in row:
-            raise DatasetFormatError(shown, None, "frame", "is missing, and so is time_s")
+    shown, content = tree.shown(name), tree.read_bytes(name)
+    there = _read_header(content)[1]
+    missing = [column for column in columns if column not in there]
+    if missing:
+        raise DatasetFormatError(shown, None, missing[0], "is missing from the columns")
+    if not {"frame", "time_s"} & {*there}:
+        raise DatasetFormatError(shown, None, "frame", "is missing, and so is time_s")
+    for line, row in _read_rows(content, shown, limits):
         report.read += 1
         with report_invalid_record(report, shown, f"line {line}"):
             add(row)

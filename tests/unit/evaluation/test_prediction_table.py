@@ -63,6 +63,20 @@ class TestReadTracks:
         assert (track.frames, track.times, track.sigma) == ((None,), (0.04,), ((0.1, 0.2, 0.3),))
 
     @pytest.mark.parametrize(
+        "text",
+        [
+            "Frame;Time_S;X_m;Y_m;Z_m;Sigma_m\n5;0,2;1,5;-2;-1;0,1\n",
+            '"frame"\t"time_s"\t"x_m"\t"y_m"\t"z_m"\t"sigma_m"\r\n5\t0.2\t1.5\t-2\t-1\t0.1\r\n',
+        ],
+    )
+    def test_it_is_read_as_spreadsheets_save_it(self, tmp_path: Path, text: str) -> None:
+        path = tmp_path / "mine.csv"
+        path.write_bytes(text.encode())
+        track = only(path)
+        assert (track.frames, track.times, track.position) == ((5,), (0.2,), ((1.5, -2.0, -1.0),))
+        assert track.sigma == ((0.1, 0.1, 0.1),)
+
+    @pytest.mark.parametrize(
         ("row", "words"),
         [
             ("1,0,1,2", "z_m"),
