@@ -240,7 +240,7 @@ def _track_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
     track, sigmas = record.track, position_sigma(record.track.covariance)
     for row, (frame, time) in enumerate(zip(track.frames, track.times, strict=True)):
         place = track.position[row].tolist()
-        cameras = " ".join(track.views[row])
+        cameras = " ".join(name.replace(" ", "_") for name in track.views[row])
         yield int(frame), float(time), *place, float(sigmas[row]), track.state[row], cameras
 
 

@@ -84,6 +84,12 @@ class TestWriteTracks:
             "x_m": "1.5", "y_m": "-2.0", "z_m": "-0.11", "sigma_s": "0.01",
         }  # fmt: skip
 
+    def test_names_with_spaces_are_one_word_each(self, tmp_path: Path) -> None:
+        named = replace(track(), views=(("cup final", "cup final link 3"), (), (), ()))
+        write_tracks(tmp_path, [TrackRecord("cup", named, Pitch(), 25.0)])
+        first = rows(tmp_path / "ball.csv")[0]
+        assert first["cameras"].split(" ") == ["cup_final", "cup_final_link_3"]
+
     def test_without_pyarrow_there_is_no_parquet_and_all_else(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
