@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { sentenceOf } from '../api/problem.js';
 import { postVersion, previewFreeze } from '../api/versions.js';
 import { withValue } from '../lib/field.js';
-import { count, sharePercent, words } from '../lib/format.js';
+import { count, plural, sharePercent, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
 import { FormDialog } from './dialog.js';
@@ -70,11 +70,14 @@ export function splitTexts(splits) {
 /** @param {{plan: FreezePlan, split: SplitRequest}} props */
 function Plan({ plan, split }) {
 	const left = Object.entries(plan.left_out);
+	const stale = plan.stale_tracks.length;
 	return html`
 		<div class="bulk__outcome" role="status">
 			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included${plan.groups ? html`: ${splitTexts(plan.splits).join(', ')}` : ''}.</p>
 			${split.kind === 'match' && plan.groups ? html`<p class="note">All groups of a match are in the same split, so the share of groups can differ a little from the share of matches.</p>` : null}
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
+			${plan.tracks ? html`<p>${plural(plan.tracks, 'track')} of the ball ${plan.tracks === 1 ? 'is' : 'are'} included.</p>` : null}
+			${stale ? html`<p data-grade="warn">${plural(stale, 'accepted track')} ${stale === 1 ? 'stays' : 'stay'} out, as groups have changed since (${plan.stale_tracks.slice(0, 5).join(', ')}${stale > 5 ? ', …' : ''}). Make the tracks again and accept them first.</p>` : null}
 			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
 	`;

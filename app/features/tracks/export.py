@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.media.video import MAX_FRAMES
 from app.soccer.policy import Policy
 from app.tracking.ball_track import BallTrack, EventCorrection
 
@@ -68,7 +70,7 @@ class TrackSource:
     Attributes:
         dataset: Name of the dataset.
         policy: Says how noisy clicks and cameras are.
-        shots: Of its recordings.
+        shots: Of its recordings; of a frozen version none, as they may be others by now.
         known: What is stored of stretches, or frozen.
         followed: Balls of accepted runs, by match.
         frozen: Whether it is a frozen version's tracks that are known: they are written as they are, and
@@ -95,7 +97,8 @@ class TrackSource:
             InputError: No groups follow each other in time, or no stretch has a track; with the reasons.
         """
         taken = (item for item in records if self.everything or item.verdict != "rejected")
-        stretches = gather_stretches(taken, self.policy, self.shots, self.followed)
+        shots = _cut_at_frozen_tracks(self.known) if self.frozen else self.shots
+        stretches = gather_stretches(taken, self.policy, shots, self.followed)
         if self.frozen:
             stretches = _restore_frozen_stretches(self.known, stretches)
         require_any_stretch(self.dataset, stretches)
@@ -142,6 +145,20 @@ class TrackSource:
         )
 
 
+def _cut_at_frozen_tracks(known: Iterable[StoredStretchTrack]) -> dict[str, list[tuple[int, int]]]:
+    """Frames of recordings cut into those of frozen tracks and those between them, by match."""
+    tracks: dict[str, list[StoredStretchTrack]] = {}
+    for stored in known:
+        tracks.setdefault(stored.match, []).append(stored)
+    found = {}
+    for match, of_match in tracks.items():
+        edges = {0, MAX_FRAMES}
+        for stored in of_match:
+            edges |= {stored.first, stored.last + 1}
+        found[match] = [(first, end - 1) for first, end in pairwise(sorted(edges))]
+    return found
+
+
 def _restore_frozen_stretches(
     known: Iterable[StoredStretchTrack], stretches: Sequence[Stretch]
 ) -> list[Stretch]:
@@ -149,8 +166,7 @@ def _restore_frozen_stretches(
 
     Args:
         known: The frozen tracks.
-        stretches: Of the groups of the version as the shots of recordings are now: cameras, and balls that are no
-            measurement, are theirs.
+        stretches: Of the groups of the version, cut at those: cameras, and balls that are no measurement, are theirs.
     """
     found, left = [], [*stretches]
     for stored in known:
@@ -163,6 +179,10 @@ def _restore_frozen_stretches(
         ]
         left = [one for one in left if one not in inside]
         found.append(_restore_frozen_stretch(stored, stored.inputs, inside))
+    left = [
+        one if one.key == one.match else replace(one, key=f"{one.match} {one.first}-{one.last}")
+        for one in left
+    ]
     return sorted([*found, *left], key=lambda one: (one.match, one.first))
 
 

@@ -225,23 +225,33 @@ def _solve_track_change(
 def collect_accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
     """The tracks of a dataset that people accepted as its groups are now, by stretch, each with all that it
     was computed from (``codec.frozen_track_to_json``)."""
+    found = {}
+    for track in list_accepted_tracks(session, dataset):
+        if not track.stale:
+            body = read_track_bodies(session, [track.id])[track.id]
+            whole, ball = _build_ball_track(body, track.corrections)
+            found[track.key] = frozen_track_to_json(track.match, whole, ball)
+    return found
+
+
+def list_accepted_tracks(session: Session, dataset: DatasetHead) -> list[Track]:
+    """The tracks of a dataset that people accepted, also those that are stale since."""
     rows = [row for row in list_track_rows(session, dataset.id) if row.verdict == "accepted"]
     groups = (
         read_group_states_by_match(session, dataset.id, {row.match for row in rows}) if rows else {}
     )
     runs = list_accepted_runs(session, dataset.id) if rows else {}
     shots = read_recording_shots(session, dataset.id) if rows else {}
-    found = {}
-    for row in rows:
-        of_match = groups.get(row.match, ()), runs.get(row.match, ()), shots.get(row.match)
-        track = build_track_from_row(row, dataset.policy, *of_match)
-        if track.stale:
-            continue
-        whole, ball = _build_ball_track(
-            read_track_bodies(session, [row.id])[row.id], track.corrections
+    return [
+        build_track_from_row(
+            row,
+            dataset.policy,
+            groups.get(row.match, ()),
+            runs.get(row.match, ()),
+            shots.get(row.match),
         )
-        found[row.key] = frozen_track_to_json(row.match, whole, ball)
-    return found
+        for row in rows
+    ]
 
 
 def make_track_source(
@@ -263,12 +273,11 @@ def make_track_source(
         frozen: The tracks of a frozen version by stretch (``codec.frozen_track_to_json``); None: the dataset
             is exported as it is.
     """
-    shots = read_recording_shots(session, dataset_id)
-    if frozen:
-        tracks = [parse_frozen_track(key, value) for key, value in frozen.items()]
-        return TrackSource(dataset, policy, shots, tracks, frozen=True)
     if frozen is not None:
-        return TrackSource(dataset, policy, shots)
+        # A version knows no shots: those of its recordings may be others by now.
+        tracks = [parse_frozen_track(key, value) for key, value in frozen.items()]
+        return TrackSource(dataset, policy, {}, tracks, frozen=bool(tracks))
+    shots = read_recording_shots(session, dataset_id)
     rows = list_track_rows(session, dataset_id)
     bodies = read_track_bodies(session, [row.id for row in rows if row.verdict == "accepted"])
     known = []

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import Any
+from typing import Any, Literal
 
 from app.db.json_columns import Json, parse_json_column
 from app.db.session import Session
@@ -18,6 +18,8 @@ from app.features.versions.service import Version, read_version
 from app.soccer.codec import policy_to_json
 from app.wording import plural
 
+MOST_NAMED = 5
+"""Tracks that a sentence names."""
 NEW, GONE = "not in the dataset", "no longer in the dataset"
 
 
@@ -42,10 +44,19 @@ class BallMove:
 
 @dataclass(frozen=True)
 class ChangedGroup:
-    """A group of both versions: ``what`` of annotations, verdict, split and ball is another."""
+    """A group of both versions: ``what`` of annotations, verdict, split and ball is another; of one that is in
+    neither, but was judged, its verdict."""
 
     group: str
     what: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ChangedTrack:
+    """A track of the ball that was ``added``, ``dropped`` or ``changed``."""
+
+    stretch: str
+    what: Literal["added", "dropped", "changed"]
 
 
 @dataclass(frozen=True)
@@ -69,12 +80,13 @@ class VersionDiff:
     changed: tuple[ChangedGroup, ...]
     settings: tuple[ChangedSetting, ...]
     unchanged: int
+    tracks: tuple[ChangedTrack, ...] = ()
 
     def to_values(self, most: int | None = None) -> dict[str, Any]:
         """Everything as plain values; each list with at most so many, all are counted."""
         lists = {
             name: [asdict(item) for item in getattr(self, name)[:most]]
-            for name in ("added", "dropped", "moved", "changed", "settings")
+            for name in ("added", "dropped", "moved", "changed", "settings", "tracks")
         }
         counts = {name: len(getattr(self, name)) for name in lists}
         return {
@@ -110,7 +122,14 @@ def compute_version_diff(session: Session, older: Version, newer: Version) -> Ve
     )
     both = [key for key, row in after.items() if row.member and _is_member(before, key)]
     changes = (_compare_group(before[key], after[key]) for key in both)
-    changed = [change for change in changes if change.what]
+    judged = (
+        ChangedGroup(key, ("verdict",))
+        for key, row in after.items()
+        if key in before
+        and not (row.member or before[key].member)
+        and row.verdict != before[key].verdict
+    )
+    changed = [*(change for change in changes if change.what), *judged]
     moved = [
         move for key in both if (move := _compute_ball_move(before[key], after[key])) is not None
     ]
@@ -123,7 +142,8 @@ def compute_version_diff(session: Session, older: Version, newer: Version) -> Ve
         moved=tuple(sorted(moved, key=lambda item: -item.metres)),
         changed=tuple(changed),
         settings=tuple(_iterate_changed_settings(older, newer)),
-        unchanged=len(both) - len(touched),
+        unchanged=len({*both} - touched),
+        tracks=_compare_tracks(older.tracks, newer.tracks),
     )
 
 
@@ -160,6 +180,12 @@ def describe_diff(diff: VersionDiff) -> list[str]:
             f"{plural(len(metres), 'ball')} moved, by {median(metres):.3f} m in the median and "
             f"{metres[0]:.3f} m at most."
         )
+    for what in ("added", "dropped", "changed"):
+        named = [item.stretch for item in diff.tracks if item.what == what]
+        if named:
+            more = ", …" if len(named) > MOST_NAMED else ""
+            names = ", ".join(named[:MOST_NAMED])
+            lines.append(f"{plural(len(named), 'track')} of the ball {what} ({names}{more}).")
     lines += [
         f"{item.name}: {_format_setting(item.before)} before, {_format_setting(item.after)} now."
         for item in diff.settings
@@ -218,6 +244,18 @@ def _compare_group(before: Any, after: Any) -> ChangedGroup:
         "ball": (before.ball is None) != (after.ball is None),
     }
     return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
+
+
+def _compare_tracks(older: Mapping[str, str], newer: Mapping[str, str]) -> tuple[ChangedTrack, ...]:
+    found = []
+    for key in sorted({*older, *newer}):
+        if key not in older:
+            found.append(ChangedTrack(key, "added"))
+        elif key not in newer:
+            found.append(ChangedTrack(key, "dropped"))
+        elif older[key] != newer[key]:
+            found.append(ChangedTrack(key, "changed"))
+    return tuple(found)
 
 
 def _compute_ball_move(before: Any, after: Any) -> BallMove | None:

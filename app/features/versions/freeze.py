@@ -33,7 +33,7 @@ from app.features.solutions.queries import (
     read_calibration_bodies,
     read_current_solution_bodies,
 )
-from app.features.tracks.service import collect_accepted_tracks
+from app.features.tracks.service import collect_accepted_tracks, list_accepted_tracks
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     SOLUTION,
@@ -110,12 +110,16 @@ class FreezePlan:
         splits: How many of the groups would be in each split; ``none``: in no split, or in two.
         left_out: Why the other groups do not enter.
         unsolved: How many of the groups that enter have to be solved first.
+        tracks: How many accepted tracks of the ball enter.
+        stale_tracks: Names of the accepted ones that do not, for groups have changed since.
     """
 
     groups: int
     splits: Mapping[str, int]
     left_out: Mapping[str, int]
     unsolved: int
+    tracks: int = 0
+    stale_tracks: tuple[str, ...] = ()
 
 
 def plan_freeze(
@@ -134,6 +138,7 @@ def plan_freeze(
         found = read_dataset_head(session, dataset)
         _require_unused_name(session, found, request.name)
         candidates = read_candidates(session, found.id, request.groups)
+        tracks = list_accepted_tracks(session, found)
     if strict:
         require_solved(candidates, found.name)
         _require_any_member(found, candidates, request.groups)
@@ -147,6 +152,8 @@ def plan_freeze(
         splits=dict(sorted(sides.items())),
         left_out=_count_reasons(candidates),
         unsolved=sum(item.unsolved for item in candidates),
+        tracks=sum(not track.stale for track in tracks),
+        stale_tracks=tuple(track.key for track in tracks if track.stale),
     )
 
 

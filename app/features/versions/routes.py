@@ -29,6 +29,7 @@ from app.features.versions import service as versions
 from app.features.versions.diff import (
     BallMove,
     ChangedSetting,
+    ChangedTrack,
     MembershipChange,
     diff_versions,
     make_version_changelog,
@@ -234,6 +235,7 @@ class VersionDiffDocument(BaseModel):
     moved: list[BallMoveDocument] = Field(description="The farthest first.")
     changed: list[ChangedGroupDocument]
     settings: list[ChangedSetting]
+    tracks: list[ChangedTrack] = Field(description="Tracks of the ball, by stretch.")
 
 
 router = APIRouter(tags=["versions"], route_class=Route)

@@ -28,7 +28,8 @@ from app.features.tracks.service import (
     review_track,
 )
 from app.features.versions import verify as verify_module
-from app.features.versions.freeze import FreezeRequest, freeze_dataset
+from app.features.versions.diff import diff_versions
+from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.frozen_queries import compress_text, decode_frozen_json, read_frozen
 from app.features.versions.service import Version
 from app.features.versions.verify import verify_version
@@ -196,3 +197,23 @@ class TestCheck:
             session.execute(text("DELETE FROM frozen WHERE key LIKE 'track:%'"))
         (wrong,) = [item for item in examine_versions(store) if not item.ok]
         assert (version.name in wrong.sentence, "1 of its tracks" in wrong.sentence) == (True, True)
+
+
+class TestDiff:
+    def test_tracks_that_came_and_went_are_named(self, store, accepted) -> None:
+        versions = [frozen(store)]
+        (track,) = list_tracks(store, "demo")
+        review_track(store, track.id, TrackReview("none"), track.etag, actor="ben")
+        versions.append(frozen(store, "v2"))
+        for one, other, what in ((0, 1, "dropped"), (1, 0, "added")):
+            diff = diff_versions(store, versions[one].id, versions[other].id)
+            assert diff.to_values()["tracks"] == [{"stretch": "rig", "what": what}]
+            assert diff.to_values()["lines"][1:] == [f"1 track of the ball {what} (rig)."]
+
+    def test_a_plan_names_accepted_tracks_that_would_stay_out(self, store, accepted) -> None:
+        request = FreezeRequest("v1", groups="passing")
+        plan = plan_freeze(store, "demo", request)
+        assert (plan.tracks, plan.stale_tracks) == (1, ())
+        move(store, accepted[4], 2.0)
+        plan = plan_freeze(store, "demo", request)
+        assert (plan.tracks, plan.stale_tracks) == (0, ("rig",))

@@ -56,7 +56,10 @@ class TestFreezeVersion:
         body = {"name": "v1", "groups": "passing", "dry_run": True}
         answer = api.post(f"{API}/datasets/broadcast/versions", json=body)
         assert answer.status_code == 200
-        assert answer.json() == {"groups": 3, "splits": {"train": 3}, "left_out": {}, "unsolved": 0}
+        assert answer.json() == {
+            "groups": 3, "splits": {"train": 3}, "left_out": {}, "unsolved": 0, "tracks": 0,
+            "stale_tracks": [],
+        }  # fmt: skip
         assert services.jobs.find() == []
 
     def test_an_impossible_freeze_is_refused_before_a_job_starts(self, api, version) -> None:
