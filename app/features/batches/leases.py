@@ -38,7 +38,11 @@ from app.features.batches.service import WORK, Batch, BatchRole, Presence, read_
 from app.features.independent_annotations.adopt import log_and_notify_return, strip_and_check_reason
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
-from app.features.people.visibility_queries import has_hidden_groups
+from app.features.people.visibility_queries import (
+    READER,
+    has_hidden_groups,
+    is_hidden_from_reader,
+)
 
 LASTS = timedelta(minutes=3)
 """A lease whose page says nothing ends after this."""
@@ -169,7 +173,7 @@ class LeaseService:
             own = find_own_annotation(session, batch, group, worker.name)
             if own is not None:
                 return _make_lease_of_copy(session, batch, own, worker)
-            _require_group_access(session, batch, group, worker)
+            _require_group_access(session, batch, group)
             parts, row = (
                 _require_batch_roles(batch, worker),
                 _require_batch_group(session, batch, group),
@@ -190,6 +194,11 @@ class LeaseService:
         with self._store.write(lasting=False) as session:
             batch = hide_others_progress(session, read_batch(session, batch_id, with_here=False))
             end_person_lease(session, batch_id, group, worker.name)
+            if find_own_annotation(session, batch, group, worker.name) is None and (
+                find_batch_group(session, batch_id, group) is None
+                or _is_hidden_from_reader(session, batch, group)
+            ):
+                return Lease(batch, None)
             return Lease(
                 batch, group, here=_read_presences(session, batch, group, self._current_time_text())
             )
@@ -215,7 +224,7 @@ class LeaseService:
             return lease
         with self._store.write() as session:
             batch = _read_open_batch(session, batch_id)
-            _require_group_access(session, batch, group, worker)
+            _require_group_access(session, batch, group)
             row = _require_batch_group(session, batch, group)
             if BatchRole.ANNOTATOR not in worker.roles_in_batch(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
@@ -250,6 +259,7 @@ class LeaseService:
         checked = strip_and_check_reason(reason)
         with self._store.write() as session:
             batch = _read_open_batch(session, batch_id)
+            _require_group_access(session, batch, group)
             row = _require_batch_group(session, batch, group)
             if row.settled is not None:
                 raise ConflictError(
@@ -386,18 +396,21 @@ def _choose_batch_role(parts: set[BatchRole], row: WaitingGroup) -> BatchRole:
     return BatchRole.REVIEWER
 
 
-def _require_group_access(session: Session, batch: Batch, group: int, worker: BatchMember) -> None:
-    """Who works on copies that tell nothing of their originals does not open these by the batch.
+def _require_group_access(session: Session, batch: Batch, group: int) -> None:
+    """Who works on copies that tell nothing of their originals opens these by no batch.
 
     Raises:
         NotFoundError: As of a group that is not in it.
     """
-    if not has_hidden_groups(batch.dataset_id) or not makes_own_annotations(
-        batch, worker.roles_in_batch(batch)
-    ):
-        return
-    if group not in list_returned_groups(session, batch, worker.name):
+    if _is_hidden_from_reader(session, batch, group):
         raise _make_group_not_found_error(batch, group)
+
+
+def _is_hidden_from_reader(session: Session, batch: Batch, group: int) -> bool:
+    reader = READER.get()
+    if reader is None or not has_hidden_groups(batch.dataset_id):
+        return False
+    return is_hidden_from_reader(session, reader, batch.dataset_id, group=group)
 
 
 def _make_group_not_found_error(batch: Batch, group: int) -> NotFoundError:

@@ -16,7 +16,9 @@ from app.features.groups.replay import apply_entry
 from app.features.groups.state import require_group
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.people.visibility_queries import (
+    COPIES,
     hides_groups_from_reader,
+    sees_independent_work,
     show_entries_under_aliases,
 )
 from app.soccer.group import Group, View
@@ -56,6 +58,10 @@ class EntryChanges:
     first: bool
 
 
+ABOUT_COPIES = frozenset({"take", "agreement"})
+"""Kinds of entries that say what people made of a group independently."""
+
+
 def read_history(store: Store, group_id: int) -> list[LogEntry]:
     """Everything that was said about a group and changed of its static cameras, oldest first.
 
@@ -67,6 +73,12 @@ def read_history(store: Store, group_id: int) -> list[LogEntry]:
     with store.read() as session:
         stored = require_group(session, group_id)
         entries = show_entries_under_aliases(session, _read_group_history(session, stored))
+        if stored.dataset_id <= COPIES and not sees_independent_work(stored.dataset_id):
+            # Whose annotations there are, and whether they agree, annotators are not to know.
+            entries = [
+                replace(entry, body=None) if entry.kind in ABOUT_COPIES else entry
+                for entry in entries
+            ]
         if not hides_groups_from_reader():
             return entries
         return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]

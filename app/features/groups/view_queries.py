@@ -185,11 +185,12 @@ def find_dataset_of_view(session: Session, view_id: int) -> int | None:
 def find_group_and_view_ids(
     session: Session, dataset_id: int, keys: Collection[str]
 ) -> dict[str, tuple[int, dict[str, int]]]:
-    """Id of each group and of its views, by their keys."""
+    """Id of each group that whoever asks may see, and of its views, by their keys."""
     statement = (
         select(GroupModel.key, GroupModel.id, ViewModel.key, ViewModel.id)
         .join(ViewModel, ViewModel.group_id == GroupModel.id)
         .where(GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys))
+        .where(*visible_groups_condition(dataset_id, GroupModel.id))
     )
     found: dict[str, tuple[int, dict[str, int]]] = {}
     for group, group_id, view, view_id in session.execute(statement):
@@ -272,8 +273,21 @@ def save_station(
 
 def list_groups_of_station(session: Session, station_id: int) -> list[int]:
     """Ids of the groups that a station's views belong to."""
-    statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id).distinct()
-    return list(session.scalars(statement.order_by(ViewModel.group_id)))
+    return _list_groups_of_station(session, station_id)
+
+
+def list_visible_groups_of_station(session: Session, dataset_id: int, station_id: int) -> list[int]:
+    """Those of them that whoever asks may see."""
+    return _list_groups_of_station(
+        session, station_id, *visible_groups_condition(dataset_id, ViewModel.group_id)
+    )
+
+
+def _list_groups_of_station(
+    session: Session, station_id: int, *where: ColumnElement[bool]
+) -> list[int]:
+    statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id, *where)
+    return list(session.scalars(statement.distinct().order_by(ViewModel.group_id)))
 
 
 def list_station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:

@@ -93,7 +93,7 @@ class StationDetail(BaseModel):
                 "has_given": station.given is not None,
                 "has_given_covariance": station.given_covariance is not None,
                 "lines": lines_to_document(station.lines),
-                "groups": len(state.groups),
+                "groups": len(state.visible_groups),
             }
         )
 
@@ -222,7 +222,7 @@ def _choose_shown_group(state: StationState, group: int | None) -> int:
     Raises:
         NotFoundError: No view of that group is from the station.
     """
-    chosen = group if group is not None else next(iter(state.groups), None)
-    if chosen is None or chosen not in state.groups:
+    chosen = group if group is not None else next(iter(state.visible_groups), None)
+    if chosen is None or chosen not in state.visible_groups:
         raise NotFoundError(f"static camera {state.station.key} has no view in that group")
     return chosen

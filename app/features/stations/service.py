@@ -32,6 +32,7 @@ from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import (
     StoredStation,
     list_groups_of_station,
+    list_visible_groups_of_station,
     read_stations,
     save_station,
 )
@@ -45,8 +46,9 @@ from app.soccer.solution import Calibration
 
 @dataclass(frozen=True)
 class StationState:
-    """A station as it is now; ``groups`` are the ids of the groups that it takes part in.
+    """A station as it is now.
 
+    ``groups`` are the ids of the groups that it takes part in, ``visible_groups`` of those that whoever asks may see.
     ``shown`` is one of them as it was saved with a step of the station.
     """
 
@@ -57,6 +59,7 @@ class StationState:
     etag: str
     station: Station
     groups: tuple[int, ...]
+    visible_groups: tuple[int, ...]
     can_undo: bool
     can_redo: bool
     stored: StoredStation
@@ -259,6 +262,9 @@ def _read_state(session: Session, station_id: int) -> StationState:
         etag=station_etag(stored),
         station=stored.station,
         groups=tuple(list_groups_of_station(session, station_id)),
+        visible_groups=tuple(
+            list_visible_groups_of_station(session, stored.dataset_id, station_id)
+        ),
         can_undo=stacks.can_undo,
         can_redo=stacks.can_redo,
         stored=stored,
