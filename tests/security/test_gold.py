@@ -365,6 +365,13 @@ class TestReviewers:
             for group in (*groups, *made.golden):
                 assert ask("rita", "GET", f"/groups/{group}").status_code == 404
             assert ask("rita", "GET", "/datasets/demo/versions").status_code == 403
+            told = {
+                ask("rita", "POST", f"/batches/{batch}/groups/{group}/return", {"reason": "mine"})
+                .json()["detail"]
+                .replace(f"group {group}", "group #")
+                for group in (*groups, made.golden[0], made.others[0], 10**6)
+            }
+            assert len(told) == 1 and "has no group #" in told.pop()
             assert ask("rita", "POST", f"/groups/{copy}/submission").status_code == 200
         assert ask("rita", "POST", f"/batches/{batch}/next", {}).json()["group"] is None
         assert ask("rita", "GET", f"/groups/{groups[0]}").status_code == 200
@@ -383,6 +390,27 @@ class TestReviewers:
         for target in ("submission", "lease"):
             at = f"/batches/{blind}/groups/{made.ordinary[3]}/{target}"
             assert ask("anna", "PUT", at, {} if target == "lease" else None).status_code == 404
+        # Nor those that another batch has, too.
+        for hidden in (made.golden[0], made.ordinary[3]):
+            at = f"/batches/{plain}/groups/{hidden}"
+            for method, target in (
+                ("PUT", "lease"),
+                ("PUT", "submission"),
+                ("DELETE", "submission"),
+            ):
+                refused = ask("anna", method, f"{at}/{target}", {} if target == "lease" else None)
+                assert refused.status_code == 404, (hidden, method, target)
+            assert ask("anna", "DELETE", f"{at}/lease").status_code == 204
+        seen = ask("anna", "GET", f"/groups/{other}").json()
+        key = ask("lea", "GET", f"/groups/{made.golden[0]}").json()["key"]
+        told = set()
+        for name in (key, "nowhere"):
+            item = {"view": seen["views"][0]["id"], "ball": {"box": BALL, "followed_from": name}}
+            body = {"if_match": "*", "items": [item]}
+            answer = ask("anna", "POST", "/datasets/demo/edits", body)
+            said = answer.json()
+            told.add((answer.status_code, said["pointer"], said["hint"]))
+        assert len(told) == 1, told
         for batch in (blind, plain):
             assert ask("lea", "PATCH", f"/batches/{batch}", {"state": "closed"}).status_code == 200
 

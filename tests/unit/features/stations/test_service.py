@@ -3,10 +3,14 @@ from __future__ import annotations
 import time
 
 import pytest
+from sqlalchemy import insert
 
+from app.db.idempotency import without_pending_response
 from app.errors import ConflictError, NotFoundError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibrationSource, SetStationLines
 from app.features.groups.submit import load_group_state
+from app.features.independent_annotations.tables import GoldModel
+from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.queue.service import list_groups
 from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.stations.service import (
@@ -94,6 +98,22 @@ class TestSubmitStation:
     def test_which_calibration_counts_is_a_switch(self, store, station) -> None:
         after = change(store, station, SetStationCalibrationSource("lines"))
         assert after.station.calibration == "lines"
+
+    def test_who_does_not_see_a_group_is_not_told_of_it_by_its_camera(
+        self, store, ids, station
+    ) -> None:
+        with store.write() as session, without_pending_response():
+            row = {"group_id": ids[0], "dataset_id": station.dataset_id, "start": "imported"}
+            session.execute(
+                insert(GoldModel).values(**row, truth=b"", marked="2026", marked_by="lea")
+            )
+        blind = RestrictedReader("bo", {station.dataset_id: frozenset()}, lambda _: False)
+        token = READER.set(blind)
+        try:
+            seen = load_station(store, station.id)
+            assert (seen.groups, seen.visible_groups) == (tuple(ids), tuple(ids[1:]))
+        finally:
+            READER.reset(token)
 
     def test_an_unknown_station_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError, match="no static camera with id 9"):
