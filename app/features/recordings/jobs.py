@@ -110,9 +110,9 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
     def report_frames_read(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
+    actor = progress.job.actor
     with leave_work_to_next_server(progress):
         if progress.job.request["shots"] and has_usable_index(store, recording):
-            actor = progress.job.actor
             detect_shots_again(
                 store,
                 recording_id,
@@ -123,7 +123,7 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
             found = get_recording(store, recording_id)
         else:
             found = index_recording_in_worker(
-                store, recording_id, progress=report_frames_read, stop=progress.check
+                store, recording_id, actor=actor, progress=report_frames_read, stop=progress.check
             )
     return {
         "recording": found.id,

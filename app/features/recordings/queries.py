@@ -171,9 +171,10 @@ def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[
 def delete_overlapping_cameras(
     session: Session, recording_id: int, first: int, last: int
 ) -> Sequence[Any]:
-    """Delete what shares a frame with a stretch; returns its rows."""
-    rows = list_tracked_stretches(session, recording_id)
-    gone = [row for row in rows if row.first <= last and first <= row.last]
+    """Delete what shares a frame with a stretch; returns its rows, with the actors as they are stored."""
+    table = ShotCamerasModel.__table__
+    mine = (table.c.recording_id == recording_id, table.c.first <= last, first <= table.c.last)
+    gone = session.execute(select(table).where(*mine).order_by(table.c.first)).all()
     ids = [row.id for row in gone]
     session.execute(delete(ShotCamerasModel).where(ShotCamerasModel.id.in_(ids)))
     return gone

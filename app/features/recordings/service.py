@@ -180,7 +180,7 @@ def set_clock_readings(
         found = validate_clock_readings(
             clocks, parse_json_column(row.facts)["frames"] if row.facts else 0
         )
-        text = canonical_json_text([asdict(clock) for clock in found]) if found else None
+        text = clock_readings_to_column(found)
         if text != row.clocks:
             update_recording(session, recording_id, clocks=text)
             what: Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
@@ -257,8 +257,18 @@ def build_recording_from_row(row: RecordingRow) -> Recording:
         problem=None if row.stamp is None else _describe_file_problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
-        clocks=tuple(MatchClockReading(**one) for one in parse_json_column(row.clocks or "[]")),
+        clocks=clock_readings_from_column(row.clocks),
     )
+
+
+def clock_readings_from_column(text: str | None) -> tuple[MatchClockReading, ...]:
+    """The readings of the match clock in a column of the table, by their frames."""
+    return tuple(MatchClockReading(**one) for one in parse_json_column(text or "[]"))
+
+
+def clock_readings_to_column(clocks: Sequence[MatchClockReading]) -> str | None:
+    """Back from ``clock_readings_from_column``; None where there are none."""
+    return canonical_json_text([asdict(clock) for clock in clocks]) if clocks else None
 
 
 def _describe_file_problem(path: Path, stamp: str) -> str | None:
