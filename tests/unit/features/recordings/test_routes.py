@@ -112,6 +112,21 @@ class TestGetFrame:
         again = api.get(f"{recording}/frames/5", params={"width": 80}, headers=tag)
         assert (again.status_code, again.content) == (304, b"")
 
+    def test_it_is_kept_only_under_an_address_that_names_the_film(
+        self, api, film: Path, recording: str, finished: Finished
+    ) -> None:
+        def caching(**asked: str) -> str:
+            answer = api.get(f"{recording}/frames/5", params=asked)
+            assert answer.status_code == 200 and answer.headers["etag"]
+            return str(answer.headers["cache-control"])
+
+        named = {"v": api.get(recording).json()["sha256"][:12]}
+        assert caching(**named) == "private, max-age=3600"
+        assert caching() == caching(v="") == caching(v=named["v"][:11]) == "private, no-cache"
+        write_video(film, "mp4v", 30)
+        finished(api.post(f"{recording}/shots"))
+        assert caching(**named) == "private, no-cache"
+
     def test_a_frame_that_is_not_there_is_said_to_be(self, api, recording: str) -> None:
         answer = api.get(f"{recording}/frames/{FRAMES}")
         assert (answer.status_code, "has no frame 60" in answer.text) == (404, True)
