@@ -30,6 +30,7 @@ from app.features.recordings.service import (
     add_recording,
     find_group_ids_by_frame,
     get_recording,
+    require_name_for_recordings,
     require_video_file,
 )
 from app.features.recordings.shots import detect_shots_again
@@ -65,8 +66,9 @@ def request_recording_import(
         NotFoundError: There is no such upload or file.
     """
     path = _resolve_video_path(settings, source)
+    require_name_for_recordings(store, dataset)
     if "upload" in source:
-        # It is read where it is, so it stays.
+        # It is read where it is, so it stays; from before there is a recording that reads it.
         mark_upload_permanent(settings, source["upload"])
     recording = add_recording(store, dataset, path, actor=actor)
     return request_index(jobs, store, recording, actor=actor)

@@ -138,10 +138,9 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
         InputError: The name of the dataset cannot be one.
     """
     with store.write() as session, without_pending_response():
-        row = find_dataset(session, dataset)
-        if row is None:
-            require_valid_name(dataset, "a dataset", pointer="/dataset")
-        number = insert_dataset(session, dataset, TOUCHLINE, actor) if row is None else int(row.id)
+        number = _find_dataset_id_or_require_name(session, dataset)
+        if number is None:
+            number = insert_dataset(session, dataset, TOUCHLINE, actor)
         known = list_names_and_paths(session, number)
         there = next((row.id for row in known if row.path == str(path)), None)
         if there is None:
@@ -150,6 +149,24 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
             there = insert_recording(session, number, name, str(path), actor=actor)
             add_audit_event(session, actor, "recording added", number, recording=there, name=name)
         return build_recording_from_row(require_recording(session, there))
+
+
+def require_name_for_recordings(store: Store, dataset: str) -> None:
+    """Require that recordings can be added to a dataset of a name, which need not be there.
+
+    Raises:
+        InputError: The name of the dataset cannot be one.
+    """
+    with store.read() as session:
+        _find_dataset_id_or_require_name(session, dataset)
+
+
+def _find_dataset_id_or_require_name(session: Session, dataset: str) -> int | None:
+    row = find_dataset(session, dataset)
+    if row is None:
+        require_valid_name(dataset, "a dataset", pointer="/dataset")
+        return None
+    return int(row.id)
 
 
 def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:

@@ -76,6 +76,19 @@ class TestAddRecording:
         assert finished(api.post(API, json=body)).result["frames"] == FRAMES
         assert api.get(f"/api/v1/uploads/{sent['id']}").json()["kept"]
 
+    def test_a_file_that_is_sent_for_a_dataset_that_cannot_be_does_not_stay(
+        self, api, film: Path
+    ) -> None:
+        kind = {"content-type": "application/octet-stream"}
+        url = "/api/v1/uploads?name=final.mp4"
+        sent = api.post(url, content=film.read_bytes(), headers=kind).json()
+        body = {"dataset": "a/b", "source": {"upload": sent["id"]}}
+        refused = api.post(API, json=body)
+        assert (refused.status_code, refused.json()["pointer"]) == (400, "/dataset")
+        upload = f"/api/v1/uploads/{sent['id']}"
+        assert not api.get(upload).json()["kept"]
+        assert api.delete(upload).status_code == 204
+
     @pytest.mark.parametrize(
         ("content", "problem"),
         [(b"", "final.mp4 is empty"), (b"no video at all", "is not a video that can be read")],
