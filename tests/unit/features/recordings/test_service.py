@@ -21,6 +21,8 @@ from app.features.imports.upload_queries import (
 from app.features.jobs.service import Jobs
 from app.features.recordings import index
 from app.features.recordings import jobs as module
+from app.features.recordings.ball_run_values import run_to_columns
+from app.features.recordings.ball_runs import remove_ball_run
 from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants
 from app.features.recordings.jobs import (
@@ -29,8 +31,9 @@ from app.features.recordings.jobs import (
     request_groups_of_instants,
     request_index,
 )
+from app.features.recordings.links import add_link, list_links, remove_link
 from app.features.recordings.match_clock import MatchClockReading, compute_match_time
-from app.features.recordings.queries import update_recording
+from app.features.recordings.queries import insert_ball_run, update_recording
 from app.features.recordings.service import (
     Recording,
     add_recording,
@@ -42,6 +45,7 @@ from app.features.recordings.service import (
     set_clock_readings,
 )
 from app.features.recordings.shots import Shot, get_shots, replace_shots
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 from tests.unit.features.jobs.steps import stopped_at_its_first_step
 from tests.videos import write_video
 from tests.waiting import SECONDS
@@ -180,6 +184,32 @@ class TestComputeMatchTime:
         assert compute_match_time([beyond], seconds, 20) is None
         clocks = [MatchClockReading(10, 1, 60.0), beyond]
         assert compute_match_time(clocks, seconds, 20) == (1, pytest.approx(60.4))
+
+
+class TestIds:
+    def test_those_of_what_was_removed_are_not_given_again(self, store: Store, film: Path) -> None:
+        def link(recording: Recording) -> int:
+            return add_link(store, (recording.id, 0, 9), (recording.id, 20, 29), actor="ann").id
+
+        def run(recording: Recording) -> int:
+            ball = FollowedBall(5, 10.0, 10.0, 9.0, 0.5, 0.9, "followed")
+            followed = BallRun((BallClick(5, 10.0, 10.0),), (ball,), "limit", "limit")
+            values = {"dataset_id": recording.dataset_id, "recording_id": recording.id}
+            values |= {"sha256": recording.sha256, **run_to_columns(followed)}
+            with store.write() as session:
+                return insert_ball_run(session, "ann", **values)
+
+        first = indexed(store, film)
+        assert (first.id, link(first), run(first)) == (1, 1, 1)
+        remove_link(store, first.id, 1, actor="ann")
+        remove_ball_run(store, first.id, 1, actor="ann")
+        assert (link(first), run(first)) == (2, 2)
+        write_video(film, "mp4v", 30)
+        first = indexed(store, film)
+        assert list_links(store, first.id) == [] and link(first) == 3
+        remove_recording(store, first.id, actor="ann")
+        second = indexed(store, film)
+        assert (second.id, link(second), run(second)) == (2, 4, 3)
 
 
 class TestRequireVideo:
