@@ -139,7 +139,7 @@ COPIES_USED = "copy_dataset"
 
 
 class UsedIdModel(Base):
-    """The largest id of a table that a deleted dataset had; ids are given once and for all."""
+    """The largest id of a table that a deleted dataset or row had; ids are given once and for all."""
 
     __tablename__ = "used_id"
 

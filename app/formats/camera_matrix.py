@@ -263,6 +263,9 @@ _DISTORTION = "k"
 MOST_CAMERAS = 100_000
 """Of one file: half a match has 75,000 frames at 25 a second. Each camera takes 1.5 KiB and 0.06 ms
 however well its numbers are compressed, so a file of a kilobyte could hold millions."""
+MOST_ROWS = 2_000_000
+"""Of a file that is written, from frame 0 on: a recording has no more frames. Rows without a camera take
+0.2 KiB each until they are compressed."""
 _NUMBERS = {"K": 9, "R": 9, "t": 3, _DISTORTION: 14}
 """Most numbers that one camera has in each array; OpenCV's longest distortion has 14."""
 _MAX_HEADER = 10_000
@@ -329,13 +332,18 @@ def cameras_to_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
         (F, 3, 3) and ``t`` (F, 3): a point X of the world is R X + t in the camera.
 
     Raises:
-        DatasetFormatError: A frame is beyond what a file may hold, or a lens is none of OpenCV's.
+        DatasetFormatError: There are too many cameras, a frame is beyond those of any recording, or a lens
+            is none of OpenCV's.
     """
+    if len(cameras) > MOST_CAMERAS:
+        raise _make_too_many_cameras_error(path, "K", f"would have {len(cameras):,} cameras")
     count = max(cameras, default=-1) + 1
-    if count > MOST_CAMERAS:
-        raise _make_too_many_cameras_error(path, "K", f"would have {count:,} rows")
+    if count > MOST_ROWS:
+        problem = f"would have {count:,} rows, one a frame from frame 0 on; at most {MOST_ROWS:,} can be written"
+        raise DatasetFormatError(path, f"frame {count - 1}", "K", problem)
     arrays = {name: np.full((count, *shape), np.nan) for name, shape in _SHAPES.items()}
-    lens = np.full((count, 12), np.nan)
+    lens = max((_count_lens_numbers(camera) for camera in cameras.values()), default=5)
+    arrays[_DISTORTION] = np.full((count, lens), np.nan)
     for frame, camera in cameras.items():
         if camera.is_wide:
             problem = f"has the lens {camera.lens}; an npz holds OpenCV's distortion alone"
@@ -343,9 +351,14 @@ def cameras_to_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
         arrays["K"][frame] = camera.K
         arrays["R"][frame] = camera.rotation @ _TO_Z_UP
         arrays["t"][frame] = -camera.rotation @ camera.position
-        lens[frame] = camera.distortion
-    used = np.flatnonzero(np.nan_to_num(lens).any(axis=0)).max(initial=0)
-    return {**arrays, _DISTORTION: lens[:, : next(size for size in (5, 8, 12) if used < size)]}
+        arrays[_DISTORTION][frame] = camera.distortion[:lens]
+    return arrays
+
+
+def _count_lens_numbers(camera: Camera) -> int:
+    """How many numbers OpenCV's distortion needs for a camera: 5, 8 or 12."""
+    used = np.flatnonzero(camera.distortion).max(initial=0)
+    return next(size for size in (5, 8, 12) if used < size)
 
 
 def _reshape_to_one_row_per_camera(

@@ -18,6 +18,7 @@ import { idempotencyKey, request, requestTagged } from './client.js';
  * @property {string | null} accepted_by
  * @property {number | null} placed views that have the ball from it
  * @property {number | null} kept views that had another one
+ * @property {number | null} refused views that could not be edited
  * @property {boolean} stale
  * @property {string} etag
  */

@@ -12,6 +12,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {string} dataset
  * @property {string} name
  * @property {boolean} indexed
+ * @property {string | null} sha256 of the file; null until it is indexed
  * @property {number | null} frames
  * @property {number | null} fps
  * @property {boolean | null} variable
@@ -58,9 +59,9 @@ export function deleteRecording(id) {
 	return request(`/recordings/${id}`, { method: 'DELETE' });
 }
 
-/** Where a frame is, as wide as it is shown. @param {number} id @param {number} frame @param {number} width pixels */
-export function frameAddress(id, frame, width) {
-	return `/api/v1/recordings/${id}/frames/${frame}${queryText({ width })}`;
+/** Where a frame is, as wide as it is shown; of another file it is another address, for browsers keep frames. @param {{id: number, sha256: string | null}} recording @param {number} frame @param {number} width pixels */
+export function frameAddress({ id, sha256 }, frame, width) {
+	return `/api/v1/recordings/${id}/frames/${frame}${queryText({ width, v: sha256?.slice(0, 12) })}`;
 }
 
 /** @param {number} id @param {AbortSignal} [signal] @returns {Promise<{items: TimedShot[], etag: string}>} */

@@ -5,7 +5,7 @@ import { signal } from '@preact/signals';
 
 import { frameAddress } from '../api/recordings.js';
 
-/** @typedef {{id: number, frames: number, fps: number, first?: number, last?: number}} Film   `first` to `last`: what of it is shown, else all */
+/** @typedef {{id: number, sha256: string | null, frames: number, fps: number, first?: number, last?: number}} Film   `first` to `last`: what of it is shown, else all */
 /** @typedef {ReturnType<typeof makePlayer>} Player */
 
 const AHEAD = 6;
@@ -21,7 +21,7 @@ export function makePlayer() {
 	/** Why no frame is shown. */
 	const playTrouble = signal('');
 	/** @type {Film} */
-	let film = { id: 0, frames: 0, fps: 25 };
+	let film = { id: 0, sha256: null, frames: 0, fps: 25 };
 	let width = 640;
 	/** Counts recordings that were opened: what was on its way for another one is nothing to this one. */
 	let turn = 0;
@@ -53,7 +53,7 @@ export function makePlayer() {
 
 	/** The picture of a frame, on its way or there. @param {number} frame */
 	function pictureOf(frame) {
-		const address = frameAddress(film.id, frame, width);
+		const address = frameAddress(film, frame, width);
 		let picture = coming.get(address);
 		if (!picture) {
 			picture = new Image();

@@ -170,7 +170,9 @@ def add_recordings(store: Store, follower: BallFollower) -> None:
     for path in (film, film.with_name("gone.avi")):
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
-    found = index_recording_in_worker(store, 1, progress=lambda *_: None, stop=lambda: None)
+    found = index_recording_in_worker(
+        store, 1, actor="local", progress=lambda *_: None, stop=lambda: None
+    )
     frames = [frame(number, "tracked") for number in range(6)]
     save_cameras(store, found, (0, 5), TrackedStretch(frames, ()), [], "local")
     replace_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")

@@ -99,7 +99,7 @@ def fill(store: Store, home: Path) -> None:
         film = write_video(home / f"{number}.mp4", "mp4v", 20)
         recording = add_recording(store, "small", film, actor="local")
         recording = index_recording_in_worker(
-            store, recording.id, progress=lambda *_: None, stop=lambda: None
+            store, recording.id, actor="local", progress=lambda *_: None, stop=lambda: None
         )
         for first in range(0, 9, 3):
             frames = [frame(first, "tracked"), frame(first + 1, "lost")]

@@ -54,7 +54,7 @@ def export_cameras(
         raise report.make_refusal_error(f"{source} holds no camera_<frame>.json")
     if kind == "npz":
         content = io.BytesIO()
-        arrays: dict[str, Any] = dict(cameras_to_arrays(cameras, str(source)))
+        arrays: dict[str, Any] = dict(cameras_to_arrays(cameras, source.resolve().name))
         np.savez_compressed(content, **arrays)
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
@@ -99,7 +99,7 @@ def _write_opentrackio_samples(
                 " OpenTrackIO needs: give it as --size 1280x720"
             )
         if problem := find_opentrackio_problem(camera):
-            raise DatasetFormatError(str(source), f"frame {frame}", None, problem)
+            raise DatasetFormatError(source.resolve().name, f"frame {frame}", None, problem)
         outcome = rows.get(frame, {}).get("outcome")
         samples[f"sample_{frame:0{width}d}.json"] = camera_to_opentrackio(
             camera,
@@ -125,7 +125,7 @@ def _read_track_rows(source: Path) -> dict[int, dict[str, Any]]:
         return {int(row["frame"]): row for row in rows}
     except (ValueError, LookupError, TypeError) as error:
         raise DatasetFormatError(
-            str(path),
+            f"{source.resolve().name}/{path.name}",
             None,
             "frames",
             "is not a list of tracked frames as touchline track writes it",

@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Select, func, insert, select
 
-from app.db.dialects.dialect import larger_of
+from app.db.dialects.dialect import insert_or_replace, larger_of
 from app.db.json_columns import compress_json
 from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
@@ -98,9 +98,17 @@ def group_to_columns(
 def find_next_row_id(session: Session, model: Any) -> int:
     """The id that a new row gets; sound because writes hold the lock from their start.
 
-    Ids of deleted datasets are not given again: the log still speaks of what had them.
+    Ids of deleted datasets, and those of ``reserve_row_ids``, are not given again: the log still speaks of what had them.
     """
     return int(session.scalar(_last_id_statement(model)) or 0) + 1
+
+
+def reserve_row_ids(session: Session, *models: Any) -> None:
+    """No id of these tables is ever given again; before rows are deleted whose ids the log or views tell."""
+    for model in models:
+        if used := find_next_row_id(session, model) - 1:
+            values = {"table": model.__tablename__, "id": used}
+            session.execute(insert_or_replace(UsedIdModel), [values])
 
 
 @cache

@@ -126,7 +126,9 @@ def make_recording_practice(
         _create_dataset_if_missing(store, person, actor)
         recording = add_recording(store, name, film.absolute(), actor=actor)
         reading = make_partial_progress(progress, "Finding its shots.")
-        recording = index_recording_in_worker(store, recording.id, progress=reading, stop=stop)
+        recording = index_recording_in_worker(
+            store, recording.id, actor=actor, progress=reading, stop=stop
+        )
         truth = _read_truth(settings)
         assert truth is not None
         _track_shots_and_plant_faults(store, recording, truth, progress, actor, stop)

@@ -143,7 +143,8 @@ def change_one(
     """Accept a ball run, or take that back; confirm frames of it that are uncertain.
 
     Accepted, each view that shows one of its frames gets the ball, but for uncertain frames that nobody confirmed. A ball
-    that somebody else said stays. Taken back, exactly those balls go.
+    that somebody else said stays. Taken back, exactly those balls go; where a view with one of them cannot be edited, the
+    run stays accepted, and `refused` counts those views.
     """
     store = services.store
     with add_current_state_to_conflicts(

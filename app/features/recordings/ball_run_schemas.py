@@ -77,6 +77,11 @@ class BallRunDocument(Document):
     accepted_by: str | None = Field(description="Who accepted it; null: nobody.")
     placed: int | None = Field(description="Views that have the ball from it.")
     kept: int | None = Field(description="Views of its frames that had another ball, which stays.")
+    refused: int | None = Field(
+        default=None,
+        description="Views that could not be edited, as their group is closed or somebody edited it meanwhile: they do"
+        " not have the ball, or, where the run was to be taken back, still have it, and it stays accepted.",
+    )
     stale: bool = Field(description="Whether the video is another one by now.")
     created: datetime
     by: str
@@ -141,6 +146,7 @@ def _build_run_summary(found: StoredRun) -> dict[str, object]:
         "accepted_by": found.accepted_by,
         "placed": found.groups.get("placed"),
         "kept": found.groups.get("kept"),
+        "refused": found.groups.get("refused"),
         "stale": found.stale,
         "created": found.created,
         "by": found.actor,

@@ -29,7 +29,9 @@ class StoredRun:
         confirmed: Uncertain frames that a person said are right.
         accepted_by: Who accepted it; None: nobody.
         stale: Whether the video is another one by now.
-        groups: What accepting did: views that got the ball (``placed``), and that had one already (``kept``).
+        sha256: Of the video that it is of.
+        groups: What accepting did: views that got the ball (``placed``), that had one already (``kept``), and that could
+            not be edited (``refused``); after an attempt to take it back those that it is still in.
     """
 
     id: int
@@ -39,6 +41,7 @@ class StoredRun:
     confirmed: tuple[int, ...]
     accepted_by: str | None
     stale: bool
+    sha256: str
     groups: Mapping[str, int]
     actor: str
     created: str
@@ -75,6 +78,7 @@ def build_run_from_row(row: Any, sha256: str | None) -> StoredRun:
         confirmed=tuple(parse_json_column(row.confirmed)),
         accepted_by=row.accepted_by,
         stale=row.sha256 != sha256,
+        sha256=row.sha256,
         groups=parse_json_column(row.groups),
         actor=row.actor,
         created=row.created,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -28,7 +28,7 @@ from app.features.recordings.queries import (
     list_views_of_video,
     update_ball_run,
 )
-from app.features.recordings.service import Recording, get_recording, require_recording
+from app.features.recordings.service import Recording, require_recording
 from app.features.recordings.shots import get_shots
 from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
@@ -171,44 +171,81 @@ def review_ball_run(
     """Confirm uncertain frames of a run, accept it, or take that back.
 
     Accepted, each view that shows one of its frames gets the ball, unless somebody said another one; taken back,
-    those balls go, and no others.
+    those balls go, and no others, also where the video is another one by now. It is accepted from before the first
+    ball is set until the last one is gone: where a view that has its ball cannot be edited it stays accepted.
 
     Raises:
-        ConflictError: It is of another video; or what is confirmed of an accepted run would change.
+        ConflictError: It is accepted, and of another video; or what is confirmed of an accepted run would change.
         InputError: Nothing is changed, or a frame is none of its uncertain ones.
         NotFoundError: The recording has no such run.
         StaleRevisionError: Somebody changed it meanwhile.
     """
     if change.accepted is None and change.confirmed is None:
         raise InputError("this request changes nothing", hint="Send accepted or confirmed.")
-    before = get_ball_run(store, recording_id, run_id)
-    require_etag(before.etag, if_match, "this ball run")
-    if change.confirmed is not None:
-        _require_unaccepted_and_unchanged(before, if_match)
-        with store.write() as session, without_pending_response():
-            before = _require_ball_run(session, recording_id, run_id)
-            _require_unaccepted_and_unchanged(before, if_match)
-            text = canonical_json_text(_validate_uncertain_frames(before, change.confirmed))
-            before = _save_run_change(session, before, actor, "ball confirmed", confirmed=text)
-    groups: Mapping[str, int] = {}
-    if change.accepted is not None:
-        if change.accepted and before.stale:
-            raise ConflictError(
-                "the video file has changed since the ball was followed",
-                hint="Follow the ball again.",
-            )
-        with without_pending_response():
-            groups = _apply_run_to_views(store, before, change.accepted, actor, paint)
+    if change.accepted is None:
+        with store.write() as session:
+            run = _save_confirmed_frames(session, recording_id, run_id, change, if_match, actor)
+            session.respond(run)
+        return run
+    with store.write() as session, without_pending_response():
+        run = _reserve_review(session, recording_id, run_id, change, if_match, actor)
+    with without_pending_response():
+        counts = _apply_run_to_views(store, run, change.accepted, actor, paint)
     with store.write() as session:
         present = _require_ball_run(session, recording_id, run_id)
-        require_etag(present.etag, before.etag, "this ball run")
-        if change.accepted is not None:
-            by = actor if change.accepted else None
-            did = "ball run accepted" if change.accepted else "ball run taken back"
-            values = {"accepted_by": by, "groups": canonical_json_text(groups)}
-            present = _save_run_change(session, present, actor, did, **values)
-        session.respond(present)
+        if present.etag == run.etag:
+            if change.accepted or counts["refused"]:
+                found = _update_run(session, run, groups=canonical_json_text(counts))
+            else:
+                did, values = "ball run taken back", {"accepted_by": None, "groups": "{}"}
+                found = _save_run_change(session, run, actor, did, **values)
+            session.respond(found)
+            return found
+    if change.accepted and present.accepted_by is None:
+        # Somebody took it back while its balls were set: they may have missed the last ones.
+        with without_pending_response():
+            _apply_run_to_views(store, run, False, actor, paint)
+    require_etag(present.etag, run.etag, "this ball run")
     return present
+
+
+def _reserve_review(
+    session: Session,
+    recording_id: int,
+    run_id: int,
+    change: BallRunReview,
+    if_match: str,
+    actor: str,
+) -> StoredRun:
+    """A run as it is while its balls are set or taken away, which takes seconds: accepted, and of a new revision, so
+    that what others do then to the run that they see is refused."""
+    run = _require_ball_run(session, recording_id, run_id)
+    require_etag(run.etag, if_match, "this ball run")
+    if change.accepted and run.stale:
+        raise ConflictError(
+            "the video file has changed since the ball was followed", hint="Follow the ball again."
+        )
+    if change.confirmed is not None:
+        run = _save_confirmed_frames(session, recording_id, run_id, change, if_match, actor)
+    if change.accepted:
+        values = {"accepted_by": actor, "groups": "{}"}
+        return _save_run_change(session, run, actor, "ball run accepted", **values)
+    return _update_run(session, run)
+
+
+def _save_confirmed_frames(
+    session: Session,
+    recording_id: int,
+    run_id: int,
+    change: BallRunReview,
+    if_match: str,
+    actor: str,
+) -> StoredRun:
+    """Keep which uncertain frames a person said are right."""
+    run = _require_ball_run(session, recording_id, run_id)
+    _require_unaccepted_and_unchanged(run, if_match)
+    text = canonical_json_text(_validate_uncertain_frames(run, change.confirmed or ()))
+    return _save_run_change(session, run, actor, "ball confirmed", confirmed=text)
 
 
 def remove_ball_run(store: Store, recording_id: int, run_id: int, *, actor: str) -> None:
@@ -259,11 +296,13 @@ def _follow_click(
 def _apply_run_to_views(
     store: Store, run: StoredRun, accepted: bool, actor: str, paint: PaintUpdater | None
 ) -> dict[str, int]:
-    """Give the views of a run's frames its balls, or take those away that come from it."""
-    recording = get_recording(store, run.recording)
-    trusted, items, counts = run.trusted_balls, list[ViewEdits](), {"placed": 0, "kept": 0}
+    """Give the views of a run's frames its balls, or take those away that come from it; returns ``StoredRun.groups``
+    as they are then if the run is accepted."""
+    trusted, items = run.trusted_balls, list[ViewEdits]()
+    counts = {"placed": 0, "kept": 0, "refused": 0}
     with store.read() as session:
-        shown = list_views_of_video(session, recording.dataset_id, str(recording.sha256))
+        # The file may have been replaced since; views keep the video that the run is of.
+        shown = list_views_of_video(session, run.dataset_id, run.sha256)
         shown = [view for view in shown if view.number in trusted]
         ids = sorted({view.group for view in shown})
         for start in range(0, len(ids), _BATCH):
@@ -284,10 +323,12 @@ def _apply_run_to_views(
                 change = partial(_make_set_balls_edit, balls=(mine,) if accepted else ())
                 number = groups[view.group].view_ids[view.key]
                 items.append(ViewEdits(number, None, etags[view.group], change))
-    report = edit_views(store, recording.dataset_id, items, actor=actor, paint=paint)
+    report = edit_views(store, run.dataset_id, items, actor=actor, paint=paint)
     for item in report.items:
-        counts["kept" if item.outcome == "refused" else "placed"] += 1
-    return counts if accepted else {}
+        counts["refused" if item.outcome == "refused" else "placed"] += 1
+    if not accepted:
+        counts = {**counts, "placed": counts["refused"], "kept": run.groups.get("kept", 0)}
+    return counts
 
 
 def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:
@@ -321,10 +362,15 @@ def _validate_uncertain_frames(run: StoredRun, frames: Sequence[int]) -> list[in
 def _save_run_change(
     session: Session, run: StoredRun, actor: str, did: str, **values: Any
 ) -> StoredRun:
+    changed = _update_run(session, run, **values)
+    _log_run_event(session, actor, did, run)
+    return changed
+
+
+def _update_run(session: Session, run: StoredRun, **values: Any) -> StoredRun:
     row = find_ball_run(session, run.id)
     assert row is not None
     update_ball_run(session, run.id, revision=row.revision + 1, **values)
-    _log_run_event(session, actor, did, run)
     return _require_ball_run(session, run.recording, run.id)
 
 

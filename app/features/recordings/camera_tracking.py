@@ -312,8 +312,14 @@ def save_cameras(
         for old in replaced:
             for rest, values in rests:
                 if old.first <= rest.frames[0].number <= old.last:
+                    # Whoever tracked it, and when; the name that is shown follows from both.
                     insert_cameras(
-                        session, **common, **values, revision=old.revision, actor=old.actor
+                        session,
+                        **common,
+                        **values,
+                        revision=old.revision,
+                        actor=old.actor,
+                        created=old.created,
                     )
         views = list_views_of_stretch(session, recording, first, last)
         changed = assign_tracked_cameras(

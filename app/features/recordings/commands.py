@@ -42,10 +42,11 @@ def _import_videos_locally(paths: Sequence[Path], dataset: str) -> list[dict[str
     files = [require_video_file(path.resolve()) for path in paths]
     found = []
     with open_store() as store, show_progress("Indexing") as progress:
+        actor = get_current_actor()
         for file in files:
-            recording = add_recording(store, dataset, file, actor=get_current_actor())
+            recording = add_recording(store, dataset, file, actor=actor)
             indexed = index_recording_in_worker(
-                store, recording.id, progress=progress, stop=lambda: None
+                store, recording.id, actor=actor, progress=progress, stop=lambda: None
             )
             found.append(vars(indexed))
     return found

@@ -20,6 +20,8 @@ from app.features.recordings.service import (
     Recording,
     build_recording_from_row,
     choose_name_for_video,
+    clock_readings_from_column,
+    clock_readings_to_column,
     compute_file_stamp,
     require_recording,
 )
@@ -43,16 +45,18 @@ def index_recording_in_worker(
     store: Store,
     recording_id: int,
     *,
+    actor: str,
     progress: ReportProgress,
     stop: Callable[[], None],
 ) -> Recording:
     """Decode a recording once in a worker process: its index, its facts, and its shots.
 
-    Shots that people have changed stay, unless the file is another one than before.
+    Shots that people have changed, links and readings of the match clock stay, unless the file is another one than before.
 
     Args:
         store: The database.
         recording_id: Which.
+        actor: Who wants it, for the log.
         progress: Called with frames decoded, and about how many there are.
         stop: Called every now and then; an error that it raises ends the process.
 
@@ -74,19 +78,27 @@ def index_recording_in_worker(
     with store.write() as session:
         row = require_recording(session, recording_id)
         what: Details
-        found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical_json_text(facts)}
-        if row.sha256 != facts["sha256"]:
+        another = row.sha256 != facts["sha256"]
+        found: dict[str, Any] = {"stamp": stamp, "sha256": facts["sha256"]}
+        found["facts"] = canonical_json_text(facts)
+        if another:
             name = choose_name_for_video(session, row, facts["sha256"])
             if name != row.name:
                 found["name"] = name
                 what = {"recording": recording_id, "name": name, "before": row.name}
-                add_audit_event(session, row.actor, "recording renamed", row.dataset_id, **what)
-        if row.sha256 != facts["sha256"] or row.shots == "[]":
+                add_audit_event(session, actor, "recording renamed", row.dataset_id, **what)
+        if another or row.shots == "[]":
             found |= {"shots": canonical_json_text(shots), "revision": row.revision + 1}
-        if row.sha256 != facts["sha256"] and (gone := delete_links(session, recording_id)):
+        if another and (gone := delete_links(session, recording_id)):
             # Their frames are those of another film.
             what = {"recording": recording_id, "name": row.name, "links": gone}
-            add_audit_event(session, row.actor, "links removed", row.dataset_id, **what)
+            add_audit_event(session, actor, "links removed", row.dataset_id, **what)
+        clocks = clock_readings_from_column(row.clocks)
+        kept = [one for one in clocks if not another and one.frame < facts["frames"]]
+        if gone := len(clocks) - len(kept):
+            found["clocks"] = clock_readings_to_column(kept)
+            what = {"recording": recording_id, "name": row.name, "clocks": gone}
+            add_audit_event(session, actor, "match clocks removed", row.dataset_id, **what)
         update_recording(session, recording_id, **found)
         return build_recording_from_row(require_recording(session, recording_id))
 

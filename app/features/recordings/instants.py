@@ -144,7 +144,8 @@ def make_groups_of_instants(
         dry_run: Count what would become of them, and keep nothing.
 
     Raises:
-        ConflictError, InputError: As ``validate_instant_frames``, also of the recording of a replay.
+        ConflictError, InputError: As ``validate_instant_frames``, also of the recording of a replay whose frames have
+            to be decoded.
         ImageError: A frame cannot be decoded.
         StorageError: The disk refuses.
     """
@@ -190,15 +191,17 @@ def _find_linked_views(
     for link in list_links(store, recording.id):
         if link.live.recording != recording.id or link.map.outcome != "linked":
             continue
-        replay = get_recording(store, link.replay.recording)
-        with store.read() as session:
-            shown = list_views_of_video(session, replay.dataset_id, replay.require_readable())
-        have = {view.group for view in shown if view.number in link.replay.frames}
         inside = [number for number in numbers if number in link.live.frames]
+        replay = get_recording(store, link.replay.recording)
+        if not inside or replay.sha256 is None:
+            continue
+        with store.read() as session:
+            shown = list_views_of_video(session, replay.dataset_id, replay.sha256)
+        have = {view.group for view in shown if view.number in link.replay.frames}
         asked = [number for number in inside if there.get(number) not in have]
         if not asked:
             continue
-        index = read_index(store.settings, replay.require_readable())
+        index = read_index(store.settings, replay.sha256)
         same = find_linked_frames(store, link)
         frames = {number: same.replay[number - same.first] for number in asked}
         tracked = read_cameras_of_frames(
@@ -217,6 +220,9 @@ def _find_linked_views(
                 "blended": frame in same.blended,
             }
             view = _ShownFrame(replay, index, frame, tracked.get(frame), told)
+            if not (store.settings.recordings / view.picture_path).is_file():
+                # It will be decoded.
+                replay.require_readable()
             if all(view.picture_path != other.picture_path for other in found.of[number]):
                 found.of[number].append(view)
     return found

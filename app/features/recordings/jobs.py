@@ -30,6 +30,7 @@ from app.features.recordings.service import (
     add_recording,
     find_group_ids_by_frame,
     get_recording,
+    require_name_for_recordings,
     require_video_file,
 )
 from app.features.recordings.shots import detect_shots_again
@@ -65,8 +66,9 @@ def request_recording_import(
         NotFoundError: There is no such upload or file.
     """
     path = _resolve_video_path(settings, source)
+    require_name_for_recordings(store, dataset)
     if "upload" in source:
-        # It is read where it is, so it stays.
+        # It is read where it is, so it stays; from before there is a recording that reads it.
         mark_upload_permanent(settings, source["upload"])
     recording = add_recording(store, dataset, path, actor=actor)
     return request_index(jobs, store, recording, actor=actor)
@@ -110,9 +112,9 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
     def report_frames_read(done: int, total: int | None = None, sentence: str = "") -> None:
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
+    actor = progress.job.actor
     with leave_work_to_next_server(progress):
         if progress.job.request["shots"] and has_usable_index(store, recording):
-            actor = progress.job.actor
             detect_shots_again(
                 store,
                 recording_id,
@@ -123,7 +125,7 @@ def run_index_job(store: Store, progress: JobProgress) -> Json:
             found = get_recording(store, recording_id)
         else:
             found = index_recording_in_worker(
-                store, recording_id, progress=report_frames_read, stop=progress.check
+                store, recording_id, actor=actor, progress=report_frames_read, stop=progress.check
             )
     return {
         "recording": found.id,

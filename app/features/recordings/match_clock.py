@@ -62,12 +62,14 @@ def compute_match_time(
 ) -> tuple[int, float] | None:
     """Half and time of the match in a frame; None where nobody has read the clock.
 
+    Readings in frames that the recording does not have are left out.
+
     Args:
         clocks: Readings by their frames.
         seconds: When each frame of the recording is shown, shape (N,).
         frame: Number of the frame.
     """
-    clock = find_clock_at_frame(clocks, frame)
+    clock = find_clock_at_frame([one for one in clocks if one.frame < len(seconds)], frame)
     if clock is None:
         return None
     return clock.half, clock.seconds + float(seconds[frame] - seconds[clock.frame])

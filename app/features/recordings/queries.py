@@ -11,7 +11,7 @@ from sqlalchemy.orm import aliased
 
 from app.db.session import Session, now
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.visibility_queries import list_columns_with_shown_actor, shown_actor_column
 from app.features.predictions.tables import PredictionModel
 from app.features.recordings.tables import (
@@ -128,7 +128,8 @@ def update_recording(session: Session, recording_id: int, **values: Any) -> None
 
 
 def delete_recording(session: Session, recording_id: int) -> None:
-    """Delete a recording; the groups that were taken from it stay."""
+    """Delete a recording with its cameras, links and ball runs; the groups that were taken from it stay."""
+    reserve_row_ids(session, RecordingModel, ShotLinkModel, BallRunModel)
     session.execute(delete(RecordingModel).where(RecordingModel.id == recording_id))
 
 
@@ -171,9 +172,10 @@ def list_views_of_video(session: Session, dataset_id: int, sha256: str) -> list[
 def delete_overlapping_cameras(
     session: Session, recording_id: int, first: int, last: int
 ) -> Sequence[Any]:
-    """Delete what shares a frame with a stretch; returns its rows."""
-    rows = list_tracked_stretches(session, recording_id)
-    gone = [row for row in rows if row.first <= last and first <= row.last]
+    """Delete what shares a frame with a stretch; returns its rows, with the actors as they are stored."""
+    table = ShotCamerasModel.__table__
+    mine = (table.c.recording_id == recording_id, table.c.first <= last, first <= table.c.last)
+    gone = session.execute(select(table).where(*mine).order_by(table.c.first)).all()
     ids = [row.id for row in gone]
     session.execute(delete(ShotCamerasModel).where(ShotCamerasModel.id.in_(ids)))
     return gone
@@ -224,6 +226,7 @@ def update_ball_run(session: Session, run_id: int, **values: Any) -> None:
 
 def delete_ball_run(session: Session, run_id: int) -> None:
     """Delete a run."""
+    reserve_row_ids(session, BallRunModel)
     session.execute(delete(BallRunModel).where(BallRunModel.id == run_id))
 
 
@@ -293,11 +296,13 @@ def update_link(session: Session, link_id: int, **values: Any) -> None:
 
 def delete_link(session: Session, link_id: int) -> None:
     """Delete a link."""
+    reserve_row_ids(session, ShotLinkModel)
     session.execute(delete(ShotLinkModel).where(ShotLinkModel.id == link_id))
 
 
 def delete_links(session: Session, recording_id: int) -> int:
     """Delete all links of a recording; returns how many there were."""
+    reserve_row_ids(session, ShotLinkModel)
     mine = or_(ShotLinkModel.live_id == recording_id, ShotLinkModel.replay_id == recording_id)
     gone = delete(ShotLinkModel).where(mine).returning(ShotLinkModel.id)
     return len(session.scalars(gone).all())

@@ -62,12 +62,22 @@ from app.media.images import JPEG
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
 
 CSV_FILE = "text/csv"
+SHORTEST = 12
+"""Characters of a sha256 that tell one film from another."""
 TAGGED = {
     "headers": {"ETag": {"description": "Of the list of shots.", "schema": {"type": "string"}}}
 }
 Frame = Annotated[int, Path(ge=0, le=MAX_ID, description="Number of the frame, from 0.")]
 Width = Annotated[
     int | None, Query(ge=1, le=100_000, description="Wanted width in pixels; never enlarged.")
+]
+Film = Annotated[
+    str | None,
+    Query(
+        max_length=64,
+        description="The first 12 characters of the recording's `sha256`, or more. With them the browser may keep the frame"
+        " for an hour; without, or where they are those of another file, it asks each time whether the frame is the same.",
+    ),
 ]
 OfDataset = Annotated[
     str | None, Query(max_length=200, description="Name or id of the dataset; default: all.")
@@ -166,12 +176,16 @@ async def get_frame(
     services: AppServices,
     request: Request,
     width: Width = None,
+    v: Film = None,
 ) -> Response:
     """A frame as JPEG, scaled down when a width is given; exactly the one of that number."""
     found = await to_thread.run_sync(get_recording, services.store, recording)
     sha256, wide = found.require_readable(), round_up_and_clamp_width(width)
     etag = f'"{digest_content(f"{sha256} {frame} {wide}".encode())}"'
-    headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
+    # The address has to change with the file: an id may be that of another film within the hour.
+    is_named = v is not None and len(v) >= SHORTEST and sha256.startswith(v)
+    kept = f"max-age={SECONDS}" if is_named else "no-cache"
+    headers = {"ETag": etag, "Cache-Control": f"private, {kept}"}
     if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
     task = services.recordings.request_frame(found, frame, wide)

@@ -138,10 +138,9 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
         InputError: The name of the dataset cannot be one.
     """
     with store.write() as session, without_pending_response():
-        row = find_dataset(session, dataset)
-        if row is None:
-            require_valid_name(dataset, "a dataset", pointer="/dataset")
-        number = insert_dataset(session, dataset, TOUCHLINE, actor) if row is None else int(row.id)
+        number = _find_dataset_id_or_require_name(session, dataset)
+        if number is None:
+            number = insert_dataset(session, dataset, TOUCHLINE, actor)
         known = list_names_and_paths(session, number)
         there = next((row.id for row in known if row.path == str(path)), None)
         if there is None:
@@ -150,6 +149,24 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
             there = insert_recording(session, number, name, str(path), actor=actor)
             add_audit_event(session, actor, "recording added", number, recording=there, name=name)
         return build_recording_from_row(require_recording(session, there))
+
+
+def require_name_for_recordings(store: Store, dataset: str) -> None:
+    """Require that recordings can be added to a dataset of a name, which need not be there.
+
+    Raises:
+        InputError: The name of the dataset cannot be one.
+    """
+    with store.read() as session:
+        _find_dataset_id_or_require_name(session, dataset)
+
+
+def _find_dataset_id_or_require_name(session: Session, dataset: str) -> int | None:
+    row = find_dataset(session, dataset)
+    if row is None:
+        require_valid_name(dataset, "a dataset", pointer="/dataset")
+        return None
+    return int(row.id)
 
 
 def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
@@ -180,7 +197,7 @@ def set_clock_readings(
         found = validate_clock_readings(
             clocks, parse_json_column(row.facts)["frames"] if row.facts else 0
         )
-        text = canonical_json_text([asdict(clock) for clock in found]) if found else None
+        text = clock_readings_to_column(found)
         if text != row.clocks:
             update_recording(session, recording_id, clocks=text)
             what: Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
@@ -257,8 +274,18 @@ def build_recording_from_row(row: RecordingRow) -> Recording:
         problem=None if row.stamp is None else _describe_file_problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
-        clocks=tuple(MatchClockReading(**one) for one in parse_json_column(row.clocks or "[]")),
+        clocks=clock_readings_from_column(row.clocks),
     )
+
+
+def clock_readings_from_column(text: str | None) -> tuple[MatchClockReading, ...]:
+    """The readings of the match clock in a column of the table, by their frames."""
+    return tuple(MatchClockReading(**one) for one in parse_json_column(text or "[]"))
+
+
+def clock_readings_to_column(clocks: Sequence[MatchClockReading]) -> str | None:
+    """Back from ``clock_readings_from_column``; None where there are none."""
+    return canonical_json_text([asdict(clock) for clock in clocks]) if clocks else None
 
 
 def _describe_file_problem(path: Path, stamp: str) -> str | None:

@@ -93,9 +93,9 @@ export function useBalls(one, shot) {
 		if (busy) return;
 		if (!run) announce('No ball is followed in this frame.');
 		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This ball has been accepted already.' : 'Nothing to withdraw: this ball has not been accepted.');
-		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept }) => (accepted
-			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}.`
-			: 'Withdrawn: the balls that accepting added are removed.'));
+		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept, refused }) => (accepted
+			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}${refused ? `; ${plural(refused, 'view')} could not be edited` : ''}.`
+			: refused ? `Not withdrawn: ${plural(refused, 'view')} could not be edited. Withdraw it again.` : 'Withdrawn: the balls that accepting added are removed.'));
 	}
 	function confirm() {
 		const around = run ? uncertainAround(run, frame) : [];

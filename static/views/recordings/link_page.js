@@ -105,8 +105,8 @@ function Both({ first, recordings }) {
 	const usable = link.map.outcome === 'linked';
 	useEffect(() => {
 		const open = (/** @type {Side} */ which) => {
-			const { id, frames: count, fps } = recordings[which];
-			return players[which].openFilm({ id, frames: count ?? 0, fps: fps ?? 25, first: first[which].first, last: first[which].last });
+			const { id, sha256, frames: count, fps } = recordings[which];
+			return players[which].openFilm({ id, sha256, frames: count ?? 0, fps: fps ?? 25, first: first[which].first, last: first[which].last });
 		};
 		const ends = [open('live'), open('replay')];
 		return () => { for (const end of ends) end(); };

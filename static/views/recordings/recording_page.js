@@ -146,11 +146,11 @@ function Film({ one, running, reload }) {
 	const instants = useInstants();
 	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
 	useEffect(() => {
-		const end = openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 });
+		const end = openFilm({ id: one.id, sha256: one.sha256, frames: one.frames ?? 0, fps: one.fps ?? 25 });
 		// Whoever comes back from the lines of a frame is shown it again.
 		if (Number(param('frame')) > 0) goTo(Number(param('frame')));
 		return end;
-	}, [one.id, one.frames]);
+	}, [one.id, one.sha256, one.frames]);
 	useEnded(running.jobs, read);
 	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), reload);
 	const doing = useRef({ change, undo, turn: instants.turn });

@@ -67,7 +67,7 @@ function Item({ one, shot, index, current, go }) {
 	return html`
 		<li>
 			<button class="film__shot" type="button" ref=${ref} data-kind=${shot.kind} data-dropped=${shot.kept === false} aria-current=${current ? 'true' : undefined} onClick=${go}>
-				<img src=${frameAddress(one.id, middle, THUMBNAIL)} alt="" loading="lazy" width="120" height="68" />
+				<img src=${frameAddress(one, middle, THUMBNAIL)} alt="" loading="lazy" width="120" height="68" />
 				<span class="film__words">
 					<span class="film__letter" data-kind=${shot.kind} aria-hidden="true">${kindOf(shot.kind).letter}</span>
 					<span><span class="hidden-text">Shot ${index + 1}: ${kindOf(shot.kind).label}, ${shot.kept === null ? '' : shot.kept ? 'kept, ' : 'dropped, '}</span>${lengthText((shot.last - shot.first + 1) / fps)}</span>

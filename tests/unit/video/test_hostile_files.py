@@ -126,7 +126,7 @@ class TestHugePictures:
         recording = add_recording(store, "cup", path, actor="ann")
         with pytest.raises((ImageError, TooLargeError), match=r"^huge\.avi "):
             index_recording_in_worker(
-                store, recording.id, progress=lambda *_: None, stop=lambda: None
+                store, recording.id, actor="ann", progress=lambda *_: None, stop=lambda: None
             )
         assert not get_recording(store, recording.id).indexed
 

@@ -10,7 +10,10 @@ import pytest
 
 from app.errors import ReviewError
 from app.features.file_tools.camera_export import export_cameras, key_by_frame_number
+from app.formats import camera_matrix
+from app.formats.camera_matrix import MOST_CAMERAS, MOST_ROWS
 from app.geometry.camera import Camera
+from app.media.video import MAX_FRAMES
 from app.soccer.frames import ImageSize
 from tests.cameras import EVERY_COEFFICIENT, SIZE, looking, wide, write_cameras
 
@@ -57,10 +60,34 @@ class TestNpz:
         with pytest.raises(ReviewError, match=r"frame 4.*fisheye"):
             export_cameras(folder_of(tmp_path / "cameras", cameras), tmp_path / "a.npz", "npz")
 
-    def test_a_number_that_is_no_frame_s_is_refused(self, tmp_path: Path) -> None:
+    def test_a_number_that_is_no_frame_s_is_refused_without_the_place_of_the_files(
+        self, tmp_path: Path
+    ) -> None:
         cameras = {3_000_000_000: CAMERAS[2]}
-        with pytest.raises(ReviewError, match="3,000,000,001 rows"):
+        with pytest.raises(
+            ReviewError, match=r"^cameras, frame 3000000000, K: .*3,000,000,001 rows"
+        ):
             export_cameras(folder_of(tmp_path / "cameras", cameras), tmp_path / "a.npz", "npz")
+
+    def test_cameras_late_in_a_match_are_written(self, tmp_path: Path) -> None:
+        late, out = MOST_CAMERAS + 20_000, tmp_path / "clip.npz"
+        cameras = {late: CAMERAS[2]}
+        result = export_cameras(folder_of(tmp_path / "cameras", cameras), out, "npz")
+        assert (result["first"], result["last"]) == (late, late)
+        with np.load(out) as arrays:
+            assert arrays["K"].shape == (late + 1, 3, 3) and arrays["k"].shape == (late + 1, 5)
+            assert np.allclose(arrays["K"][late], CAMERAS[2].K)
+            assert all(np.isnan(arrays[name][:late]).all() for name in "KkRt")
+
+    def test_more_cameras_than_a_file_may_hold_are_refused(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(camera_matrix, "MOST_CAMERAS", 2)
+        with pytest.raises(ReviewError, match="would have 3 cameras; a file may hold 2 cameras"):
+            export_cameras(folder_of(tmp_path / "cameras"), tmp_path / "a.npz", "npz")
+
+    def test_a_recording_has_no_frame_beyond_what_is_written(self) -> None:
+        assert MOST_ROWS == MAX_FRAMES
 
 
 class TestOpenTrackIO:

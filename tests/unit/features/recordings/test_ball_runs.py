@@ -12,6 +12,7 @@ import pytest
 from app.db.store import Store
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
+from app.features.recordings import ball_runs as module
 from app.features.recordings.ball_runs import get_ball_run
 from app.features.recordings.follow import collect_follow_hints
 from app.features.recordings.queries import update_recording
@@ -64,6 +65,11 @@ def balls(api: Any) -> dict[int, Any]:
         for view in api.get(f"/api/v1/groups/{row['id']}").json()["views"]:
             found[int(view["key"].removesuffix(".png"))] = view["balls"]
     return found
+
+
+def etags_of_before(_: Any, groups: Any) -> dict[int, str]:
+    """As if somebody had edited the groups since they were read."""
+    return dict.fromkeys(groups, '"older"')
 
 
 def take(api: Any, recording: str, finished: Finished, *frames: int) -> None:
@@ -214,6 +220,83 @@ class TestAccept:
             update_recording(session, number, sha256="0" * 64)
         assert get_ball_run(store, number, run["id"]).stale
         assert change(api, run, accepted=True).status_code == 409
+
+    def test_a_run_of_another_video_is_taken_back(
+        self, api: Any, recording: str, finished: Finished, store: Store
+    ) -> None:
+        take(api, recording, finished, 3, 20)
+        run = change(api, follow(api, recording).json(), accepted=True).json()
+        assert run["placed"] == 2
+        with store.write() as session:
+            update_recording(session, run["recording"], sha256="0" * 64)
+        back = change(api, run, accepted=False)
+        assert back.status_code == 200 and back.json()["accepted_by"] is None
+        assert balls(api) == {3: [], 20: []}
+
+    def test_views_that_cannot_be_edited_are_counted_and_keep_the_run_accepted(
+        self, api: Any, recording: str, finished: Finished, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        take(api, recording, finished, 3, 20)
+        run = follow(api, recording).json()
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "read_etags", etags_of_before)
+            refused = change(api, run, accepted=True).json()
+        counts = ("placed", "kept", "refused")
+        assert [refused[name] for name in counts] == [0, 0, 2] and refused["accepted_by"]
+        accepted = change(api, refused, accepted=True).json()
+        assert [accepted[name] for name in counts] == [2, 0, 0]
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "read_etags", etags_of_before)
+            refused = change(api, accepted, accepted=False).json()
+        assert [refused[name] for name in counts] == [2, 0, 2] and refused["accepted_by"]
+        assert all(balls(api).values())
+        assert change(api, refused, accepted=False).json()["accepted_by"] is None
+        assert balls(api) == {3: [], 20: []}
+
+    @pytest.mark.parametrize("kind", ["confirmed", "extended", "accepted", "taken back", "deleted"])
+    def test_what_others_do_to_a_run_while_it_is_accepted_fits_its_balls(
+        self,
+        api: Any,
+        recording: str,
+        finished: Finished,
+        monkeypatch: pytest.MonkeyPatch,
+        kind: str,
+    ) -> None:
+        take(api, recording, finished, 3, 20)
+        run, whole, answers = follow(api, recording).json(), module.edit_views, list[Any]()
+        path = f"{recording}/ball-runs/{run['id']}"
+
+        def act() -> Any:
+            if kind == "confirmed":
+                return change(api, run, confirmed=[13])
+            if kind == "extended":
+                x, y = place(20)
+                click, tag = {"frame": 20, "x": x, "y": y}, {"If-Match": run["etag"]}
+                return api.post(f"{path}/clicks", json=click, headers=tag)
+            if kind == "accepted":
+                return change(api, run, accepted=True)
+            if kind == "taken back":
+                return change(api, api.get(path).json(), accepted=False)
+            return api.delete(path)
+
+        def edit_views(*asked: Any, **more: Any) -> Any:
+            monkeypatch.setattr(module, "edit_views", whole)
+            answers.append(act())
+            return whole(*asked, **more)
+
+        monkeypatch.setattr(module, "edit_views", edit_views)
+        mine = change(api, run, accepted=True)
+        (answer,) = answers
+        present = api.get(path)
+        if kind == "taken back":
+            assert (answer.status_code, mine.status_code) == (200, 412)
+            assert present.json()["accepted_by"] is None and not any(balls(api).values())
+        elif kind == "deleted":
+            assert (answer.status_code, mine.status_code, present.status_code) == (204, 404, 404)
+        else:
+            assert (answer.status_code, mine.status_code) == (412, 200)
+            assert present.json() == mine.json() and mine.json()["placed"] == 2
+            assert all(balls(api).values())
 
     def test_boxes_of_detectors_are_candidates(
         self, api: Any, recording: str, finished: Finished, store: Store

@@ -12,15 +12,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from app.db.idempotency import without_pending_response
 from app.db.store import Store
 from app.errors import ConflictError, InputError, JobCancelled
+from app.features.audit.service import assign_local_work
 from app.features.datasets.queries import list_unused_frame_files
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.imports.cameras import import_given_cameras
+from app.features.people.roles import Role
+from app.features.people.service import find_person, invite
 from app.features.recordings import camera_tracking as module
 from app.features.recordings.camera_tracking import (
     TrackedStretch,
@@ -38,6 +42,7 @@ from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
 from app.features.recordings.service import Recording, find_group_ids_by_frame, get_recording
 from app.features.recordings.shots import Shot, replace_shots
+from app.features.recordings.tables import ShotCamerasModel
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -463,6 +468,32 @@ def test_cameras_take_the_place_of_those_that_share_a_frame_and_leave_no_file(
         assert [
             name for name in list_unused_frame_files(session, store.settings) if "cameras" in name
         ]
+
+
+def test_frames_beside_a_stretch_that_is_tracked_keep_who_tracked_them_and_when(
+    app: Any, api: Any, recording: str, found: Recording, finished: Finished, tracker: Tracker
+) -> None:
+    store: Store = app.state.services.store
+
+    def stored() -> list[tuple[int, str, str]]:
+        table = ShotCamerasModel
+        statement = select(table.first, table.actor, table.created).order_by(table.first)
+        with store.read() as session:
+            return [tuple(row) for row in session.execute(statement)]
+
+    track(api, recording, finished, 4, 11)
+    ((_, actor, created),) = stored()
+    assert actor == "local"
+    invite(store, "anna", Role.LEAD, actor="local")
+    assign_local_work(store, find_person(store, "anna").id, actor="ada")
+    assert [one.actor for one in list_shot_cameras(store, found.id)] == ["anna"]
+    frames = [tracker.frame(number, {}) for number in (6, 7)]
+    module.save_cameras(store, found, (6, 7), TrackedStretch(frames, ()), [], "bob")
+    before, new, behind = stored()
+    assert [before, behind] == [(4, "local", created), (8, "local", created)]
+    assert new[:2] == (6, "bob") and new[2] > created
+    shown = [one.actor for one in list_shot_cameras(store, found.id)]
+    assert shown == ["anna", "bob", "anna"]
 
 
 def test_cameras_of_another_video_or_of_no_file_are_not_given(

@@ -27,7 +27,7 @@ def recording(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     film = write_video(tmp_path / "final.mp4", "mp4v", 40)
     recording = add_recording(store, "cup", film, actor="ann")
     return index_recording_in_worker(
-        store, recording.id, progress=lambda *_: None, stop=lambda: None
+        store, recording.id, actor="ann", progress=lambda *_: None, stop=lambda: None
     )
 
 
@@ -70,7 +70,9 @@ class TestTakeInstants:
         folder = store.settings.recordings / str(recording.sha256)
         assert [path.name for path in folder.iterdir()] == ["3.png"]
         other = add_recording(store, "league", recording.path, actor="ann")
-        index_recording_in_worker(store, other.id, progress=lambda *_: None, stop=lambda: None)
+        index_recording_in_worker(
+            store, other.id, actor="ann", progress=lambda *_: None, stop=lambda: None
+        )
         monkeypatch.setattr(module, "replace_file", None)
         assert make_groups_of_instants(store, other.id, [3], False, "ann", lambda *_: None).new == 1
 

@@ -400,6 +400,24 @@ class TestLinkedGroups:
             "other.mp4 is no longer in the place that it was imported from" in job.problem["detail"]
         )
         assert "final/7.png" not in self.views(api)
+        # Of frames that it does not show, and of those that have its views, it is not needed.
+        result = self.taken(api, link, finished, 5, 30)
+        assert (result["new"], result["unchanged"], result["linked_views"]) == (1, 1, 0)
+
+    def test_kept_frames_of_a_replay_whose_file_is_gone_are_views(
+        self, app: Any, api: Any, film: Path, recording: str, finished: Finished
+    ) -> None:
+        write_video(film.parent / "other.mp4", "mp4v", 30)
+        body = {"dataset": "cup", "source": {"folder": "films/other.mp4"}}
+        other = finished(api.post(API, json=body)).result["recording"]
+        replay = {"recording": other, "first": 0, "last": 29}
+        made = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay})
+        instants(api, made.headers["location"], (0, 0), (10, 20))
+        # The group of its own that frame 10 of the replay is keeps its picture.
+        self.taken(api, f"{API}/{other}/links", finished, 10, linked=False)
+        (film.parent / "other.mp4").unlink()
+        assert self.taken(api, made.headers["location"], finished, 5)["linked_views"] == 1
+        assert self.views(api)["final/5.png"] == ["5.png", "other_10.png"]
 
 
 class TestSuggestions:

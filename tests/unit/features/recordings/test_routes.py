@@ -76,6 +76,19 @@ class TestAddRecording:
         assert finished(api.post(API, json=body)).result["frames"] == FRAMES
         assert api.get(f"/api/v1/uploads/{sent['id']}").json()["kept"]
 
+    def test_a_file_that_is_sent_for_a_dataset_that_cannot_be_does_not_stay(
+        self, api, film: Path
+    ) -> None:
+        kind = {"content-type": "application/octet-stream"}
+        url = "/api/v1/uploads?name=final.mp4"
+        sent = api.post(url, content=film.read_bytes(), headers=kind).json()
+        body = {"dataset": "a/b", "source": {"upload": sent["id"]}}
+        refused = api.post(API, json=body)
+        assert (refused.status_code, refused.json()["pointer"]) == (400, "/dataset")
+        upload = f"/api/v1/uploads/{sent['id']}"
+        assert not api.get(upload).json()["kept"]
+        assert api.delete(upload).status_code == 204
+
     @pytest.mark.parametrize(
         ("content", "problem"),
         [(b"", "final.mp4 is empty"), (b"no video at all", "is not a video that can be read")],
@@ -111,6 +124,21 @@ class TestGetFrame:
         tag = {"If-None-Match": answer.headers["etag"]}
         again = api.get(f"{recording}/frames/5", params={"width": 80}, headers=tag)
         assert (again.status_code, again.content) == (304, b"")
+
+    def test_it_is_kept_only_under_an_address_that_names_the_film(
+        self, api, film: Path, recording: str, finished: Finished
+    ) -> None:
+        def caching(**asked: str) -> str:
+            answer = api.get(f"{recording}/frames/5", params=asked)
+            assert answer.status_code == 200 and answer.headers["etag"]
+            return str(answer.headers["cache-control"])
+
+        named = {"v": api.get(recording).json()["sha256"][:12]}
+        assert caching(**named) == "private, max-age=3600"
+        assert caching() == caching(v="") == caching(v=named["v"][:11]) == "private, no-cache"
+        write_video(film, "mp4v", 30)
+        finished(api.post(f"{recording}/shots"))
+        assert caching(**named) == "private, no-cache"
 
     def test_a_frame_that_is_not_there_is_said_to_be(self, api, recording: str) -> None:
         answer = api.get(f"{recording}/frames/{FRAMES}")

@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.db.log import read_log
@@ -20,6 +21,8 @@ from app.features.imports.upload_queries import (
 from app.features.jobs.service import Jobs
 from app.features.recordings import index
 from app.features.recordings import jobs as module
+from app.features.recordings.ball_run_values import run_to_columns
+from app.features.recordings.ball_runs import remove_ball_run
 from app.features.recordings.index import index_recording_in_worker
 from app.features.recordings.instants import make_groups_of_instants
 from app.features.recordings.jobs import (
@@ -28,15 +31,21 @@ from app.features.recordings.jobs import (
     request_groups_of_instants,
     request_index,
 )
+from app.features.recordings.links import add_link, list_links, remove_link
+from app.features.recordings.match_clock import MatchClockReading, compute_match_time
+from app.features.recordings.queries import insert_ball_run, update_recording
 from app.features.recordings.service import (
     Recording,
     add_recording,
+    clock_readings_to_column,
     find_group_ids_by_frame,
     get_recording,
     remove_recording,
     require_video_file,
+    set_clock_readings,
 )
 from app.features.recordings.shots import Shot, get_shots, replace_shots
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 from tests.unit.features.jobs.steps import stopped_at_its_first_step
 from tests.videos import write_video
 from tests.waiting import SECONDS
@@ -47,10 +56,10 @@ def film(tmp_path: Path) -> Path:
     return write_video(tmp_path / "final.mp4", "mp4v", 60)
 
 
-def indexed(store: Store, film: Path) -> Recording:
-    recording = add_recording(store, "cup", film, actor="ann")
+def indexed(store: Store, film: Path, actor: str = "ann") -> Recording:
+    recording = add_recording(store, "cup", film, actor=actor)
     return index_recording_in_worker(
-        store, recording.id, progress=lambda *_: None, stop=lambda: None
+        store, recording.id, actor=actor, progress=lambda *_: None, stop=lambda: None
     )
 
 
@@ -95,11 +104,35 @@ class TestIndexNow:
         first = indexed(store, film)
         make_groups_of_instants(store, first.id, [5], False, "ann", lambda *_: None)
         write_video(film, "mp4v", 30)
-        second = indexed(store, film)
+        second = indexed(store, film, actor="eve")
         assert (second.id, second.name, second.groups) == (first.id, "final-2", 0)
         with store.read() as session:
             (event,) = [e for e in read_log(session) if e.body.get("did") == "recording renamed"]
         assert (event.body["before"], event.body["name"]) == ("final", "final-2")
+        assert event.actor == "eve"
+
+    def test_clock_readings_of_the_film_before_go_when_a_file_is_replaced(
+        self, store: Store, film: Path
+    ) -> None:
+        first = indexed(store, film)
+        clocks = [MatchClockReading(5, 1, 10.0), MatchClockReading(50, 1, 12.0)]
+        set_clock_readings(store, first.id, clocks, actor="ann")
+        assert indexed(store, film).clocks == tuple(clocks)
+        write_video(film, "mp4v", 30)
+        assert indexed(store, film, actor="eve").clocks == ()
+        with store.read() as session:
+            (event,) = [e for e in read_log(session) if e.body.get("did") == "match clocks removed"]
+        assert (event.actor, event.body["clocks"], event.body["name"]) == ("eve", 2, "final")
+
+    def test_a_clock_reading_beyond_the_frames_goes_with_the_same_file(
+        self, store: Store, film: Path
+    ) -> None:
+        first, clock = indexed(store, film), MatchClockReading(5, 1, 10.0)
+        set_clock_readings(store, first.id, [clock], actor="ann")
+        both = clock_readings_to_column([clock, MatchClockReading(60, 1, 12.0)])
+        with store.write() as session:
+            update_recording(session, first.id, clocks=both)
+        assert indexed(store, film).clocks == (clock,)
 
     def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
         self, store: Store, film: Path
@@ -109,7 +142,9 @@ class TestIndexNow:
 
         recording = add_recording(store, "cup", film, actor="ann")
         with pytest.raises(JobCancelled):
-            index_recording_in_worker(store, recording.id, progress=lambda *_: None, stop=cancelled)
+            index_recording_in_worker(
+                store, recording.id, actor="ann", progress=lambda *_: None, stop=cancelled
+            )
         assert not get_recording(store, recording.id).indexed
 
     def test_a_file_that_changes_meanwhile_is_refused(
@@ -141,6 +176,40 @@ class TestIndexNow:
         (tmp_path / "link.mp4").symlink_to(film)
         with pytest.raises(NotFoundError):
             indexed(store, tmp_path / "link.mp4")
+
+
+class TestComputeMatchTime:
+    def test_a_reading_beyond_the_frames_is_left_out(self) -> None:
+        seconds, beyond = np.arange(30) / 25, MatchClockReading(40, 2, 2700.0)
+        assert compute_match_time([beyond], seconds, 20) is None
+        clocks = [MatchClockReading(10, 1, 60.0), beyond]
+        assert compute_match_time(clocks, seconds, 20) == (1, pytest.approx(60.4))
+
+
+class TestIds:
+    def test_those_of_what_was_removed_are_not_given_again(self, store: Store, film: Path) -> None:
+        def link(recording: Recording) -> int:
+            return add_link(store, (recording.id, 0, 9), (recording.id, 20, 29), actor="ann").id
+
+        def run(recording: Recording) -> int:
+            ball = FollowedBall(5, 10.0, 10.0, 9.0, 0.5, 0.9, "followed")
+            followed = BallRun((BallClick(5, 10.0, 10.0),), (ball,), "limit", "limit")
+            values = {"dataset_id": recording.dataset_id, "recording_id": recording.id}
+            values |= {"sha256": recording.sha256, **run_to_columns(followed)}
+            with store.write() as session:
+                return insert_ball_run(session, "ann", **values)
+
+        first = indexed(store, film)
+        assert (first.id, link(first), run(first)) == (1, 1, 1)
+        remove_link(store, first.id, 1, actor="ann")
+        remove_ball_run(store, first.id, 1, actor="ann")
+        assert (link(first), run(first)) == (2, 2)
+        write_video(film, "mp4v", 30)
+        first = indexed(store, film)
+        assert list_links(store, first.id) == [] and link(first) == 3
+        remove_recording(store, first.id, actor="ann")
+        second = indexed(store, film)
+        assert (second.id, link(second), run(second)) == (2, 4, 3)
 
 
 class TestRequireVideo:
