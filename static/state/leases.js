@@ -65,7 +65,7 @@ async function take(id, group, over = false) {
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// While the server is away, or nobody is logged in, what one has stays one's own.
-		if (!isHere(id, group) || error.status === 0 || error.status === 401) return;
+		if (!isHere(id, group) || error.isPassing || error.status === 401) return;
 		const known = lease.value;
 		const state = error.status !== 409 ? 'none' : known?.state === 'mine' || known?.state === 'lost' ? 'lost' : 'others';
 		lease.value = { batch: id, group, state, part: known?.part ?? null, here: error.here ?? known?.here ?? [], sentence: error.message };
@@ -225,7 +225,7 @@ function hold(id, group) {
 	if (lease.value?.group !== group || lease.value.batch !== id) lease.value = null;
 	if (!lease.value) take(id, group);
 	// What others have is mine as soon as they have left it, also where they could not say so.
-	const again = () => { if (lease.value && lease.value.state !== 'none') take(id, group); };
+	const again = () => { if (lease.value?.state !== 'none') take(id, group); };
 	const timer = setInterval(again, AGAIN_MS);
 	const leave = () => giveBack(id, group);
 	const deaf = listen('work', heard, again);
