@@ -15,6 +15,7 @@ import { me, mustLogIn } from './me.js';
 import { batchId, currentId, goNext, reviewAddress } from './navigation.js';
 import { announce, complain, dismiss, inform } from './notice.js';
 import { outbox } from './outbox.js';
+import { isAway } from './sending.js';
 
 /** @import {ReturnedJson} from '../api/independent_annotations.js' */
 /** @import {BatchJson, LeaseJson, Part, Presence} from '../api/work.js' */
@@ -186,25 +187,40 @@ function arrived(group) {
 /** Whether the group on screen can be handed in here. */
 export const canSubmit = computed(() => lease.value?.part === 'annotator' && lease.value.state === 'mine');
 
+/** Groups that are being handed in: a second press says nothing new. @type {Set<number>} */
+const submitting = new Set();
+
 /** Done: hand the group in, and go on. */
 export async function submitAndOpenNext() {
 	const held = lease.value;
-	if (!held || !canSubmit.value || isMoving.value) return;
+	if (!held || !canSubmit.value || isMoving.value || submitting.has(held.group)) return;
+	submitting.add(held.group);
+	try {
+		// Who has gone elsewhere while it waited stays there.
+		if (await handIn(held) && isHere(held.batch, held.group)) await nextOfBatch();
+	} finally {
+		submitting.delete(held.group);
+	}
+}
+
+/** @param {Held} held @returns {Promise<boolean>} whether it was handed in */
+async function handIn(held) {
 	settle();
+	if (isAway.value && waits(held.group)) inform('This group is submitted as soon as its changes are saved.');
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
 		announce('First resolve the conflict: choose which version to keep.');
-		return;
+		return false;
 	}
 	try {
 		await putSubmission(held.batch, held.group);
 		announce('Submitted.');
+		return true;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`This group was not submitted: ${error.message}`);
-		return;
+		return false;
 	}
-	await nextOfBatch();
 }
 
 /** Have the group on screen as long as it is there, wherever the address leads. */
