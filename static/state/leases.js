@@ -54,15 +54,21 @@ function got(answer, id) {
 	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', submittedBy: answer.submitted_by, back: answer.returned, place: answer.place, of: answer.of };
 }
 
+/** The group that is worked on, in the review as in the calibration editor; a number, so that another view of it is no news. */
+const workedOn = computed(() => {
+	const at = page.value;
+	return at.page === 'review' || at.page === 'calibration' ? at.group : null;
+});
+
 /** @param {number} id @param {number} group */
-const isHere = (id, group) => batchId.value === id && currentId() === group;
+const isHere = (id, group) => batchId.value === id && workedOn.value === group;
 
 /** Take the group on screen, or let it stay mine. @param {number} id @param {number} group @param {boolean} [over] */
 async function take(id, group, over = false) {
 	try {
 		const answer = await putLease(id, group, over);
 		if (isHere(id, group)) got(answer, group);
-		else if (currentId() !== group) giveBack(id, group);
+		else if (workedOn.value !== group) giveBack(id, group);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// While the server is away, or nobody is logged in, what one has stays one's own.
@@ -226,12 +232,11 @@ async function handIn(held) {
 /** Have the group on screen as long as it is there, wherever the address leads. */
 export function startLeases() {
 	effect(() => {
-		const [id, at] = [batchId.value, page.value];
-		if (id === null || at.page !== 'review' || at.group === null || mustLogIn.value) {
+		const [id, group] = [batchId.value, workedOn.value];
+		if (id === null || group === null || mustLogIn.value) {
 			lease.value = null;
 			return undefined;
 		}
-		const { group } = at;
 		return untracked(() => hold(id, group));
 	});
 }

@@ -11,7 +11,7 @@ globalThis.history = /** @type {any} */ ({
 	},
 });
 
-const { canSubmit, lease, submitAndOpenNext } = await import('../../static/state/leases.js');
+const { canSubmit, lease, startLeases, submitAndOpenNext } = await import('../../static/state/leases.js');
 const { notice } = await import('../../static/state/notice.js');
 const { outbox } = await import('../../static/state/outbox.js');
 const { isAway } = await import('../../static/state/sending.js');
@@ -53,5 +53,25 @@ describe('submitting a group', () => {
 		await done;
 		assert.deepEqual(asked.map((one) => one.split(' ')[0]), ['PUT']);
 		assert.equal(location.pathname, '/review/9');
+	});
+});
+
+describe('a lease', () => {
+	it('stays while its group is looked at, in the calibration editor too', async () => {
+		const deaf = { addEventListener: () => {}, removeEventListener: () => {} };
+		// A page that nobody looks at hears of nothing.
+		Object.assign(globalThis, deaf, { document: { ...deaf, hidden: true } });
+		startLeases();
+		for (const place of ['7/calibration?view=a.png&', '7/calibration?view=b.png&', '7?', '7?view=a.png&']) {
+			navigate(`/review/${place}q=batch:1`);
+		}
+		assert.equal(lease.value?.group, 7);
+		assert.deepEqual(asked, []);
+		navigate('/review/7/history?q=batch:1');
+		assert.equal(lease.value, null);
+		assert.deepEqual(asked, ['DELETE /batches/1/groups/7/lease']);
+		navigate('/review/9?q=batch:1');
+		assert.equal(asked.at(-1), 'PUT /batches/1/groups/9/lease');
+		navigate('/groups');
 	});
 });
