@@ -527,7 +527,12 @@ class TestVerdicts:
         screen = review(4)
         group = screen.group
         before = screen.document()["verdict"]["state"]
-        problem = {"type": "about:blank", "title": "Refused", "status": 422, "detail": "this is no verdict"}
+        problem = {
+            "type": "about:blank",
+            "title": "Refused",
+            "status": 422,
+            "detail": "this is no verdict",
+        }
         screen.page.route(
             "**/verdict",
             lambda route: route.fulfill(
