@@ -211,6 +211,16 @@ function baseOf(at, key) {
 	return { lines, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
 }
 
+/**
+ * Remember an edit that was not sent from here but is on the server, so that undo finds it.
+ *
+ * @param {GroupDocument} at what it was made of @param {number | null} station the static camera that it changed
+ */
+export function rememberEdit(at, station) {
+	did({ kind: 'edit', dataset: at.dataset.name, group: at.id, number: at.number, times: 1 });
+	keepStation(at.id, station);
+}
+
 /** Groups whose last edit of this window changed a static camera, the newest last; it outlives a reload. */
 const lastStations = stored('last stations', /** @type {{group: number, station: number}[]} */ ([]), 'sessionStorage');
 const MOST_STATIONS = 100;
