@@ -104,6 +104,7 @@ export function startAsking() {
 		const wanted = lines.value;
 		if (page.value.page !== 'calibration' || !changed.value) {
 			asking.cancel();
+			refusal.value = '';
 			return;
 		}
 		asking.run(wanted);
