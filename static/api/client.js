@@ -28,11 +28,14 @@ export function cameIn() {
 	loggedOut.value = false;
 }
 
-/** @param {number} status @param {any} body @param {number} [since] what `entrances` was when it was asked @returns {ApiError} */
-function refusal(status, body, since = entrances) {
+/**
+ * @param {number} status @param {any} body @param {number} [since] what `entrances` was when it was asked
+ * @param {number} [retryAfter] @returns {ApiError}
+ */
+function refusal(status, body, since = entrances, retryAfter = 0) {
 	if (status === 401 && since === entrances) loggedOut.value = true;
 	if (status === 403) forbidden.value += 1;
-	return new ApiError(status, body);
+	return new ApiError(status, body, retryAfter);
 }
 
 /** @typedef {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal, keepalive?: boolean}} RequestOptions   `keepalive`: it is sent also while the page goes away */
@@ -69,8 +72,9 @@ export async function requestTagged(path, { method = 'GET', body, etag, key, sig
 		throw new ApiError(0, null);
 	}
 	const json = await bodyOf(response, signal);
-	if (!response.ok) throw refusal(response.status, json, since);
 	const { headers: said } = response;
+	// A date in its place is not a number, and not honoured.
+	if (!response.ok) throw refusal(response.status, json, since, Number(said.get('retry-after')) || 0);
 	return { json, etag: said.get('etag') ?? '', replayed: said.get('idempotency-replayed') === 'true' };
 }
 

@@ -1,15 +1,20 @@
 // @ts-check
 /** An answer of the server that says what is wrong, in its own sentence. */
 
+/** Nobody was reached, a proxy found the server away, or it is busy or full for now. */
+const PASSING = new Set([0, 502, 503, 504, 507]);
+
 export class ApiError extends Error {
 	/**
 	 * @param {number} status HTTP status; 0 when the server was not reached
 	 * @param {any} body problem JSON, or null
+	 * @param {number} [retryAfter] seconds after which the server wants to be asked again
 	 */
-	constructor(status, body) {
+	constructor(status, body, retryAfter = 0) {
 		super(detailOf(status, body));
 		this.name = 'ApiError';
 		this.status = status;
+		this.retryAfter = retryAfter;
 		/** What to do about it, when the server says so. @type {string | null} */
 		this.hint = body?.hint ?? null;
 		/** Which field of the request is at fault. @type {string | null} */
@@ -23,6 +28,11 @@ export class ApiError extends Error {
 	/** Whether somebody else changed the group first. */
 	get isConflict() {
 		return this.status === 412;
+	}
+
+	/** Whether the same request may succeed later. */
+	get isPassing() {
+		return PASSING.has(this.status);
 	}
 }
 

@@ -120,11 +120,12 @@ function isTyping(target) {
 	return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
 
-/** Enter and Space belong to the button or field that has the focus, Enter to a link. @param {KeyboardEvent} event */
+/** Enter and Space belong to the button, field or summary that has the focus, Enter to a link. @param {KeyboardEvent} event */
 function isPress(event) {
 	if (event.ctrlKey) return false;
 	if (event.target instanceof HTMLAnchorElement) return event.key === 'Enter';
-	const pressable = event.target instanceof HTMLButtonElement || event.target instanceof HTMLInputElement;
+	const pressable = event.target instanceof HTMLButtonElement || event.target instanceof HTMLInputElement
+		|| (event.target instanceof HTMLElement && event.target.tagName === 'SUMMARY');
 	return pressable && (event.key === 'Enter' || event.key === ' ');
 }
 

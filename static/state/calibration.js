@@ -13,6 +13,7 @@ import { group, groupDocument, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './undo.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
+import { refuses } from './rights.js';
 import { asProposed } from './proposal_lines.js';
 import { begin, changesOf, linesOf, proposedLines, rebase, stage, stepBack, stepForward } from './staging.js';
 
@@ -103,6 +104,7 @@ export function startAsking() {
 		const wanted = lines.value;
 		if (page.value.page !== 'calibration' || !changed.value) {
 			asking.cancel();
+			refusal.value = '';
 			return;
 		}
 		asking.run(wanted);
@@ -153,13 +155,15 @@ export function discardStaged() {
 	announce('Staged changes discarded.');
 }
 
-/** Save everything staged as one edit. @returns {boolean} whether there was anything */
+/** Save everything staged as one edit. @returns {boolean} whether it is on its way */
 export function commit() {
 	const at = view.value;
 	if (!at || !changed.value) {
 		announce('Nothing is staged.');
 		return false;
 	}
+	// What is staged stays where it cannot be saved.
+	if (refuses('annotate', groupDocument.value?.dataset.name)) return false;
 	const proposed = asProposed(changes.value, proposedLines(staging.value));
 	const edit = { kind: /** @type {const} */ ('lines'), view: at.key, lines: changes.value, ...(proposed.length ? { proposed } : {}) };
 	batch(() => {

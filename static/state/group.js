@@ -211,6 +211,16 @@ function baseOf(at, key) {
 	return { lines, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
 }
 
+/**
+ * Remember an edit that was not sent from here but is on the server, so that undo finds it.
+ *
+ * @param {GroupDocument} at what it was made of @param {number | null} station the static camera that it changed
+ */
+export function rememberEdit(at, station) {
+	did({ kind: 'edit', dataset: at.dataset.name, group: at.id, number: at.number, times: 1 });
+	keepStation(at.id, station);
+}
+
 /** Groups whose last edit of this window changed a static camera, the newest last; it outlives a reload. */
 const lastStations = stored('last stations', /** @type {{group: number, station: number}[]} */ ([]), 'sessionStorage');
 const MOST_STATIONS = 100;
@@ -258,16 +268,27 @@ function etagFor({ station, etag }, answer) {
 /** @param {Item} item @param {ApiError} error */
 function refused(item, error) {
 	const conflicting = error.isConflict && (item.edit !== null || item.verdict !== null);
+	const dropped = conflicting ? [] : outbox.value.filter((other) => other.group === item.group && !other.held);
 	batch(() => {
 		// What was said on top of it falls with it, or waits with it.
 		if (conflicting) revise((other) => (other.group === item.group ? { ...other, held: true } : other));
-		else discard((other) => other.group === item.group && !other.held);
+		else discard((other) => dropped.includes(other));
 		expected.value = null;
 		if (isGroup(error.current)) takeOver(error.current);
 	});
 	if (error.isConflict && !isGroup(error.current)) load(item.group).then(renew, () => {});
-	if (!conflicting) complain(`Not saved: ${[error.message, error.hint].filter(Boolean).join('. ')}`);
+	if (!conflicting) complain(refusalText(item, dropped, error));
 	listener(item, error);
+	for (const other of dropped) if (other.id !== item.id && other.verdict) listener(other, error);
+}
+
+/** @param {Item} item @param {Item[]} dropped with it @param {ApiError} error */
+function refusalText({ id, group: of }, dropped, { message, hint }) {
+	const number = known(of)?.number;
+	const where = number === undefined ? '' : ` in group ${number}`;
+	const text = `Not saved${where}: ${[message, hint].filter(Boolean).join('. ')}`;
+	if (!dropped.some((other) => other.id !== id && other.verdict)) return text;
+	return `${text.replace(/[^.?!]$/, '$&.')} Its verdict is not saved either.`;
 }
 
 /** @type {(item: Item, error: ApiError) => void} */

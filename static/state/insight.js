@@ -74,7 +74,8 @@ async function ask(what, id, key, signal) {
 	} catch (error) {
 		if (signal.aborted) return null;
 		if (!(error instanceof ApiError)) throw error;
-		if (error.status === 404 || error.status === 405) absent.add(what);
+		// 404 is about this group or view, which may have gone.
+		if (error.status === 405) absent.add(what);
 		return null;
 	}
 }

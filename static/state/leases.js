@@ -15,6 +15,7 @@ import { me, mustLogIn } from './me.js';
 import { batchId, currentId, goNext, reviewAddress } from './navigation.js';
 import { announce, complain, dismiss, inform } from './notice.js';
 import { outbox } from './outbox.js';
+import { isAway } from './sending.js';
 
 /** @import {ReturnedJson} from '../api/independent_annotations.js' */
 /** @import {BatchJson, LeaseJson, Part, Presence} from '../api/work.js' */
@@ -53,19 +54,25 @@ function got(answer, id) {
 	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', submittedBy: answer.submitted_by, back: answer.returned, place: answer.place, of: answer.of };
 }
 
+/** The group that is worked on, in the review as in the calibration editor; a number, so that another view of it is no news. */
+const workedOn = computed(() => {
+	const at = page.value;
+	return at.page === 'review' || at.page === 'calibration' ? at.group : null;
+});
+
 /** @param {number} id @param {number} group */
-const isHere = (id, group) => batchId.value === id && currentId() === group;
+const isHere = (id, group) => batchId.value === id && workedOn.value === group;
 
 /** Take the group on screen, or let it stay mine. @param {number} id @param {number} group @param {boolean} [over] */
 async function take(id, group, over = false) {
 	try {
 		const answer = await putLease(id, group, over);
 		if (isHere(id, group)) got(answer, group);
-		else if (currentId() !== group) giveBack(id, group);
+		else if (workedOn.value !== group) giveBack(id, group);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// While the server is away, or nobody is logged in, what one has stays one's own.
-		if (!isHere(id, group) || error.status === 0 || error.status === 401) return;
+		if (!isHere(id, group) || error.isPassing || error.status === 401) return;
 		const known = lease.value;
 		const state = error.status !== 409 ? 'none' : known?.state === 'mine' || known?.state === 'lost' ? 'lost' : 'others';
 		lease.value = { batch: id, group, state, part: known?.part ?? null, here: error.here ?? known?.here ?? [], sentence: error.message };
@@ -186,36 +193,50 @@ function arrived(group) {
 /** Whether the group on screen can be handed in here. */
 export const canSubmit = computed(() => lease.value?.part === 'annotator' && lease.value.state === 'mine');
 
+/** Groups that are being handed in: a second press says nothing new. @type {Set<number>} */
+const submitting = new Set();
+
 /** Done: hand the group in, and go on. */
 export async function submitAndOpenNext() {
 	const held = lease.value;
-	if (!held || !canSubmit.value || isMoving.value) return;
+	if (!held || !canSubmit.value || isMoving.value || submitting.has(held.group)) return;
+	submitting.add(held.group);
+	try {
+		// Who has gone elsewhere while it waited stays there.
+		if (await handIn(held) && isHere(held.batch, held.group)) await nextOfBatch();
+	} finally {
+		submitting.delete(held.group);
+	}
+}
+
+/** @param {Held} held @returns {Promise<boolean>} whether it was handed in */
+async function handIn(held) {
 	settle();
+	if (isAway.value && waits(held.group)) inform('This group is submitted as soon as its changes are saved.');
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
 		announce('First resolve the conflict: choose which version to keep.');
-		return;
+		return false;
 	}
 	try {
 		await putSubmission(held.batch, held.group);
 		announce('Submitted.');
+		return true;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`This group was not submitted: ${error.message}`);
-		return;
+		return false;
 	}
-	await nextOfBatch();
 }
 
 /** Have the group on screen as long as it is there, wherever the address leads. */
 export function startLeases() {
 	effect(() => {
-		const [id, at] = [batchId.value, page.value];
-		if (id === null || at.page !== 'review' || at.group === null || mustLogIn.value) {
+		const [id, group] = [batchId.value, workedOn.value];
+		if (id === null || group === null || mustLogIn.value) {
 			lease.value = null;
 			return undefined;
 		}
-		const { group } = at;
 		return untracked(() => hold(id, group));
 	});
 }
@@ -225,7 +246,7 @@ function hold(id, group) {
 	if (lease.value?.group !== group || lease.value.batch !== id) lease.value = null;
 	if (!lease.value) take(id, group);
 	// What others have is mine as soon as they have left it, also where they could not say so.
-	const again = () => { if (lease.value && lease.value.state !== 'none') take(id, group); };
+	const again = () => { if (lease.value?.state !== 'none') take(id, group); };
 	const timer = setInterval(again, AGAIN_MS);
 	const leave = () => giveBack(id, group);
 	const deaf = listen('work', heard, again);

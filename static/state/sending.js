@@ -17,13 +17,13 @@ import { adopt, claimTab, isKept, outbox, revise, unbar } from './outbox.js';
  * @property {(item: Item, error: ApiError) => void} refused
  */
 
-/** Proxies answer so while the server behind them is away. */
-const AWAY = new Set([0, 502, 504]);
 const FIRST_RETRY = 1500;
 const LAST_RETRY = 30_000;
 
-/** Whether the server could not be reached when it was last asked for a write. */
+/** Whether the server could not be reached, or had no time, when it was last asked for a write. */
 export const isAway = signal(false);
+/** What the server that is away said itself, as that it is busy; empty: it was not reached. */
+export const busyWith = signal('');
 /** Whether a write is on its way now. */
 export const isSending = signal(false);
 /** When the last write was answered, ms. */
@@ -109,8 +109,8 @@ async function send({ id, path, method, body, etag, ...rest }) {
 			bar(item, error);
 			return true;
 		}
-		if (AWAY.has(error.status)) {
-			tryLater();
+		if (error.isPassing) {
+			tryLater(error);
 			return false;
 		}
 		isAway.value = false;
@@ -133,9 +133,11 @@ export function tryBarred() {
 	wake();
 }
 
-function tryLater() {
+/** @param {ApiError} error */
+function tryLater({ status, message, retryAfter }) {
 	isAway.value = true;
+	busyWith.value = status === 503 || status === 507 ? message : '';
 	// Where the browser knows that there is no network it will say when there is.
-	if (navigator.onLine) timer = setTimeout(wake, pause);
+	if (navigator.onLine) timer = setTimeout(wake, Math.max(pause, 1000 * retryAfter));
 	pause = Math.min(LAST_RETRY, 2 * pause);
 }

@@ -10,7 +10,7 @@ import { actions, didAgain, forget, forgetEdit, nextAgain, nextBack, tookBack, u
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
-import { isAway, untilTakenUp, wake } from './sending.js';
+import { busyWith, isAway, untilTakenUp, wake } from './sending.js';
 import { redoVerdict, undoVerdict } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
@@ -146,8 +146,8 @@ function undoUnsent() {
 		complain('Undo needs the server, which cannot be reached.');
 		return false;
 	}
-	// The first of all may have reached the server, only its answer did not reach us.
-	if (last === outbox.value[0]) {
+	// The first of all may have reached the server, only its answer did not reach us; one that is busy has said no.
+	if (last === outbox.value[0] && !busyWith.value) {
 		submitTurn('undo');
 		return true;
 	}

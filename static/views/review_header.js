@@ -15,7 +15,7 @@ import { batch, lease } from '../state/leases.js';
 import { isCopy } from '../state/independent_annotations.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
-import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
+import { busyWith, isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
 import { openThreads } from '../state/threads.js';
 import { isBlind } from '../state/verdicts.js';
 import { Header } from './header.js';
@@ -33,7 +33,8 @@ const NEWS = 8000;
 function saveState() {
 	const here = waiting.value.length;
 	if (isAway.value && here > 0) {
-		return { state: 'away', words: () => `Offline · ${here} ${here === 1 ? 'change waits' : 'changes wait'}` };
+		const why = busyWith.value ? 'Server busy' : 'Offline';
+		return { state: 'away', words: () => `${why} · ${here} ${here === 1 ? 'change waits' : 'changes wait'}` };
 	}
 	if (held.value.length > 0) return { state: 'failed', words: () => 'Not saved: conflict' };
 	if (here > 0 || isSending.value) return { state: 'saving', words: () => 'Saving…' };
@@ -68,7 +69,7 @@ export function SaveState() {
 	const quick = state === 'saving' && !slow;
 	const text = quick ? (savedAt.value === null ? 'No changes' : `Saved ${ago(savedAt.value, now)}`) : words(now);
 	const title = state !== 'away' ? '' : lasting.value
-		? 'Stored in this browser, and sent when the server can be reached'
+		? `Stored in this browser, and sent when the server ${busyWith.value ? `has time. It says: ${busyWith.value}` : 'can be reached'}`
 		: 'This browser cannot store unsaved changes: do not close the page';
 	return html`
 		<${ConflictLink} />

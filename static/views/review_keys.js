@@ -222,7 +222,7 @@ const VERDICT = [
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Submit the group and go to the next one of the batch', group: 'Navigate', needs: 'annotate', when: () => canSubmit.value, run: () => { submitAndNext(); } },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next one of the batch', group: 'Navigate', needs: 'annotate', once: true, when: () => canSubmit.value, run: () => { submitAndNext(); } },
 	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canReturn.value, run: askReturn },
 	{ keys: ['Shift+r'], label: 'Apply an independent annotation to its group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups forward', group: 'Navigate', run: () => { goBy(1, FAR); } },

@@ -239,6 +239,26 @@ class TestPointer:
         editor.press("Control+z")
         editor.staged(0)
 
+    def test_lines_that_cannot_be_previewed_say_so(self, editor: Editor, console: Any) -> None:
+        console.expect("422")
+        told = {"title": "Refused", "status": 422, "detail": "these lines meet nowhere"}
+        editor.page.route("**/preview", lambda route: route.fulfill(status=422, json=told))
+        editor.choose(longest(editor.lines))
+        editor.press(".", "Shift+ArrowDown")
+        card = editor.page.get_by_role("region", name="Before and after", exact=True)
+        expect(card).to_contain_text("not known")
+        expect(card).to_contain_text("these lines meet nowhere")
+        editor.press("Control+Delete")
+        expect(card).to_contain_text("nothing staged")
+        expect(card).not_to_contain_text("these lines meet nowhere")
+
+    def test_a_group_that_is_not_there_is_not_waited_for(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("404")
+        page = open_page("/review/999999/calibration")
+        expect(page.get_by_role("heading", name="Group 999999 cannot be shown")).to_be_visible()
+
     def test_a_new_marking_is_drawn_by_clicks(self, editor: Editor) -> None:
         view = editor.view
         absent = absent_from(view["lines"])
@@ -355,10 +375,14 @@ class TestStation:
         editor.staged(0)
         until(page, lambda: editor.lines == before)
         editor.saved()
-        page.get_by_role("button", name="Given camera").click()
-        expect(page.get_by_role("button", name="Given camera")).to_have_attribute(
-            "aria-pressed", "true"
-        )
+        given = page.get_by_role("button", name="Given camera")
+        given.click()
+        expect(given).to_have_attribute("aria-pressed", "true")
+        editor.press("Control+z")
+        expect(given).to_have_attribute("aria-pressed", "false")
+        editor.saved()
+        given.click()
+        expect(given).to_have_attribute("aria-pressed", "true")
         jobs_end(page, film)
 
     def test_undo_returns_to_the_group_of_an_edit_also_after_the_page_was_loaded_anew(

@@ -71,6 +71,26 @@ class TestOutbox:
         assert first["views"][0]["balls"][0]["box"][0] == box[0] + 5
         leave_as_found(page, chain[:2], edited=chain[0])
 
+    def test_an_edit_that_a_busy_server_refuses_is_sent_in_a_moment(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("503")
+        screen, chain = at_last_groups(open_page, console)
+        page = screen.page
+        box = screen.document()["views"][0]["balls"][0]["box"]
+        busy = {"title": "Busy", "status": 503, "detail": "too many requests at once"}
+        page.route(
+            "**/api/v1/views/**",
+            lambda route: route.fulfill(status=503, json=busy, headers={"Retry-After": "2"}),
+            times=1,
+        )
+        screen.press("i", "Shift+ArrowLeft")
+        expect(page.locator(".save")).to_contain_text("Server busy · 1 change waits")
+        expect(page.get_by_role("alert")).to_have_count(0)
+        screen.saved()
+        assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
+        leave_as_found(page, [], edited=chain[0])
+
     def test_what_waits_survives_a_reload(self, open_page: OpenPage, console: Any) -> None:
         screen, chain = at_last_groups(open_page, console)
         page = screen.page

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import jobs_end, until
+from tests.e2e.screen import holding, jobs_end, until
 from tests.e2e.service import delete_dataset, free_port, killable
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
@@ -344,6 +344,27 @@ class TestCutting:
         expect(page.get_by_text("Another person changed the shots")).to_be_visible()
         expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(1)
         assert shots_of(page, recording)[0]["kind"] == "closeup"
+
+    def test_what_waits_behind_a_refused_change_falls_with_it(
+        self, recording: int, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("412 (Precondition Failed)")
+        page = opened(open_page, recording)
+        path = f"/api/v1/recordings/{recording}/shots"
+        tag = page.request.get(path).headers["etag"]
+        theirs = {"shots": [{"first": 0, "last": 119, "kind": "closeup"}]}
+        with holding(page, f"**{path}") as sent:
+            page.keyboard.press("1")
+            sent.arrive()
+            page.keyboard.press("2")
+            page.keyboard.press("x")
+            assert page.request.put(path, data=theirs, headers={"If-Match": tag}).ok
+        shots = page.get_by_role("region", name="Shots").get_by_role("button")
+        expect(shots).to_have_count(1)
+        page.keyboard.press("a")
+        until(page, lambda: shots_of(page, recording)[0]["kept"] is True)
+        assert [one["kind"] for one in shots_of(page, recording)] == ["closeup"]
+        expect(shots).to_have_count(1)
 
 
 class TestInstants:

@@ -523,19 +523,24 @@ class TestVerdicts:
     def test_a_verdict_that_is_refused_puts_the_group_back(
         self, review: Callable[..., Screen], console: Any
     ) -> None:
-        console.expect("503")
+        console.expect("422")
         screen = review(4)
         group = screen.group
         before = screen.document()["verdict"]["state"]
-        problem = {"type": "about:blank", "title": "Busy", "status": 503, "detail": "no room left"}
+        problem = {
+            "type": "about:blank",
+            "title": "Refused",
+            "status": 422,
+            "detail": "this is no verdict",
+        }
         screen.page.route(
             "**/verdict",
             lambda route: route.fulfill(
-                status=503, content_type="application/problem+json", body=json.dumps(problem)
+                status=422, content_type="application/problem+json", body=json.dumps(problem)
             ),
         )
         screen.press("s")
-        expect(screen.page.get_by_role("alert")).to_contain_text("no room left")
+        expect(screen.page.get_by_role("alert")).to_contain_text("this is no verdict")
         assert screen.group == group
         expect(screen.page.locator('.pill[data-status="deferred"]')).to_have_count(0)
         assert screen.document()["verdict"]["state"] == before
@@ -543,9 +548,9 @@ class TestVerdicts:
     def test_a_refusal_that_is_there_before_the_next_group_is_known_keeps_the_group(
         self, open_page: Callable[..., Page], console: Any
     ) -> None:
-        console.expect("503")
+        console.expect("422")
         page = open_page(None)
-        page.route("**/verdict", lambda route: route.fulfill(status=503, body="{}"))
+        page.route("**/verdict", lambda route: route.fulfill(status=422, body="{}"))
         with holding(page, re.compile("/neighbours")) as neighbours:
             page.goto(f"/review/{passing(page, 4)}")
             screen = Screen(page)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,6 +14,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.formats.issia_writer import write_issia
+from tests.e2e.screen import holding, until
 from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
@@ -105,6 +107,42 @@ class TestTracks:
         expect(page.get_by_role("button", name="Reject")).to_have_attribute("aria-pressed", "true")
         page.keyboard.press("u")
         expect(page.get_by_text("no verdict yet")).to_be_visible()
+
+    def test_corrections_in_a_row_build_on_each_other(self, track: Page) -> None:
+        number = track.url.split("/tracks/")[1].split("?")[0]
+        track.goto(f"/tracks/{number}?frame={FIRST + 5}")
+        shows(track, FIRST + 5)
+        with holding(track, f"**/api/v1/tracks/{number}") as sent:
+            track.keyboard.press("2")
+            sent.arrive()
+            track.keyboard.press("Shift+ArrowRight")
+            shows(track, FIRST + 30)
+            track.keyboard.press("3")
+        path = f"/api/v1/tracks/{number}"
+        until(track, lambda: len(track.request.get(path).json()["corrections"]) == 2)
+
+    def test_a_verdict_that_is_answered_late_leads_nobody_away(self, track: Page) -> None:
+        number = track.url.split("/tracks/")[1].split("?")[0]
+        with holding(track, f"**/api/v1/tracks/{number}") as sent:
+            track.keyboard.press("a")
+            sent.arrive()
+            track.get_by_role("link", name="Tracks", exact=True).click()
+            track.wait_for_url("**/datasets/flight/tracks")
+        expect(track.locator("[aria-live]").filter(has_text="accepted")).to_have_count(1)
+        track.wait_for_timeout(500)
+        assert track.url.endswith("/datasets/flight/tracks")
+        expect(track.get_by_text("No other track of this list waits")).to_have_count(0)
+
+    def test_a_verdict_is_shown_though_the_next_track_is_not_known(
+        self, track: Page, console: Any
+    ) -> None:
+        console.expect("500")
+        listed = re.compile(r"/api/v1/datasets/\w+/tracks")
+        track.route(listed, lambda route: route.fulfill(status=500, json={"detail": "no list"}))
+        track.keyboard.press("a")
+        expect(track.get_by_role("alert")).to_contain_text("The next track is not known: no list")
+        accept = track.get_by_role("button", name="Accept")
+        expect(accept).to_have_attribute("aria-pressed", "true")
 
     def test_a_frame_leads_to_its_group(self, track: Page) -> None:
         track.keyboard.press("ArrowRight")

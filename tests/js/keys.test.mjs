@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { bind, chooseKey, chordOf, isEditable, isLetter, keysOf } from '../../static/lib/keys.js';
+import { bind, chooseKey, chordOf, isEditable, isLetter, keysOf, startKeys } from '../../static/lib/keys.js';
 
 const event = { key: 'a', code: 'KeyA', ctrlKey: false, metaKey: false, altKey: false, shiftKey: false };
 
@@ -40,5 +40,31 @@ describe('chooseKey', () => {
 		assert.ok(isEditable(accept));
 		assert.ok(!isEditable({ ...accept, keys: ['Escape'] }));
 		assert.ok(!isEditable({ ...accept, keys: [] }));
+	});
+});
+
+describe('a key', () => {
+	/** @type {Record<string, (event: any) => void>} */
+	const hears = {};
+	class HTMLElement {
+		/** @param {string} tagName */
+		constructor(tagName) { this.tagName = tagName; }
+	}
+	const kinds = ['HTMLAnchorElement', 'HTMLButtonElement', 'HTMLInputElement', 'HTMLTextAreaElement', 'HTMLSelectElement'];
+	Object.assign(globalThis, {
+		HTMLElement, ...Object.fromEntries(kinds.map((kind) => [kind, class extends HTMLElement {}])),
+		addEventListener: (/** @type {string} */ name, /** @type {any} */ hear) => { hears[name] = hear; },
+		document: { querySelector: () => null },
+	});
+
+	it('opens the summary that has the focus, and does nothing else', () => {
+		let runs = 0;
+		const unbind = bind([{ keys: ['Enter', ' '], label: 'Open the group', group: 'Track', run: () => { runs += 1; } }]);
+		startKeys();
+		for (const [tag, key] of [['SUMMARY', 'Enter'], ['SUMMARY', ' '], ['DIV', 'Enter']]) {
+			hears.keydown({ ...event, key, code: key, target: new HTMLElement(tag), preventDefault: () => {} });
+		}
+		assert.equal(runs, 1);
+		unbind();
 	});
 });

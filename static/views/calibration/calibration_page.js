@@ -37,14 +37,29 @@ import { StationCard } from './station_card.js';
 
 /** @import {GroupDocument, ViewJson} from '../../api/types.js' */
 
-/** @param {number} id */
-async function enter(id) {
+/** @param {number} id @param {(id: number) => void} setAbsent */
+async function enter(id, setAbsent) {
+	setAbsent(0);
 	try {
 		await open(id);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
+		const at = page.peek();
+		if (at.page !== 'calibration' || at.group !== id) return;
+		setAbsent(id);
 		complain(`Group ${id} cannot be shown: ${error.message}`, { label: 'Open the queue', run: () => navigate('/groups') });
 	}
+}
+
+/** In the place of a group that is not there, or not yet. @param {{id: number}} props `id`: 0 while it may come */
+function Absent({ id }) {
+	if (id === 0) return html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`;
+	return html`
+		<main class="review__empty">
+			<h1>Group ${id} cannot be shown</h1>
+			<p><a href="/groups">Open the queue</a></p>
+		</main>
+	`;
 }
 
 /** @param {{group: GroupDocument, current: string}} props */
@@ -128,7 +143,8 @@ function Workspace({ group, at }) {
 export function CalibrationPage() {
 	useKeys(EDITOR_KEYS);
 	const wanted = page.value.page === 'calibration' ? page.value.group : null;
-	useEffect(() => { if (wanted !== null) enter(wanted); }, [wanted]);
+	const [absent, setAbsent] = useState(0);
+	useEffect(() => { if (wanted !== null) enter(wanted, setAbsent); }, [wanted]);
 	useEffect(() => startAsking(), []);
 	useEffect(() => followPaint(), []);
 	useEffect(() => followProposals(), []);
@@ -151,7 +167,7 @@ export function CalibrationPage() {
 			<//>
 			<div class="bars"><${NoticeBar} /><${ConflictBar} /></div>
 			<p class="small-note">The calibration editor needs a wider screen. ${wanted === null ? null : html`<a class="button" href=${reviewAddress(wanted)}>Back to the review</a>`}</p>
-			${group && at ? html`<${Workspace} group=${group} at=${at} />` : html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`}
+			${group && at ? html`<${Workspace} group=${group} at=${at} />` : html`<${Absent} id=${absent === wanted ? absent : 0} />`}
 		</div>
 	`;
 }

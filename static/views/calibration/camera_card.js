@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { chooseCalibration } from '../../api/calibration.js';
 import { ApiError } from '../../api/problem.js';
 import { fixed } from '../../lib/format.js';
-import { groupDocument, submit, takeOver, unsaved } from '../../state/group.js';
+import { groupDocument, rememberEdit, submit, takeOver, unsaved } from '../../state/group.js';
 import { announce, complain } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
 import { cameraNumbers, oddities } from './camera_numbers.js';
@@ -23,6 +23,7 @@ async function choose(view, source) {
 	if (!present || view.station.calibration === source) return;
 	try {
 		takeOver(await chooseCalibration(present, view, source));
+		rememberEdit(present, view.station.shared ? view.station.id : null);
 		announce(source === 'given' ? 'The given calibration is used.' : 'The lines are used.');
 		if (view.station.shared) watchSolving(present.dataset.name);
 	} catch (error) {

@@ -15,9 +15,11 @@ const WORDS = { better: 'better', worse: 'worse', other: 'changed', same: '' };
 export function Comparison({ group, view, before, after }) {
 	const { text, grade } = summaryOf(group, view, after);
 	const staged = changed.value;
+	const asking = staged && !isCurrent.value && !refusal.value;
+	const state = isCurrent.value ? 'not saved' : asking ? 'asking…' : 'not known';
 	return html`
-		<section class="card strip-card" aria-label="Before and after" aria-busy=${!isCurrent.value}>
-			<h2>Before → after<span class="card__aside">${staged ? (isCurrent.value ? 'not saved' : 'asking…') : 'nothing staged'}</span></h2>
+		<section class="card strip-card" aria-label="Before and after" aria-busy=${asking}>
+			<h2>Before → after<span class="card__aside">${staged ? state : 'nothing staged'}</span></h2>
 			<div class="editor__scroll" tabindex="0" role="group" aria-label="Before and after in numbers">
 				<p class="comparison__summary" data-grade=${refusal.value ? 'bad' : grade} role="status">${refusal.value || text}</p>
 				<table class="numbers comparison" data-live=${staged && !isCurrent.value}>

@@ -102,7 +102,7 @@ export const EDITOR_KEYS = [
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
 	{ keys: ['e'], label: 'Show the paint found in the picture', group: 'View', run: togglePaint },
 	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines are drawn ${gain.value} times as long.`); } },
-	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', typing: true, run: save },
+	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', needs: 'annotate', typing: true, run: save },
 	{ keys: ['Ctrl+z'], label: 'Undo; staged changes first', group: 'Save', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Save', run: redo },
 	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Discard everything staged', group: 'Save', run: discardStaged },

@@ -53,14 +53,23 @@ function useLink(first) {
 				announce(told);
 			} catch (problem) {
 				if (!(problem instanceof ApiError)) throw problem;
-				complain(problem.status === 412 ? 'Another person changed this link; the page shows the new state.' : problem.message);
-				if (problem.status !== 412) return;
-				before.current = [];
-				keep(await getLink(recording, id));
+				if (problem.status === 412) await meet();
+				else complain(problem.message);
 			}
 		});
 	}
 	const reload = async () => keep(await getLink(recording, id));
+	/** Another person was first. */
+	async function meet() {
+		before.current = [];
+		try {
+			await reload();
+			complain('Another person changed this link; the page shows the new state.');
+		} catch (problem) {
+			if (!(problem instanceof ApiError)) throw problem;
+			complain(`Another person changed this link. Load the page again to see the new state: ${problem.message}`);
+		}
+	}
 	return { link, change, reload, undo: () => change(() => before.current.pop() ?? null, 'Undone.', false) };
 }
 

@@ -39,6 +39,8 @@ function useShots(id) {
 	const latest = useRef(list);
 	const before = useRef(/** @type {Shot[][]} */ ([]));
 	const sending = useRef(Promise.resolve());
+	// What was sent for builds on what was sent before: where that fails a new turn begins.
+	const turn = useRef(0);
 	/** @param {{items: Shot[], etag: string}} next */
 	function keep(next) {
 		latest.current = next;
@@ -59,7 +61,9 @@ function useShots(id) {
 		const present = latest.current;
 		if (!present) return;
 		keep({ items, etag: present.etag });
+		const mine = turn.current;
 		sending.current = sending.current.then(async () => {
+			if (mine !== turn.current) return;
 			try {
 				const saved = await putShots(id, items, latest.current?.etag ?? '');
 				// What was changed meanwhile is on its way.
@@ -68,8 +72,10 @@ function useShots(id) {
 			} catch (problem) {
 				if (!(problem instanceof ApiError)) throw problem;
 				complain(problem.status === 412 ? 'Another person changed the shots; the page shows the new state.' : problem.message);
-				before.current = [];
 				await read();
+				// Also what was changed until the answer came was changed in the old list.
+				turn.current += 1;
+				before.current = [];
 			}
 		});
 	}

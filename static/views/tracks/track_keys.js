@@ -18,7 +18,7 @@ import { eventAt, eventBy, EVENTS } from '../../state/tracks.js';
  * @property {(kind: EventKind, added: boolean) => void} correct
  * @property {(by: number) => void} zoom
  * @property {() => void} switchView
- * @property {() => Promise<boolean>} goOn
+ * @property {() => Promise<void>} goOn
  */
 
 /** @param {{current: Doing}} doing as it is when a key is pressed @returns {Binding[]} */

@@ -245,7 +245,11 @@ function Track({ track, setTrack }) {
 	const [at, plays] = [player.at.value, player.speed.value !== 0];
 	const [width, setWidth] = useState(Math.min(track.last - track.first + 1, WINDOW));
 	const turn = useChanges(track, setTrack);
-	const sending = useRef(false);
+	const newest = useRef(track);
+	useLayoutEffect(() => { newest.current = track; }, [track]);
+	const sending = useRef(Promise.resolve());
+	const judging = useRef(false);
+	const isHere = () => { const at = page.peek(); return at.page === 'track' && at.track === track.id; };
 	const frames = found.value;
 	const goTo = player.goTo;
 	const switchView = () => { shownAs.value = shownAs.value === 'space' ? 'curves' : 'space'; };
@@ -259,36 +263,67 @@ function Track({ track, setTrack }) {
 		}, SETTLED);
 		return () => clearTimeout(timer);
 	}, [at, plays]);
-	/** The next track that waits for a verdict, in the list that this one was reached from. @returns {Promise<boolean>} whether there is one */
-	async function goOn() {
+	/** To the next track that waits for a verdict, in the list that this one was reached from. @param {() => boolean} [stillWanted] asked once it is known which track that is */
+	async function goOn(stillWanted = () => true) {
 		const values = listValues(place.peek().search);
-		const next = await nextOpen(track, values, me.value?.name ?? 'local');
+		/** @type {Awaited<ReturnType<typeof nextOpen>>} */
+		let next;
+		try {
+			next = await nextOpen(track, values, me.value?.name ?? 'local');
+		} catch (problem) {
+			if (!(problem instanceof ApiError)) throw problem;
+			complain(`The next track is not known: ${problem.message}`);
+			return;
+		}
+		if (!isHere() || !stillWanted()) return;
 		if (!next) inform('No other track of this list waits for a verdict.', { label: 'All tracks', run: () => navigate(pageAddress(track.dataset, 'tracks')) });
 		else navigate(trackAddress(next.id, values));
-		return next !== null;
 	}
-	/** @param {Parameters<typeof patchTrack>[1]} body @param {string} told */
-	async function send(body, told) {
-		if (sending.current) return;
-		sending.current = true;
+	/** @param {TrackJson} changed */
+	function keep(changed) {
+		newest.current = changed;
+		if (isHere()) setTrack(changed);
+	}
+	/** @param {(present: TrackJson) => Parameters<typeof patchTrack>[1]} make of the last answer @param {string} told @returns {Promise<boolean>} whether it is saved */
+	async function sendNow(make, told) {
 		try {
-			const changed = await patchTrack(track, body);
+			keep(await patchTrack(newest.current, make(newest.current)));
 			announce(told);
-			if (body.verdict === undefined || body.verdict === 'none' || !(await goOn())) setTrack(changed);
+			return true;
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
 			complain(problem.message);
-			if (problem.status === 412) setTrack(await getTrack(track.id));
-		} finally {
-			sending.current = false;
+			if (problem.status === 412) await readAgain();
+			return false;
 		}
 	}
+	async function readAgain() {
+		try {
+			keep(await getTrack(track.id));
+		} catch (problem) {
+			// Why it was not saved is told already.
+			if (!(problem instanceof ApiError)) throw problem;
+		}
+	}
+	/** One after the other: each builds on the last answer. @param {Parameters<typeof sendNow>} what */
+	function send(...what) {
+		const sent = sending.current.then(() => sendNow(...what));
+		sending.current = sent.then(() => {});
+		return sent;
+	}
 	/** @param {'accepted' | 'rejected' | 'none'} verdict */
-	const judge = (verdict) => send({ verdict }, verdict === 'none' ? 'The verdict is withdrawn.' : `The track is ${verdict}.`);
+	async function judge(verdict) {
+		if (judging.current) return;
+		judging.current = true;
+		const saved = await send(() => ({ verdict }), verdict === 'none' ? 'The verdict is withdrawn.' : `The track is ${verdict}.`);
+		judging.current = false;
+		// Who takes it back meanwhile stays.
+		if (saved && verdict !== 'none' && isHere()) await goOn(() => !judging.current && newest.current.verdict === verdict);
+	}
 	/** @param {EventKind} kind @param {boolean} added */
 	const correct = (kind, added) => {
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);
-		send({ corrections: corrected(track.corrections, { frame, kind, added }) }, added ? `Added a ${kind} in frame ${frame}.` : `Removed the ${kind} of frame ${frame}.`);
+		send((present) => ({ corrections: corrected(present.corrections, { frame, kind, added }) }), added ? `Added a ${kind} in frame ${frame}.` : `Removed the ${kind} of frame ${frame}.`);
 	};
 	const doing = useRef({ track, frames, at, player, judge, correct, switchView, goOn, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
 	Object.assign(doing.current, { track, frames, at, player, judge, correct, goOn });
