@@ -57,8 +57,16 @@ def _written(root: Path, view: View) -> Path:
         raise DataError(f'"{view.file_name}" leads out of {root}')
     path = root / view.file_name
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.exists():
-        path.write_bytes(view.frame())
+    content = view.frame()
+    if path.exists():
+        if path.read_bytes() != content:
+            raise DataError(
+                f"{path} is another picture than the frame of this version; choose an empty folder, or delete it"
+            )
+        return path
+    part = path.with_name(f"{path.name}.part")
+    part.write_bytes(content)
+    part.replace(path)
     return path
 
 

@@ -49,19 +49,18 @@ def read_version_truth(session: Session, version: Version, split: str | None) ->
     """The frames of a frozen version, with the ids that its views have today."""
     rows = list(read_rows(session, version.id, members=True))
     frames: list[GroundTruthFrame] = []
-    gone = 0
+    gone = seen = 0
     for start in range(0, len(rows), BATCH):
         frozen = read_frozen_groups(session, version, rows[start : start + BATCH])
         ids = find_group_and_view_ids(
             session, version.dataset_id, [item.group.key for item in frozen]
         )
         for item in frozen:
-            for frame in _iterate_frozen_frames(
-                item, ids.get(item.group.key, (0, {})), len(frames)
-            ):
+            for frame in _iterate_frozen_frames(item, ids.get(item.group.key, (0, {})), seen):
                 if split is None or frame.split == split:
                     frames.append(frame)
                     gone += frame.id < 0
+            seen += len(item.group.views)
     pins = make_truth_pins(
         version.policy, version.solver_version, version.hash, version.groups, version
     )

@@ -74,3 +74,14 @@ class TestWritten:
         view = replace(touchline.open(export).views[0], file_name="../outside.png")
         with pytest.raises(DataError, match="leads out of"):
             _written(tmp_path / "frames", view)
+
+    def test_another_picture_in_its_place_is_named_and_kept(
+        self, export: Path, tmp_path: Path
+    ) -> None:
+        (view, *_) = touchline.open(export).views
+        path = _written(tmp_path, view)
+        assert _written(tmp_path, view) == path and path.read_bytes() == view.frame()
+        path.write_bytes(b"of another version")
+        with pytest.raises(DataError, match="is another picture than the frame of this version"):
+            _written(tmp_path, view)
+        assert path.read_bytes() == b"of another version"
