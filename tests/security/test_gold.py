@@ -386,6 +386,16 @@ class TestReviewers:
         plain = ask("lea", "POST", "/datasets/demo/batches", body).json()["id"]
         given = ask("anna", "POST", f"/batches/{plain}/next", {}).json()["group"]
         assert given == other and ask("anna", "GET", f"/groups/{other}").status_code == 200
+        # What is hidden counts in no batch.
+        seen = ask("anna", "GET", f"/batches/{plain}").json()
+        assert (seen["groups"], seen["waiting"]) == (1, 1)
+        assert ask("lea", "GET", f"/batches/{plain}").json()["groups"] == 3
+        (left,) = [
+            one["left"]
+            for one in ask("anna", "GET", "/work").json()["items"]
+            if one["batch"]["id"] == plain
+        ]
+        assert left == 1
         # Nor are the originals opened by the batch whose copies she annotates.
         for target in ("submission", "lease"):
             at = f"/batches/{blind}/groups/{made.ordinary[3]}/{target}"

@@ -10,7 +10,11 @@ from dataclasses import replace
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.batches.queries import list_returned_batch_groups, read_batch_groups
+from app.features.batches.queries import (
+    count_visible_work,
+    list_returned_batch_groups,
+    read_batch_groups,
+)
 from app.features.batches.queries import set_group_submission as hand_in_group
 from app.features.batches.service import Batch, BatchRole, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
@@ -101,13 +105,20 @@ def hide_others_progress(session: Session, batch: Batch) -> Batch:
     """A batch as whoever asks may see it.
 
     Of one that they annotate blind they see their own part alone: counts of the groups change with
-    what is submitted of them, and not with what is submitted of a gold group.
+    what is submitted of them, and not with what is submitted of a gold group. Groups that are hidden by
+    that one count in no other.
     """
     if query_reveals_hidden_work(batch.query) and not sees_independent_work(batch.dataset_id):
         batch = replace(batch, query="")
     reader = READER.get()
-    if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
+    if reader is None or batch.dataset_id not in reader.batches:
         return batch
+    if batch.id not in reader.batches[batch.dataset_id]:
+        found = count_visible_work(session, batch.id, batch.dataset_id)
+        if found is None:
+            return batch
+        counts = {name: getattr(found, name) for name in ("groups", "submitted", "settled", "last")}
+        return replace(batch, **counts)
     return replace(with_own_counts(session, batch, reader.person), query="")
 
 

@@ -199,7 +199,7 @@ def list_own_batches(
                 left = (
                     count_own_groups_left(session, batch, worker.name)
                     if own
-                    else _count_groups_left(batch, parts)
+                    else _count_groups_left(hide_others_progress(session, batch), parts)
                 )
                 back = _list_returned_groups(session, batch, worker.name)
                 seen = with_own_counts(session, batch, worker.name) if own else batch

@@ -312,6 +312,15 @@ def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, WorkCo
     }
 
 
+def count_visible_work(session: Session, batch_id: int, dataset_id: int) -> WorkCount | None:
+    """How much is done of the groups of a batch that whoever asks may see; None: it is of tracks."""
+    if session.row(WorkCount, _COUNT, {"ids": [batch_id]}) is None:
+        return None
+    visible = visible_groups_condition(dataset_id, BatchGroupModel.group_id)
+    found = session.row(WorkCount, _COUNT.where(*visible), {"ids": [batch_id]})
+    return found or WorkCount(batch_id, 0, 0, 0, None)
+
+
 def set_group_submission(
     session: Session,
     batch_id: int,
