@@ -1,9 +1,12 @@
-"""Cache: versions that were fetched from a server, each once, under its hash."""
+"""Cache: versions that were fetched from a server, each once."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 
 def cache_folder() -> Path:
@@ -15,13 +18,19 @@ def cache_folder() -> Path:
     return (Path(root) if root else Path.home() / ".cache") / "touchline"
 
 
-def cached_version(folder: Path, hash_: str, boxes: str, images: bool) -> Path:
+def cached_version(folder: Path, version: Mapping[str, Any], boxes: str, images: bool) -> Path:
     """Where the export of a version is kept.
+
+    Versions with the same content have one hash, and may differ in name, licence and pictures.
 
     Args:
         folder: The cache.
-        hash_: Of the version, whole.
+        version: As the server describes it.
         boxes: Which ball box it has.
         images: Whether it has the frames.
     """
-    return folder / "versions" / f"{hash_}-{boxes}{'-images' if images else ''}.zip"
+    told = repr([version[name] for name in ("dataset", "name", "created")])
+    which = hashlib.sha256(told.encode()).hexdigest()[:12]
+    return (
+        folder / "versions" / f"{version['hash']}-{which}-{boxes}{'-images' if images else ''}.zip"
+    )

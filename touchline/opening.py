@@ -48,7 +48,7 @@ def open_version(
         return Dataset(export, _frames(frames, export, None))
     client = Client(str(source))
     found = _find(client, dataset, version)
-    path = cached_version(Path(cache or cache_folder()), found["hash"], boxes, images)
+    path = cached_version(Path(cache or cache_folder()), found, boxes, images)
     if not path.exists():
         request = {"dataset": found["dataset"], "format": "parquet", "version": found["id"]}
         client.export(path, keep=False, **request, boxes=boxes, images="copy" if images else "none")
