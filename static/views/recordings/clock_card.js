@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { patchRecording } from '../../api/recordings.js';
+import { getRecording, patchRecording } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { withForm } from '../../lib/field.js';
 import { clockSeconds, clockText, HALVES } from '../../state/shots.js';
@@ -15,11 +15,11 @@ import { FormError } from '../form_error.js';
 /** @param {{one: RecordingJson, reload: () => void}} props */
 export function ClockCard({ one, reload }) {
 	const { error, attempt } = useAttempt();
-	/** @param {MatchClock[]} clocks */
-	const send = (clocks) => attempt(patchRecording(one.id, { clocks }), reload);
+	/** Change the readings as they are by now, also those of other people. @param {(clocks: MatchClock[]) => MatchClock[]} change */
+	const send = (change) => attempt(getRecording(one.id).then(({ clocks }) => patchRecording(one.id, { clocks: change(clocks) })), reload);
 	const set = withForm((said, form) => {
 		const clock = { frame: wanted.value, half: Number(said.get('half')), seconds: clockSeconds(String(said.get('time'))) ?? 0 };
-		send([...one.clocks.filter(({ frame }) => frame !== clock.frame), clock]).then((done) => { if (done) form.reset(); });
+		send((clocks) => [...clocks.filter(({ frame }) => frame !== clock.frame), clock]).then((done) => { if (done) form.reset(); });
 	});
 	return html`
 		<section class="card" aria-label="Time of the match">
@@ -37,7 +37,7 @@ export function ClockCard({ one, reload }) {
 					${one.clocks.map((clock) => html`
 						<li key=${clock.frame}>
 							<button class="link-button" type="button" onClick=${() => goTo(clock.frame)}>frame ${clock.frame}</button> ${clockText(clock.half, clock.seconds)}
-							<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} onClick=${() => send(one.clocks.filter((other) => other !== clock))}>Remove<span class="hidden-text"> the clock of frame ${clock.frame}</span></button>
+							<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} onClick=${() => send((clocks) => clocks.filter(({ frame }) => frame !== clock.frame))}>Remove<span class="hidden-text"> the clock of frame ${clock.frame}</span></button>
 						</li>`)}
 				</ul>` : html`<p class="empty-note">Go to a frame in which the match clock changes, and enter the time that it shows.</p>`}
 		</section>
