@@ -189,6 +189,8 @@ PROPERTIES: Mapping[str, str] = {
     "AuditEntry.group": "Key of the group; null where it concerns none.",
     "CaseDocument.group": "The group.",
     "ChangedGroupDocument.group": "Key of the group.",
+    "ChangedTrack.stretch": "Key of its stretch.",
+    "ChangedTrack.what": "Whether the newer version has gained it, has lost it, or has another one.",
     "FindingRow.group": "Key of the group.",
     "FrameResult.group": "Key of the group.",
     "BallMoveDocument.group": "Key of the group.",
