@@ -21,6 +21,7 @@ from app.features.tracks.codec import (
 )
 from app.features.tracks.run_measurements import AcceptedRunObservation
 from app.features.tracks.stretches import (
+    MOST_FRAMES,
     RATE,
     Shots,
     Stretch,
@@ -155,7 +156,11 @@ def _cut_at_frozen_tracks(known: Iterable[StoredStretchTrack]) -> dict[str, list
         edges = {0, MAX_FRAMES}
         for stored in of_match:
             edges |= {stored.first, stored.last + 1}
-        found[match] = [(first, end - 1) for first, end in pairwise(sorted(edges))]
+        found[match] = [
+            (start, min(start + MOST_FRAMES, end) - 1)
+            for first, end in pairwise(sorted(edges))
+            for start in range(first, end, MOST_FRAMES)
+        ]
     return found
 
 

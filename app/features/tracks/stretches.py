@@ -318,7 +318,11 @@ def _split_into_stretches(
             place = here
         else:
             new = last is None or (
-                match.recorded and row.instant.time - last.instant.time > LONGEST_GAP_S
+                match.recorded
+                and (
+                    row.instant.time - last.instant.time > LONGEST_GAP_S
+                    or frame - parts[-1][0].instant.frame >= MOST_FRAMES
+                )
             )
         if last is not None and frame == last.instant.frame:
             raise InputError(

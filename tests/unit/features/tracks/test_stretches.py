@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
+from app.features.tracks import stretches as stretches_module
 from app.features.tracks.codec import TrackInputs, make_track
 from app.features.tracks.stored import format_unused_balls
 from app.features.tracks.stretches import (
@@ -167,6 +168,14 @@ class TestGatherStretches:
         assert len(stretches[0].frames) == 21
         assert np.allclose(stretches[0].times, 10 + np.arange(21) / 50)
         assert stretches[0].measurements.view_names == ("final",)
+
+    def test_a_recording_without_shots_is_cut_where_a_track_would_be_too_long(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(stretches_module, "MOST_FRAMES", 8)
+        groups = [recorded(group, frame) for frame, group in enumerate(flight_groups(12))]
+        found = gather_stretches(map(record, groups), PAPER)
+        assert [item.key for item in found] == ["final 0-7", "final 8-11"]
 
     def test_groups_that_say_no_time_are_in_none(self, make_group) -> None:
         found = gather_stretches([record(make_group())], PAPER)
