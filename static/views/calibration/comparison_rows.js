@@ -44,7 +44,7 @@ const MEASURES = [
 	{ name: 'supported', label: 'Markings with paint', read: (_, solved) => solved?.calibration.paint?.supported, say: share, better: 1, step: 0.005, rare: true },
 	{ name: 'explained', label: 'Paint with a marking', read: (_, solved) => solved?.calibration.paint?.explained, say: share, better: 1, step: 0.005, rare: true },
 	{ name: 'ball', label: 'Ball error here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: pixelText, better: -1, step: 0.05 },
-	{ name: 'ratio', label: 'Ball size ÷ expected', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
+	{ name: 'ratio', label: 'Ball size ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
 	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
 	{ name: 'views', label: 'Views used', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },
 	{ name: 'x', label: 'Ball x', read: (solution) => solution?.ball?.point[0], say: metres, better: 0, step: 0.005 },
