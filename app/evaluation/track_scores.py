@@ -188,8 +188,7 @@ def _add_track_to_comparison(
         # The nearest comes last, and stays; of two that are equally near the first.
         known = known[np.lexsort((-known, -apart[known]))]
         rows[place[known]] = known
-        near = place[place >= 0]
-        found.beside += len(place) - int(there[near].sum())
+        found.beside += len(place) - int(there[place[known]].sum())
         if predicted.events is not None:
             found.events.append(_collect_track_events(track, predicted))
     position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)

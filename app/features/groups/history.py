@@ -26,6 +26,8 @@ from app.soccer.pitch import Pitch
 
 STATION_EDITS = ("station_edit", "station_undo", "station_redo")
 """Kinds of entries in which somebody changed a static camera, and with it all its groups."""
+ABOUT_COPIES = frozenset({"take", "agreement"})
+"""Kinds of entries that say what people made of a group independently."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,6 @@ class EntryChanges:
     pitch_before: Pitch | None
     pitch_after: Pitch
     first: bool
-
-
-ABOUT_COPIES = frozenset({"take", "agreement"})
-"""Kinds of entries that say what people made of a group independently."""
 
 
 def read_history(store: Store, group_id: int) -> list[LogEntry]:

@@ -271,21 +271,17 @@ def save_station(
     session.execute(update(StationModel).where(StationModel.id == stored.id).values(values))
 
 
-def list_groups_of_station(session: Session, station_id: int) -> list[int]:
-    """Ids of the groups that a station's views belong to."""
-    return _list_groups_of_station(session, station_id)
-
-
-def list_visible_groups_of_station(session: Session, dataset_id: int, station_id: int) -> list[int]:
-    """Those of them that whoever asks may see."""
-    return _list_groups_of_station(
-        session, station_id, *visible_groups_condition(dataset_id, ViewModel.group_id)
-    )
-
-
-def _list_groups_of_station(
-    session: Session, station_id: int, *where: ColumnElement[bool]
+def list_groups_of_station(
+    session: Session, station_id: int, visible_in: int | None = None
 ) -> list[int]:
+    """Ids of the groups that a station's views belong to.
+
+    Args:
+        session: Any session.
+        station_id: Which station.
+        visible_in: Id of its dataset, for those alone that whoever asks may see.
+    """
+    where = [] if visible_in is None else visible_groups_condition(visible_in, ViewModel.group_id)
     statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id, *where)
     return list(session.scalars(statement.distinct().order_by(ViewModel.group_id)))
 

@@ -32,10 +32,10 @@ from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import (
     StoredStation,
     list_groups_of_station,
-    list_visible_groups_of_station,
     read_stations,
     save_station,
 )
+from app.features.people.visibility_queries import has_hidden_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
 from app.features.solutions.service import read_known_calibrations, solve_and_encode
@@ -254,6 +254,9 @@ def _read_state(session: Session, station_id: int) -> StationState:
     if stored is None:
         raise NotFoundError(f"there is no static camera with id {station_id}")
     stacks = read_station_stacks(session, station_id)
+    groups = visible = list_groups_of_station(session, station_id)
+    if has_hidden_groups(stored.dataset_id):
+        visible = list_groups_of_station(session, station_id, stored.dataset_id)
     return StationState(
         id=stored.id,
         dataset_id=stored.dataset_id,
@@ -261,10 +264,8 @@ def _read_state(session: Session, station_id: int) -> StationState:
         revision=stored.revision,
         etag=station_etag(stored),
         station=stored.station,
-        groups=tuple(list_groups_of_station(session, station_id)),
-        visible_groups=tuple(
-            list_visible_groups_of_station(session, stored.dataset_id, station_id)
-        ),
+        groups=tuple(groups),
+        visible_groups=tuple(visible),
         can_undo=stacks.can_undo,
         can_redo=stacks.can_redo,
         stored=stored,

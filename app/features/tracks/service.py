@@ -111,23 +111,7 @@ def list_tracks(store: Store, dataset: str | int) -> list[Track]:
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         rows = list_track_rows(session, found.id)
-        groups = (
-            read_group_states_by_match(session, found.id, {row.match for row in rows})
-            if rows
-            else {}
-        )
-        runs = list_accepted_runs(session, found.id) if rows else {}
-        shots = read_recording_shots(session, found.id) if rows else {}
-        return [
-            build_track_from_row(
-                row,
-                found.policy,
-                groups.get(row.match, ()),
-                runs.get(row.match, ()),
-                shots.get(row.match),
-            )
-            for row in rows
-        ]
+        return _build_tracks(session, found, rows)
 
 
 def get_track(store: Store, track_id: int) -> Track:
@@ -237,11 +221,16 @@ def collect_accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str,
 def list_accepted_tracks(session: Session, dataset: DatasetHead) -> list[Track]:
     """The tracks of a dataset that people accepted, also those that are stale since."""
     rows = [row for row in list_track_rows(session, dataset.id) if row.verdict == "accepted"]
-    groups = (
-        read_group_states_by_match(session, dataset.id, {row.match for row in rows}) if rows else {}
-    )
-    runs = list_accepted_runs(session, dataset.id) if rows else {}
-    shots = read_recording_shots(session, dataset.id) if rows else {}
+    return _build_tracks(session, dataset, rows)
+
+
+def _build_tracks(session: Session, dataset: DatasetHead, rows: Sequence[Any]) -> list[Track]:
+    """Tracks of a dataset from their rows, with what they depend on as it is now."""
+    if not rows:
+        return []
+    groups = read_group_states_by_match(session, dataset.id, {row.match for row in rows})
+    runs = list_accepted_runs(session, dataset.id)
+    shots = read_recording_shots(session, dataset.id)
     return [
         build_track_from_row(
             row,
