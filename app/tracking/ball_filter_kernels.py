@@ -42,6 +42,8 @@ from app.tracking.ball_models import (
 
 OUTLIER = np.log(0.01 / 1000.0**2)
 """Logarithm of the density of a measurement of something else, per square pixel."""
+UP = (0.0, 0.0, 1.0)
+"""Along z; a tuple, which costs the innermost loop no memory."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -149,15 +151,12 @@ def apply_kick(m, P, before, mode, dt):
     cost = np.log(KICKS_A_SECOND * max(dt, 1e-3))
     predict_state(m, P, before, dt / 2)
     if before == FLIGHT and mode != ROLL:
-        up = np.array([0.0, 0.0, 1.0])
-        square, _ = apply_linear_measurement(m, P, up, -TOUCHED, TOUCHED_SIGMA**2)
+        square, _ = apply_linear_measurement(m, P, UP, -TOUCHED, TOUCHED_SIGMA**2)
         cost -= min(square / 2, 12.0)
     spread = dt * dt / 12 * (m[3] ** 2 + m[4] ** 2 + KICK_SPEED**2)
     if mode == ROLL:
         cost += np.log(0.5)
-        square, total = apply_linear_measurement(
-            m, P, np.array([0.0, 0.0, 1.0]), -REST, 4 * GRASS_SIGMA**2
-        )
+        square, total = apply_linear_measurement(m, P, UP, -REST, 4 * GRASS_SIGMA**2)
         cost += min(0.0, -square / 2 - np.log(total) / 2 + np.log(0.4))
         clear_covariance(P, 3, 6)
         m[5] = 0.0
@@ -213,7 +212,7 @@ def apply_bounce(m, P, mode, dt):
     predict_state(m, P, FLIGHT, when)
     fall = max(m[5], 0.3)
     slack = (fall * dt) ** 2 / 12 + 0.04**2
-    square, total = apply_linear_measurement(m, P, np.array([0.0, 0.0, 1.0]), -REST, slack)
+    square, total = apply_linear_measurement(m, P, UP, -REST, slack)
     cost = (
         -square / 2
         - np.log(2 * np.pi * total) / 2

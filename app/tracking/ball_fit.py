@@ -48,7 +48,8 @@ P, V = slice(0, 3), slice(3, 6)
 """Where position and velocity stand in a state."""
 _ROUNDS, _MOST_M = 30, 8.0
 """Steps of the fit, and how far one may move a ball."""
-_SETTLED_M = 1e-4
+SETTLED_M = 1e-4
+"""A fit is done where no place moves by more."""
 _LOOSE = {FLIGHT: 0.5, ROLL: 1.0, HELD: 1.0}
 """White noise of the acceleration beside its slow part, by mode, (m/s2)2 s."""
 _ROUGH = 0.0016
@@ -92,6 +93,7 @@ def fit_ball_path(
     unseen: FloatArray,
     *,
     brief: bool = False,
+    settled_m: float = SETTLED_M,
 ) -> FittedPath:
     """Fit the way of a ball.
 
@@ -105,6 +107,7 @@ def fit_ball_path(
         unseen: What touches that nobody saw add to the noise of the acceleration before each
             knot, (m/s2)2 s, shape (K,).
         brief: Leave out what only a result tells: ``event_sigma`` is NaN, and nothing is late.
+        settled_m: Done where no place moves by more, metres.
     """
     problem = _PathProblem(knots, mode, event, used, noise, unseen, start)
     state = start
@@ -114,7 +117,7 @@ def fit_ball_path(
         step = -solve_factored(rows, pull.ravel()).reshape(-1, SIZE)
         most = float(np.abs(step[:, P]).max())
         state = state + step * min(1.0, _MOST_M / max(most, 1e-12))
-        if most < _SETTLED_M:
+        if most < settled_m:
             break
     diagonal, beside, _ = problem.compute_normal_equations(state)
     rows = factor_block_tridiagonal(diagonal, beside)

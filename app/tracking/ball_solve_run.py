@@ -11,7 +11,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_constraints import TrackConstraints
-from app.tracking.ball_fit import FittedPath, fit_ball_path
+from app.tracking.ball_fit import SETTLED_M, FittedPath, fit_ball_path
 from app.tracking.ball_models import NOTHING
 from app.tracking.ball_search import (
     BallHistory,
@@ -51,12 +51,14 @@ class TrackOptions:
         beyond_s: How far before the first and after the last measurement a ball is said.
         most_sigma_m: Uncertainty beyond which a frame is a gap.
         leave_out: Whether to say how measurements are predicted without them.
+        settled_m: A fit is done where no place moves by more, metres.
     """
 
     longest_gap_s: float = 1.2
     beyond_s: float = 0.5
     most_sigma_m: float = 1.5
     leave_out: bool = True
+    settled_m: float = SETTLED_M
 
 
 @dataclass(frozen=True)
@@ -147,10 +149,12 @@ def solve_run(
         return TrackRun(rows, format_contradiction(f"{wrong:.0%} of the measurements fit no ball"))
     event = history.event.copy()
     used, noise = history.used.copy(), knots.noise
-    unseen = _unseen_touch_noise(knots)
+    unseen, near = _unseen_touch_noise(knots), options.settled_m
     state = np.pad(history.state, ((0, 0), (0, 3)))
     for turn in range(4):
-        fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen, brief=True)
+        fitted = fit_ball_path(
+            knots, history.mode, event, used, state, noise, unseen, brief=True, settled_m=near
+        )
         state = fitted.state
         scale = _estimate_noise_scale(knots, fitted, used)
         if known is None and turn == 0 and np.median(scale) > _LOUD:
@@ -166,7 +170,7 @@ def solve_run(
             event, history = moved[1], replace(history, mode=moved[0])
         if not changed and turn > 0:
             break
-    fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen)
+    fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen, settled_m=near)
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
     return TrackRun(rows, None, part.view_names, rows_of, history, fitted, used, noise)

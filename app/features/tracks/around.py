@@ -39,8 +39,13 @@ from app.features.tracks.stored import (
     parse_corrections,
     parse_track_summary,
 )
-from app.features.tracks.stretches import gather_stretches, parse_frame_number
-from app.formats.export_record import ExportRecord
+from app.features.tracks.stretches import (
+    GroupMeasurements,
+    build_stretches,
+    measure_group,
+    parse_frame_number,
+)
+from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 
@@ -51,8 +56,8 @@ _MARGIN = 10
 
 
 _MOST_KEPT = 500
-"""Groups that are kept as they were read: people go from one to the next."""
-_kept: dict[tuple[Any, ...], ExportRecord] = {}
+"""Groups whose measurements are kept: people go from one to the next."""
+_kept: dict[tuple[Any, ...], GroupMeasurements | None] = {}
 _lock = Lock()
 
 
@@ -141,7 +146,7 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
         ]
         groups = read_groups_by_match(session, head.id, [row.match], ids).get(row.match, [])
         near = map_groups_by_frame(groups, first, last)
-        records = _read_cached_records(session, list(near.values()), head.policy.hash)
+        measured = _measure_cached_groups(session, list(near.values()), head.policy.hash)
         runs = list_accepted_runs(session, head.id).get(row.match, [])
         close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
         followed = {
@@ -152,7 +157,7 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
         }
     # One stretch, however far apart its groups are.
     shots = {row.match: [(int(row.first), int(row.last))]}
-    stretches = gather_stretches(records, head.policy, shots, followed)
+    stretches = build_stretches(measured, head.policy, shots, followed)
     if not stretches:
         ball, inputs = _make_empty_track(summary.rate, first, last)
     else:
@@ -162,23 +167,27 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
     return TrackExcerpt(make_track_etag(row), ball, inputs, near, frame)
 
 
-def _read_cached_records(
+def _measure_cached_groups(
     session: Session, groups: Sequence[GroupForTracking], policy: str
-) -> list[ExportRecord]:
-    """Groups with their solutions; those that were read before for a frame near by are not read again."""
+) -> list[GroupMeasurements]:
+    """What groups give; those that were read before for a frame near by are not read again."""
     key_of = {group.key: (group.id, group.source, group.state, policy) for group in groups}
     with _lock:
         found = {key: _kept[said] for key, said in key_of.items() if said in _kept}
     missing = [group for group in groups if group.key not in found]
-    new = {record.group.key: record for record in read_export_records(session, missing)}
-    with _lock:
+    new: dict[tuple[Any, ...], GroupMeasurements | None] = {}
+    known: dict[bytes, Camera] = {}
+    for record in read_export_records(session, missing):
+        measured = found[record.group.key] = measure_group(record, known)
         # What is not solved by now may be solved without another change.
-        solved = {key_of[key]: record for key, record in new.items() if record.solution is not None}
-        _kept.update(solved)
+        if record.solution is not None:
+            new[key_of[record.group.key]] = measured
+    with _lock:
+        _kept.update(new)
         for said in list(_kept)[: max(len(_kept) - _MOST_KEPT, 0)]:
             del _kept[said]
-    found |= new
-    return [found[group.key] for group in groups if group.key in found]
+    every = (found.get(group.key) for group in groups)
+    return [one for one in every if one is not None]
 
 
 def _make_empty_track(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs]:

@@ -19,7 +19,7 @@ from app.json_text import canonical_json_text, digest_content
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.pitch import Pitch
 from app.tracking.ball_correct import TrackPatch, apply_patches, correct_track
-from app.tracking.ball_solve import track_ball
+from app.tracking.ball_solve import TrackOptions, track_ball
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
@@ -37,6 +37,8 @@ TRACK_VERSION = "5"
 """Of the solver: tracks of another one are stale."""
 EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
 _UPPER = np.triu_indices(6)
+_NEAR_M = 1e-3
+"""How near a part of a track comes to its solution: it is shown to the centimetre, and not stored."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def make_track(inputs: TrackInputs) -> BallTrack:
 def make_partial_track(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
     """The track of a part of a stretch, with corrections, where the whole says how wrong views are."""
     measured, frames, times = inputs.measurements, inputs.frames, inputs.times
-    track = track_ball(measured, frames, times, pitch=inputs.pitch, known=known)
+    options = TrackOptions(settled_m=_NEAR_M)
+    track = track_ball(measured, frames, times, pitch=inputs.pitch, options=options, known=known)
     return apply_corrections(inputs, track, solve_corrected_parts(inputs, track))
 
 

@@ -136,15 +136,18 @@ def find_group_instant(group: Group) -> tuple[Instant, bool] | None:
     return Instant(number, number / RATE, group.key), False
 
 
-@dataclass
-class _GroupMeasurements:
-    """What one group gives.
+@dataclass(frozen=True)
+class GroupMeasurements:
+    """What one group gives to a stretch.
 
     Attributes:
+        recorded: Whether a recording says when it was.
         observations: Name of a view, its time, and what it measures.
     """
 
+    match: str
     instant: Instant
+    recorded: bool
     pitch: Pitch
     observations: list[tuple[str, float, BallObservation]]
     point: tuple[float, float, float] | None
@@ -155,7 +158,7 @@ class _GroupMeasurements:
 @dataclass
 class _MatchMeasurements:
     recorded: bool
-    rows: list[_GroupMeasurements] = field(default_factory=list)
+    rows: list[GroupMeasurements] = field(default_factory=list)
 
 
 def gather_stretches(
@@ -168,20 +171,31 @@ def gather_stretches(
 
     Args:
         records: Groups with their solutions, in any order.
+        policy, shots, followed: As of ``build_stretches``.
+    """
+    known: dict[bytes, Camera] = {}
+    measured = (measure_group(record, known) for record in records)
+    return build_stretches(filter(None, measured), policy, shots, followed)
+
+
+def build_stretches(
+    measured: Iterable[GroupMeasurements],
+    policy: Policy,
+    shots: Shots | None = None,
+    followed: Mapping[str, Sequence[AcceptedRunObservation]] | None = None,
+) -> list[Stretch]:
+    """The stretches of groups that were measured, by match and time.
+
+    Args:
+        measured: What the groups give, in any order.
         policy: Says how noisy clicks and cameras are.
         shots: Of recordings, where they are known.
         followed: Balls of accepted runs in frames that are of no group, by match: of the frames of a stretch,
             and beyond its groups of those of its shot.
     """
     matches: dict[str, _MatchMeasurements] = {}
-    known: dict[bytes, Camera] = {}
-    for record in records:
-        found = find_group_instant(record.group)
-        if found is None:
-            continue
-        instant, recorded = found
-        match = matches.setdefault(record.group.match, _MatchMeasurements(recorded))
-        match.rows.append(_measure_group(record, instant, known))
+    for one in measured:
+        matches.setdefault(one.match, _MatchMeasurements(one.recorded)).rows.append(one)
     stretches = []
     for name, match in sorted(matches.items()):
         match.rows.sort(key=lambda row: row.instant.frame)
@@ -235,9 +249,19 @@ def require_any_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
         )
 
 
-def _measure_group(
-    record: ExportRecord, instant: Instant, known: dict[bytes, Camera]
-) -> _GroupMeasurements:
+def measure_group(
+    record: ExportRecord, known: dict[bytes, Camera] | None = None
+) -> GroupMeasurements | None:
+    """What a group gives to a stretch; None where it says no time.
+
+    Args:
+        record: With its solution.
+        known: Cameras by their numbers, to which those of the group are added: equal ones are one object.
+    """
+    found = find_group_instant(record.group)
+    if found is None:
+        return None
+    known, (instant, recorded) = {} if known is None else known, found
     group, solution, unused = record.group, record.solution, Counter[str]()
     views, calibrations = [], []
     cameras = {}
@@ -268,8 +292,15 @@ def _measure_group(
         )
         for item in collect_clicked_balls(views, calibrations)
     ]
-    return _GroupMeasurements(
-        instant, group.pitch, observations, record.ball_point, cameras, unused
+    return GroupMeasurements(
+        group.match,
+        instant,
+        recorded,
+        group.pitch,
+        observations,
+        record.ball_point,
+        cameras,
+        unused,
     )
 
 
@@ -305,10 +336,10 @@ def _camera_to_bytes(camera: Camera) -> bytes:
 
 def _split_into_stretches(
     match: _MatchMeasurements, shots: Sequence[tuple[int, int]] | None
-) -> list[list[_GroupMeasurements]]:
+) -> list[list[GroupMeasurements]]:
     """Rows that belong together: a whole rig, or the shots of a recording."""
-    parts: list[list[_GroupMeasurements]] = []
-    last: _GroupMeasurements | None = None
+    parts: list[list[GroupMeasurements]] = []
+    last: GroupMeasurements | None = None
     place: object = None
     for row in match.rows:
         frame = row.instant.frame
@@ -346,7 +377,7 @@ def find_shot_at_frame(
 def _build_stretch(
     key: str,
     name: str,
-    rows: Sequence[_GroupMeasurements],
+    rows: Sequence[GroupMeasurements],
     beside: Sequence[AcceptedRunObservation],
     match: _MatchMeasurements,
     policy: Policy,
@@ -385,7 +416,7 @@ def _build_stretch(
 
 
 def _build_measurements(
-    rows: Sequence[_GroupMeasurements], beside: Sequence[AcceptedRunObservation], policy: Policy
+    rows: Sequence[GroupMeasurements], beside: Sequence[AcceptedRunObservation], policy: Policy
 ) -> BallMeasurements:
     found = [
         (row.instant.frame, name, time, item, row.point)
