@@ -164,14 +164,23 @@ def inflate_ray_noise(knots: TrackKnots, most: float) -> TrackKnots:
     return replace(knots, noise=knots.noise * factor)
 
 
-def find_likeliest_history(knots: TrackKnots, pitch: Pitch, width: int = _WIDTH) -> BallHistory:
-    """The likeliest history of a stretch."""
+def find_likeliest_history(
+    knots: TrackKnots, pitch: Pitch, width: int = _WIDTH, shortest_s: float = 0.0
+) -> BallHistory:
+    """The likeliest history of a stretch.
+
+    Args:
+        knots: Of the stretch.
+        pitch: Where the ball is played.
+        width: Histories that are kept.
+        shortest_s: Between two knots, below which the ball is not taken to be touched.
+    """
     x, y = pitch.length / 2 + _ASIDE_M, pitch.width / 2 + _ASIDE_M
     room = np.array([[-x, x], [-y, y], [-_ABOVE_M, _BELOW_M]])
     asked = knots.asked
     mode, event, left, state, score = find_likeliest_modes(
         knots.times, knots.starts, knots.centres, knots.across, knots.along,
-        knots.noise, knots.scale, knots.far, knots.far_sigma, room, width,
+        knots.noise, knots.scale, knots.far, knots.far_sigma, room, width, shortest_s,
         find_view_changes(knots), asked.wanted, asked.begin, asked.due, asked.may_not,
         np.searchsorted(asked.at, np.arange(len(knots.times) + 1)),
         asked.normal, asked.value, asked.sigma,

@@ -82,7 +82,7 @@ def out_of_bounds_cost(m, P, mode, room):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def find_likeliest_modes(
-    times, starts, centres, across, along, noise, scale, far, far_sigma, room, width,
+    times, starts, centres, across, along, noise, scale, far, far_sigma, room, width, shortest,
     changed, wanted, begin, due, may_not, places, normal, value, sigma,
 ):  # fmt: skip
     """The likeliest history of modes and events.
@@ -98,6 +98,7 @@ def find_likeliest_modes(
         far, far_sigma: Distances from the cameras by size, and noise, 0 where unknown, shape (M,).
         room: Lowest and highest x, y and z of a ball, shape (3, 2).
         width: Hypotheses kept.
+        shortest: Seconds between two knots, below which a ball is not touched unless somebody says so.
         changed: Whether other views see the ball at a knot than before it, shape (K,).
         wanted: Kind of the event that happens once before a knot of its window, or ``NOTHING``, (K,).
         begin: First knot of that window, shape (K,).
@@ -138,6 +139,7 @@ def find_likeliest_modes(
         second[:] = -np.inf
         jump_of[:] = -1
         dt = times[k] - times[k - 1] if k else 0.0
+        short = dt < shortest and wanted[k] == NOTHING
         for strict in range(2):
             # Where no history can do what has to happen, it is as if nobody had said it.
             if strict == 1 and (k == 0 or made > 0):
@@ -149,6 +151,8 @@ def find_likeliest_modes(
                     missing = NOTHING
                 now = missing != NOTHING and due[k] and strict == 0
                 for way in range(_PER_KNOT if k else 1):
+                    if short and 0 < way < 5:
+                        continue
                     event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK
                     if way == 5:
                         if not changed[k]:

@@ -47,3 +47,13 @@ def test_a_stretch_says_medians_and_what_was_predicted() -> None:
 def test_nothing_predicted_is_said() -> None:
     told = summarize_prediction_errors(np.full(2, np.nan), np.array([1, 2]), np.array([1, 2]))
     assert told.median_px is None and told.p95_px is None and told.predicted == 0
+
+
+def test_each_frame_has_the_median_of_its_own_errors() -> None:
+    draw = np.random.default_rng(4)
+    px, of_frame = draw.exponential(3.0, 200), draw.integers(0, 40, 200)
+    px[draw.random(200) < 0.2] = np.nan
+    told = summarize_prediction_errors(px, of_frame, np.arange(45))
+    own = [px[(of_frame == frame) & np.isfinite(px)] for frame in range(45)]
+    wanted = [np.median(errors) if len(errors) else np.nan for errors in own]
+    assert np.array_equal(told.by_frame, wanted, equal_nan=True)

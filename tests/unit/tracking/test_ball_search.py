@@ -95,3 +95,16 @@ class TestSearch:
         high = -PLACES[:, 2] > 0.6
         assert (history.mode[high] == FLIGHT).mean() > 0.8
         assert BALL[:, 3].min() < -0.6
+
+    def test_views_that_are_milliseconds_apart_are_no_two_chances_of_a_touch(self) -> None:
+        given = seen(BOTH)
+        late = np.array([view == "right" for view in given.views])
+        times = given.times + np.where(late, 0.005, 0.0)
+        knots = build_knots(replace(given, times=times), TIMES, np.zeros(2))
+        usual, found = (
+            find_likeliest_history(knots, Pitch(), shortest_s=shortest) for shortest in (0.0, 0.01)
+        )
+        short = np.diff(knots.times, prepend=-np.inf) < 0.01
+        assert np.isin(usual.event[short], (KICK, BOUNCE)).any()
+        assert not np.isin(found.event[short], (KICK, BOUNCE)).any()
+        assert (found.mode == usual.mode).mean() > 0.97
