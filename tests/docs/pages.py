@@ -32,7 +32,7 @@ status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax,bad_point -match:"Alde
 
 - Terms stand between spaces and must all hold. `field:a,b` means either, where a field has choices or text. `-` before a term is its
   opposite. A bare word is looked for in label and key. Quotes hold spaces: `match:"Alder Town"`.
-- `:` and `=` mean the same. Numbers also compare with `<` `<=` `>` `>=`; nothing that has no number fulfils that, and `field:none` finds it.
+- `:` and `=` mean the same. Numbers also compare with `<` `<=` `>` `>=`; nothing that has no number fulfils that (so `-jac<0.9` finds it), and `field:none` finds it.
   An operator that a field does not have is refused with those that it has (400, `pointer` `/q/<position>`), and so is a field that there is not.
 - Text is compared as it is: there are no patterns. `any` and `none` ask whether there is one.
 - `sort:name` orders the list, `sort:name-desc` turns that round; the last one counts. What has no value comes last in both. Equal groups stand

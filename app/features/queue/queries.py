@@ -59,9 +59,13 @@ _NOT: Mapping[str, Callable[[Any, Any], Any]] = {
 
 
 def compare_condition(column: str, op: str, value: float | str) -> Condition:
-    """A number or text against a value, by one of < <= > >= =; nothing that is absent does."""
-    condition: Condition = _COMPARED[op](_queue_column(column), value)
-    return condition
+    """A number or text against a value, by one of < <= > >= =; nothing that is absent does.
+
+    Turned round, what is absent does.
+    """
+    held = _queue_column(column)
+    condition: Condition = _COMPARED[op](held, value)
+    return and_(held.is_not(None), condition) if _TABLE.c[column].nullable else condition
 
 
 def absent_condition(column: str) -> Condition:

@@ -259,7 +259,7 @@ def _gate_condition(term: _QueryTerm, value: str) -> Condition:
         return conditions.flag_condition("solved", False)
     if value == "none":
         return conditions.flag_condition("passes", True)
-    return conditions.compare_condition("gate", "=", _require_choice(term, value))
+    return conditions.text_condition("gate", _require_choice(term, value))
 
 
 def _pictures_condition(term: _QueryTerm, value: str) -> Condition:

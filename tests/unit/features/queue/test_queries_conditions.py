@@ -47,7 +47,7 @@ class TestConditions:
             (compare_condition("min_jac", "=", 0.75), True),
             (compare_condition("status", "=", "accepted"), True),
             (compare_condition("sigma_m", "<", 1e9), False),
-            (negate_condition(compare_condition("sigma_m", "<", 1e9)), False),
+            (negate_condition(compare_condition("sigma_m", "<", 1e9)), True),
             (absent_condition("sigma_m"), True),
             (absent_condition("min_jac"), False),
             (empty_text_condition("reviewer"), True),

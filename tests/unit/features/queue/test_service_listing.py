@@ -137,6 +137,18 @@ def sorted_by(row: GroupRow, name: str) -> Any:
     return getattr(row, SORTS[name])
 
 
+class TestNegation:
+    @pytest.mark.parametrize(
+        "term", ["gate:jac", "gate:jac,none", "jac<0.8", "sigma>=0.1", "sigma:none", "status:accepted", "passes:yes"]
+    )  # fmt: skip
+    def test_a_term_and_its_opposite_are_all_groups_and_no_group_twice(
+        self, store, dataset, term
+    ) -> None:
+        held, rest = (walk(store, dataset, query, 50) for query in (term, f"-{term}"))
+        assert held and rest
+        assert sorted(held + rest) == list(range(1, COUNT + 1))
+
+
 NEAR = (COUNT - 7) // 2
 """Where the last page of seven begins that is looked for from the start and not from the end."""
 SORTED = [f"sort:{name}{end}" for name in SORTS for end in ("", "-desc")]
