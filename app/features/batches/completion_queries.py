@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from sqlalchemy import bindparam, delete, exists, select, update
+from sqlalchemy import bindparam, delete, exists, func, select, update
 
-from app.db.dialects.dialect import select_from_number_parameter
+from app.db.dialects.dialect import select_from_number_list, select_from_number_parameter
 from app.db.session import Session
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
+from app.features.verdicts.tables import VerdictModel
 from app.features.webhooks.queries import DONE, queue_messages_about_batch
 from app.features.webhooks.tables import WebhookModel
 from app.json_text import json_text
 
+_OVER = ("accepted", "rejected")
+"""Verdicts after which a group waits for nobody."""
 _BATCH = BatchModel.__table__
 _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
 _TELLS = exists().where(WebhookModel.dataset_id == _BATCH.c.dataset_id, WebhookModel.off.is_(None))
@@ -51,7 +54,7 @@ def complete_judged_groups(
         actor: Who gave them.
         at: When they were given.
     """
-    over = {group for group, state in states.items() if state in ("accepted", "rejected")}
+    over = {group for group, state in states.items() if state in _OVER}
     for ids, settled in ((over, at), (set(states) - over, None)):
         given = {"ids": json_text(sorted(ids))}
         touched = session.execute(_TOUCHED, given).all() if ids else []
@@ -62,6 +65,34 @@ def complete_judged_groups(
             session.execute(_CLOSE, given)
             near = [row.id for row in touched if row.is_near]
             _announce_finished_batches(session, near, actor=actor, at=at)
+
+
+def follow_verdicts_given_while_closed(session: Session, batch_id: int, since: str) -> None:
+    """Bring the groups of a batch that asks for one verdict up to the verdicts that they have.
+
+    Args:
+        session: The write session that opens the batch again.
+        batch_id: The batch.
+        since: When it was made: earlier verdicts do not count in it.
+    """
+    mine, verdict = BatchGroupModel.batch_id == batch_id, VerdictModel
+    newest = (
+        select(func.max(verdict.id))
+        .where(verdict.group_id.in_(select(BatchGroupModel.group_id).where(mine)))
+        .group_by(verdict.group_id)
+    )
+    judged = select(verdict.group_id, verdict.at).where(
+        verdict.id.in_(newest), verdict.state.in_(_OVER)
+    )
+    rows = session.execute(judged).all()
+    ids = select_from_number_list(row.group_id for row in rows)
+    back = update(BatchGroupModel).where(mine, BatchGroupModel.group_id.not_in(ids))
+    session.execute(back.values(settled=None))
+    waits = (mine, BatchGroupModel.settled.is_(None))
+    for row in rows:
+        if row.at >= since:
+            done = update(BatchGroupModel).where(*waits, BatchGroupModel.group_id == row.group_id)
+            session.execute(done.values(settled=row.at))
 
 
 def complete_group_in_batch(

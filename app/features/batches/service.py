@@ -13,6 +13,7 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
+from app.features.batches.completion_queries import follow_verdicts_given_while_closed
 from app.features.batches.queries import (
     CLOSED,
     OPEN,
@@ -321,11 +322,13 @@ def change_batch(
         if names is not None
     }
     with store.write() as session:
-        read_batch(session, batch_id)
+        closed = not read_batch(session, batch_id).is_open
         if gold_every not in (None, before.gold_every):
             _require_gold_groups(session, before.dataset_id)
         if values:
             update_batch(session, batch_id, values)
+        if closed and state == OPEN and before.verdicts == 1:
+            follow_verdicts_given_while_closed(session, batch_id, before.created)
         for part, chosen in people.items():
             set_batch_people(session, batch_id, part, chosen)
         batch = read_batch(session, batch_id)

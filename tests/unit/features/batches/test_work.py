@@ -250,6 +250,22 @@ class TestLeases:
         judge(store, groups[0], "bo", "deferred")
         assert leases.lease_next_group(batch, BO, after=groups[1]).group == groups[2]
 
+    def test_verdicts_that_were_given_and_undone_while_a_batch_was_closed_count_once_it_is_open(
+        self, store, dataset, groups, leases
+    ):
+        judge(store, groups[3], "bo")
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        judge(store, groups[0], "bo")
+        change_batch(store, batch, actor="lead", state="closed")
+        judge(store, groups[0], "bo", "unreviewed")
+        judge(store, groups[1], "bo")
+        judge(store, groups[2], "bo", "deferred")
+        assert change_batch(store, batch, actor="lead", state="open").settled == 1
+        settled = {one.group: one.settled for one in list_batch_groups(store, batch)}
+        # What was judged before the batch was made is judged in it once more.
+        assert [group for group in groups if settled[group]] == [groups[1]]
+        assert leases.lease_next_group(batch, BO).group == groups[0]
+
     def test_an_annotator_hands_in_and_a_reviewer_gets_it(self, store, dataset, groups, leases):
         new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
