@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+import structlog
+
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
@@ -40,6 +42,7 @@ from app.features.people.visibility_queries import READER, sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
 from app.soccer.actors import person_of_actor
 
+log = structlog.get_logger("touchline.batches")
 OVER = ("accepted", "rejected")
 """Verdicts after which a group waits for nobody."""
 
@@ -196,12 +199,24 @@ def adopt_if_sole_annotator(store: Store, batch: Batch, person: str) -> None:
             and row.submitted is not None
         ]
     for row in ready:
-        waits = batch.annotators and row.verdict not in OVER
 
-        def mark_group_submitted(session: Session, group: int = row.group_id) -> None:
-            hand_in_group(session, batch.id, group, at=now(), by=person_of_actor(person))
+        def note_work(session: Session, annotation: IndependentAnnotation = row) -> None:
+            let_group_wait_for_reviewer(session, batch, annotation, at=now())
 
-        adopt_annotation(store, row.id, actor=person, also=mark_group_submitted if waits else None)
+        try:
+            adopt_annotation(store, row.id, actor=person, also=note_work, decided=False)
+        except ConflictError as error:
+            # It waits for a lead, or for the next time; the person goes on meanwhile.
+            log.warning("an annotation waits to be taken over", id=row.id, error=str(error))
+
+
+def let_group_wait_for_reviewer(
+    session: Session, batch: Batch, annotation: IndependentAnnotation, *, at: str
+) -> None:
+    """The group of an annotation that is taken over waits for a reviewer, where its annotator has
+    not judged it."""
+    if batch.annotators and annotation.verdict not in OVER:
+        hand_in_group(session, batch.id, annotation.group_id, at=at, by=annotation.person)
 
 
 def find_own_annotation(

@@ -15,13 +15,14 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
 from app.features.groups.state import require_group
 from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
+from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import (
     COPIES,
     hides_groups_from_reader,
     sees_independent_work,
     show_entries_under_aliases,
 )
-from app.soccer.group import Group, View
+from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
 
 STATION_EDITS = ("station_edit", "station_undo", "station_redo")
@@ -108,6 +109,27 @@ def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChang
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
 
 
+def read_group_before_entry(session: Session, stored: StoredGroup, entry_id: int) -> Group:
+    """A group as it was before an entry of the log, but for the paint of its pictures."""
+    snapshot = _make_static_camera_snapshot(stored)
+    for entry in _merge_group_and_station_entries(session, stored):
+        if entry.id >= entry_id:
+            break
+        apply_entry(snapshot, entry)
+    return snapshot.group(stored.id)
+
+
+def read_station_before_entry(session: Session, stored: StoredStation, entry_id: int) -> Station:
+    """A static camera as it was before an entry of the log."""
+    snapshot = StateSnapshot()
+    _add_station_to_snapshot(snapshot, stored)
+    for entry in list_station_entries(session, stored.id):
+        if entry.id >= entry_id:
+            break
+        apply_entry(snapshot, entry)
+    return snapshot.stations[stored.id].station
+
+
 def _read_group_history(session: Session, stored: StoredGroup) -> list[LogEntry]:
     """The entries of a group's history."""
     entries = list(_merge_group_and_station_entries(session, stored))
@@ -133,10 +155,14 @@ def _make_static_camera_snapshot(stored: StoredGroup) -> StateSnapshot:
     snapshot = StateSnapshot()
     for item in stored.stations.values():
         if item.station.shared:
-            snapshot.stations[item.id] = StationRecord(
-                stored.dataset_id, item.station, item.revision, item.source_digest
-            )
+            _add_station_to_snapshot(snapshot, item)
     return snapshot
+
+
+def _add_station_to_snapshot(snapshot: StateSnapshot, stored: StoredStation) -> None:
+    snapshot.stations[stored.id] = StationRecord(
+        stored.dataset_id, stored.station, stored.revision, stored.source_digest
+    )
 
 
 def _compare_group_versions(

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from app.db.log import NewLogEntry, append_entries
+from app.db.log import (
+    NewLogEntry,
+    append_entries,
+    iterate_group_entries_of_kinds,
+    list_group_entry_kinds,
+    list_station_entry_kinds,
+)
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
+from app.features.batches.queries import find_batch
 from app.features.groups.edit import (
     CompositeEdit,
     Edit,
@@ -22,17 +29,25 @@ from app.features.groups.edit import (
     StationEdit,
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json
+from app.features.groups.history import read_group_before_entry, read_station_before_entry
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
-from app.features.groups.state import GroupState, require_group
+from app.features.groups.state import GroupState, require_group, require_unchanged
 from app.features.groups.submit import read_and_solve_group, read_group_etag, submit_edit
 from app.features.groups.view_paint import PaintUpdater
-from app.features.groups.view_queries import list_groups_of_station, save_station
-from app.features.independent_annotations.copying import rename_views_as_original
+from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
+from app.features.independent_annotations.copying import (
+    rebuild_group_before_edits,
+    rename_views_as_original,
+)
+from app.features.independent_annotations.merge import merge_group, merge_station
 from app.features.independent_annotations.queries import (
     GOLD,
+    INDEPENDENT,
     IndependentAnnotation,
     find_annotation_of_copy,
+    list_annotations_of_batch,
+    list_annotations_of_group,
     update_annotation,
 )
 from app.features.independent_annotations.service import (
@@ -55,6 +70,8 @@ from app.features.webhooks.queries import HANDED_BACK, make_time_suffix, queue_w
 from app.soccer.actors import person_of_actor
 from app.soccer.group import Group, Station
 
+ADOPTED = "adopted"
+"""What the entry of an annotation that was taken over says was done."""
 MAX_REASON = 500
 """Letters of the sentence that says why."""
 
@@ -66,16 +83,26 @@ def adopt_annotation(
     actor: str,
     paint: PaintUpdater | None = None,
     also: Callable[[Session], None] | None = None,
+    decided: bool = True,
 ) -> GroupState:
     """Take a person's annotation and verdict over into the original, in one transaction.
 
-    The edit and the verdict are that person's; that ``actor`` decided so is an entry of its own.
-    Undo takes the edit back as any other. Lines of a static camera are edits of that camera.
-    ``also`` writes what becomes true with it into the same transaction.
+    What the person left as it was stays as the original has it by now. The edit and the verdict are
+    that person's; that ``actor`` decided so is an entry of its own. Undo takes the edit back as any
+    other. Lines of a static camera are edits of that camera.
+
+    Args:
+        store: The database.
+        annotation_id: The annotation.
+        actor: Who decided so.
+        paint: Reads the paint of edited lines again.
+        also: Writes what becomes true with it into the same transaction.
+        decided: Somebody decided for it: it counts also where the original was changed meanwhile.
 
     Raises:
         NotFoundError: There is no such annotation.
-        ConflictError: It is not submitted, was decided about, or is of a gold group.
+        ConflictError: It is not submitted, was decided about, or is of a gold group; or nobody
+            decided, and the original was changed in the same places since it began.
         StaleRevisionError: Somebody changed the original at the same moment.
     """
     annotation = get_annotation(store, annotation_id)
@@ -85,17 +112,27 @@ def adopt_annotation(
     with store.read() as session:
         copy = require_group(session, annotation.copy_id)
         original = require_group(session, annotation.group_id)
+        start = _read_group_at_start(session, annotation, original, copy)
     copy = replace(copy, group=rename_views_as_original(original.group, copy.group))
-    edit = CompositeEdit(tuple(make_edits_between(original.group, copy.group)))
+    merged = merge_group(start, original.group, copy.group)
+    if not decided:
+        _require_only_own_changes(annotation, merged.both)
+    edit = CompositeEdit(tuple(make_edits_between(original.group, merged.group)))
     after: list[GroupState] = []
 
     def record_adoption(session: Session) -> None:
-        _require_adoptable(read_annotation(session, annotation_id))
-        _adopt_stations(session, original, copy, annotation.person)
+        current = read_annotation(session, annotation_id)
+        _require_adoptable(current)
+        if current.submitted != annotation.submitted:
+            raise ConflictError(
+                f"{annotation.person} submitted this annotation anew meanwhile",
+                hint="Look at it again, then apply it.",
+            )
+        _adopt_stations(session, annotation, decided=decided)
         copy_verdict_to_original(session, annotation, actor=annotation.person)
         at = now()
         update_annotation(session, annotation_id, settled=at)
-        body = {"take": annotation_id, "person": annotation.person, "did": "adopted"}
+        body = {"take": annotation_id, "person": annotation.person, "did": ADOPTED}
         append_entries(
             session, [NewLogEntry(KIND, actor, at, body, original.dataset_id, original.id)]
         )
@@ -118,8 +155,40 @@ def adopt_annotation(
     if not after:
         # The original says the same already.
         with store.write() as session:
+            require_unchanged(session, original.id, etag, original.group.key)
             record_adoption(session)
     return after[-1]
+
+
+def _read_group_at_start(
+    session: Session, annotation: IndependentAnnotation, original: StoredGroup, copy: StoredGroup
+) -> Group:
+    """The original as it was for whoever began the copy, under its own names."""
+    ((_, begun, _),) = list_group_entry_kinds(session, [copy.id], ["import"])
+    start = read_group_before_entry(session, original, begun)
+    batch = None if annotation.batch_id is None else find_batch(session, annotation.batch_id)
+    nameless = copy.group.key != original.group.key
+    if batch is None or not (batch.blind or nameless):
+        return start
+    if any(
+        (one.batch_id, one.kind) == (annotation.batch_id, INDEPENDENT)
+        and one.settled is not None
+        and one.settled <= annotation.begun
+        for one in list_annotations_of_group(session, original.id)
+    ):
+        # The group waited again after another one: this annotation takes the place of that one.
+        return start
+    then = replace(original, group=start)
+    return rebuild_group_before_edits(session, then, batch.created, before=begun)
+
+
+def _require_only_own_changes(annotation: IndependentAnnotation, both: Sequence[str]) -> None:
+    """Raise ConflictError where the original was changed in the same places meanwhile."""
+    if both:
+        raise ConflictError(
+            f"{annotation.person} and others changed {both[0]} of the same group",
+            hint="Compare the annotation with the group, then apply or return it.",
+        )
 
 
 def make_edits_between(before: Group, after: Group) -> Iterator[Edit]:
@@ -177,30 +246,86 @@ def _require_adoptable(annotation: IndependentAnnotation) -> None:
         raise ConflictError("this annotation was adjudicated already")
 
 
-def _adopt_stations(
-    session: Session, original: StoredGroup, copy: StoredGroup, person: str
-) -> None:
-    """Edit the static cameras as the copy has them."""
-    for key, held in original.stations.items():
-        view = copy.group.view(key)
-        if not held.station.shared or view is None:
+def _adopt_stations(session: Session, annotation: IndependentAnnotation, *, decided: bool) -> None:
+    """Edit the static cameras as the person edited those of their copies."""
+    original, copy = (
+        require_group(session, number) for number in (annotation.group_id, annotation.copy_id)
+    )
+    own = {held.station.key: held for held in copy.stations.values()}
+    for held in {held.id: held for held in original.stations.values()}.values():
+        copied = own.get(held.station.key)
+        if not held.station.shared or copied is None or copied.station == held.station:
             continue
-        station, own, edits = held.station, view.station, list[StationEdit]()
-        lines = _make_line_edit(station, own)
-        edits += [] if lines is None else [lines]
-        if own.calibration != station.calibration:
-            edits.append(SetStationCalibrationSource(own.calibration))
-        for edit in edits:
-            body = edit_and_inverse_to_json(edit, edit.inverse(station))
-            station = edit.apply(station)
-            where = {"dataset_id": original.dataset_id, "station_id": held.id}
-            append_entries(session, [NewLogEntry("station_edit", person, now(), body, **where)])
-            save_station(session, held, station)
-            held = replace(held, station=station, revision=held.revision + 1)
-        if edits:
-            groups = list_groups_of_station(session, held.id)
-            refresh_inputs_hashes(session, groups)
-            refresh_queue(session, groups)
+        start, reference = _read_stations_at_start(session, annotation, held, copied)
+        merged = merge_station(start, held.station, copied.station, reference=reference)
+        if not decided:
+            _require_only_own_changes(
+                annotation, [f"{what} of {held.station.key}" for what in merged.both]
+            )
+        _edit_station(session, held, merged.station, annotation.person)
+
+
+def _read_stations_at_start(
+    session: Session,
+    annotation: IndependentAnnotation,
+    original: StoredStation,
+    copied: StoredStation,
+) -> tuple[Station, Station]:
+    """What a person's static camera was when theirs was last brought into the original, and what
+    that was then; before the first time, what the original was when their copies began.
+    """
+    adopted = _find_last_adoption(session, annotation, original)
+    if adopted is not None:
+        return (
+            read_station_before_entry(session, copied, adopted),
+            read_station_before_entry(session, original, adopted),
+        )
+    entries = list_station_entry_kinds(session, copied.id, ["station"])
+    if not entries:
+        return original.station, original.station
+    start = read_station_before_entry(session, original, entries[0].id)
+    return start, start
+
+
+def _find_last_adoption(
+    session: Session, annotation: IndependentAnnotation, original: StoredStation
+) -> int | None:
+    """The entry of the last adoption that brought a person's copy of a static camera in."""
+    groups = set(list_groups_of_station(session, original.id))
+    adopted = {
+        one.id: one.group_id
+        for one in list_annotations_of_batch(session, annotation.batch_id, original.dataset_id)
+        if one.person == annotation.person and one.settled is not None and one.group_id in groups
+    }
+    entries = iterate_group_entries_of_kinds(session, sorted(set(adopted.values())), [KIND])
+    found = [
+        entry.id
+        for entry in entries
+        if entry.body["did"] == ADOPTED and entry.body["take"] in adopted
+    ]
+    return max(found, default=None)
+
+
+def _edit_station(session: Session, held: StoredStation, wanted: Station, person: str) -> None:
+    """Make a static camera what it is to be, as edits of a person."""
+    station, edits = held.station, list[StationEdit]()
+    lines = _make_line_edit(station, wanted)
+    edits += [] if lines is None else [lines]
+    if wanted.calibration != station.calibration:
+        edits.append(SetStationCalibrationSource(wanted.calibration))
+    for edit in edits:
+        body = edit_and_inverse_to_json(edit, edit.inverse(station))
+        station = edit.apply(station)
+        entry = NewLogEntry(
+            "station_edit", person, now(), body, dataset_id=held.dataset_id, station_id=held.id
+        )
+        append_entries(session, [entry])
+        save_station(session, held, station)
+        held = replace(held, station=station, revision=held.revision + 1)
+    if edits:
+        groups = list_groups_of_station(session, held.id)
+        refresh_inputs_hashes(session, groups)
+        refresh_queue(session, groups)
 
 
 def copy_verdict_to_original(

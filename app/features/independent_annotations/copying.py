@@ -94,10 +94,17 @@ def strip_to_gold_start(group: Group, start: str) -> Group:
     return replace(group, paint={} if bare else group.paint)
 
 
-def rebuild_group_before_edits(session: Session, stored: StoredGroup, since: str) -> Group:
-    """A group without its edits from a time on, back to the import before, the last one first."""
+def rebuild_group_before_edits(
+    session: Session, stored: StoredGroup, since: str, *, before: int | None = None
+) -> Group:
+    """A group without its edits from a time on, back to the import before, the last one first.
+
+    ``before``: ``stored`` is as it was before this entry of the log; None: as it is now.
+    """
     group = stored.group
     for entry in reversed(list_group_entries(session, stored.id, verdicts=False)):
+        if before is not None and entry.id >= before:
+            continue
         if entry.at < since:
             break
         if entry.kind == "import":

@@ -49,6 +49,8 @@ from tests.unit.features.independent_annotations.begun import begin_for_batch, b
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
+THERE = (ImagePoint(5.0, 6.0), ImagePoint(7.0, 8.0))
+ELSEWHERE = (ImagePoint(9.0, 10.0), ImagePoint(11.0, 12.0))
 
 
 def change(store, group_id, edit, actor="ann") -> GroupState:
@@ -341,6 +343,55 @@ class TestAdoptTake:
         back = undo_group_edit(store, state.id, if_match=after.etag, actor="lea")
         assert back.group == state.group
 
+    def test_what_its_person_left_alone_stays_as_it_was_corrected_meanwhile(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        first, second = (view.key for view in state.group.views[:2])
+        mine, theirs, other = list(state.group.views[1].station.lines)[:3]
+        change(store, state.id, make_set_ball_edit(first, BALL), actor="lea")
+        change(store, state.id, SetLines(second, {theirs: HERE}), actor="lea")
+        change(store, state.id, SetViewInclusion(first, False), actor="lea")
+        change(store, take.copy_id, SetLines(second, {mine: HERE, other: None}))
+        submit_annotation(store, take.id, actor="ann")
+        after = adopt_annotation(store, take.id, actor="lea", decided=False).group
+        assert after.view(first).balls == (BALL,) and not after.view(first).included
+        lines = after.view(second).station.lines
+        assert (lines[mine], lines[theirs], other in lines) == (HERE, HERE, False)
+        assert faults(store) == []
+
+    @pytest.mark.parametrize("batch", [None, "blind"])
+    def test_it_is_not_taken_over_by_itself_where_others_changed_the_same(
+        self, store, state, batch
+    ) -> None:
+        view = state.group.views[0].key
+        terms = {}
+        if batch is not None:
+            made = make_batch(store, state.dataset_id, NewBatch("a", verdicts=2), actor="lea")
+            terms = {"batch_id": made.id, "since": made.created}
+            # Who annotates blind does not see what others changed since.
+            change(store, state.id, make_set_ball_edit(view, None), actor="lea")
+        take = begin_for_batch(store, state.id, "ann", **terms)
+        if batch is None:
+            change(store, state.id, make_set_ball_edit(view, None), actor="lea")
+        change(store, take.copy_id, make_set_ball_edit(view, BALL))
+        submit_annotation(store, take.id, actor="ann")
+        with pytest.raises(ConflictError, match=f"ann and others changed the ball of {view}"):
+            adopt_annotation(store, take.id, actor="ann", decided=False)
+        assert load_group_state(store, state.id).group.view(view).balls == ()
+        after = adopt_annotation(store, take.id, actor="lea")
+        assert after.group.view(view).balls == (BALL,)
+
+    def test_what_was_imported_again_meanwhile_stays(self, store, fill, make_group) -> None:
+        group = make_group(1)
+        (original,) = fill(group)
+        take = begin_take(store, original, person="ann")
+        views = (replace(group.views[0], balls=(BALL,)), *group.views[1:])
+        fill(replace(group, views=views))
+        submit_annotation(store, take.id, actor="ann")
+        after = adopt_annotation(store, take.id, actor="lea", decided=False)
+        assert after.group.views[0].balls == (BALL,)
+
     def test_a_view_that_was_left_out_is_left_out_then(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         view = state.group.views[0].key
@@ -365,6 +416,77 @@ class TestAdoptTake:
         submit_annotation(store, take.id, actor="ann")
         after = adopt_annotation(store, take.id, actor="lea")
         assert after.group == state.group and after.verdict.state == "unreviewed"
+
+
+class TestAdoptStation:
+    """What becomes of static cameras, which all groups of a dataset share."""
+
+    @pytest.fixture
+    def camera(self, store, fill, make_static):
+        return Camera(store, fill(*(make_static(number) for number in (10, 11, 12))))
+
+    def test_what_a_lead_corrected_stays(self, camera) -> None:
+        take = begin_take(camera.store, camera.groups[0], person="ann")
+        camera.draw(camera.groups[0], HERE, "lea")
+        assert camera.adopt(take, decided=False) == HERE
+        assert faults(camera.store) == []
+
+    def test_what_somebody_else_corrected_stays(self, camera) -> None:
+        ann, bo = (
+            begin_take(camera.store, camera.groups[0], person=name) for name in ("ann", "bo")
+        )
+        camera.draw(ann.copy_id, HERE, "ann")
+        assert camera.adopt(ann, decided=False) == HERE
+        later = begin_take(camera.store, camera.groups[1], person="bo")
+        assert camera.line(later.copy_id) != HERE
+        assert [camera.adopt(take, decided=False) for take in (bo, later)] == [HERE, HERE]
+        history = read_history(camera.store, camera.groups[0])
+        assert [one.actor for one in history if one.kind == "station_edit"] == ["ann"]
+
+    def test_what_was_taken_over_is_not_again_after_a_lead_corrected_it(self, camera) -> None:
+        takes = [begin_take(camera.store, group, person="ann") for group in camera.groups]
+        camera.draw(takes[0].copy_id, THERE, "ann")
+        assert camera.adopt(takes[0], decided=False) == THERE
+        camera.draw(camera.groups[0], HERE, "lea")
+        assert camera.adopt(takes[1], decided=False) == HERE
+        # What she changes after that is taken over again.
+        camera.draw(takes[2].copy_id, ELSEWHERE, "ann")
+        assert camera.adopt(takes[2], decided=False) == ELSEWHERE
+        assert faults(camera.store) == []
+
+    def test_it_is_not_taken_over_by_itself_where_others_changed_the_same(self, camera) -> None:
+        take = begin_take(camera.store, camera.groups[0], person="ann")
+        camera.draw(take.copy_id, THERE, "ann")
+        camera.draw(camera.groups[0], HERE, "lea")
+        with pytest.raises(ConflictError, match="ann and others changed"):
+            camera.adopt(take, decided=False)
+        assert camera.line(camera.groups[0]) == HERE
+        return_annotation(camera.store, take.id, "the line", actor="lea")
+        assert camera.adopt(take) == THERE
+
+
+class Camera:
+    """A line of a static camera that a few groups share."""
+
+    def __init__(self, store, groups) -> None:
+        self.store, self.groups = store, groups
+        self.name = next(iter(self._station(groups[0]).station.lines))
+
+    def _station(self, group_id: int):
+        return load_station(self.store, load_group_state(self.store, group_id).station_ids["cam1"])
+
+    def line(self, group_id: int):
+        return self._station(group_id).station.lines[self.name]
+
+    def draw(self, group_id: int, points, actor: str) -> None:
+        stored = self._station(group_id)
+        edit = SetStationLines({self.name: points})
+        submit_station_edit(self.store, stored.id, edit, if_match=stored.etag, actor=actor)
+
+    def adopt(self, take, **how):
+        submit_annotation(self.store, take.id, actor=take.person)
+        adopt_annotation(self.store, take.id, actor="lea", **how)
+        return self.line(self.groups[0])
 
 
 class TestCopies:
