@@ -11,6 +11,7 @@ from app.features.agreement.queries import OPEN, list_agreements, list_group_agr
 from app.features.agreement.service import (
     AnnotationsComparison,
     adopt_and_decide,
+    adopt_without_case,
     compare_states,
     list_undecided_annotations,
     read_limits,
@@ -19,7 +20,7 @@ from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved_group
 from app.features.groups.view_paint import PaintUpdater
-from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
+from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import Action, role_allows
@@ -178,9 +179,9 @@ def adopt_into_group(
             (row.state, row.batch_id) == (OPEN, annotation.batch_id or 0)
             for row in list_group_agreements(session, annotation.group_id)
         )
-    if not waits:
-        return adopt_annotation(store, annotation.id, actor=actor, paint=paint)
     ready = list_undecided_annotations(store, annotation.group_id, annotation.batch_id)
+    if not waits:
+        return adopt_without_case(store, annotation, ready, actor=actor, paint=paint)
     return adopt_and_decide(
         store,
         annotation.group_id,

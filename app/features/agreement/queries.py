@@ -150,12 +150,13 @@ def delete_open_agreement(session: Session, group_id: int, batch_id: int) -> Non
 
 def save_adjudication(
     session: Session, group_id: int, batch_id: int, values: Mapping[str, Any]
-) -> int:
-    """Write what was decided; returns the id of the group's dataset."""
+) -> int | None:
+    """Write what was decided; returns the id of the group's dataset, None where nothing was compared."""
     table = AgreementModel
     where = (table.group_id == group_id, table.batch_id == batch_id)
     done = update(table).where(*where).values(**values).returning(table.dataset_id)
-    return int(session.execute(done).scalar_one())
+    dataset: int | None = session.execute(done).scalar_one_or_none()
+    return dataset
 
 
 def complete_unchosen_annotations(session: Session, take_ids: Sequence[int], at: str) -> None:

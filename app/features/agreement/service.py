@@ -13,7 +13,7 @@ from app.db.json_columns import compress_json
 from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import InputError, ReviewError, StorageError
+from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.evaluation.annotation_distance import GroupDistance, compare_annotations
 from app.evaluation.rater_agreement import AgreementLimits, Disagreement, find_disagreements
 from app.features.agreement.queries import (
@@ -32,8 +32,12 @@ from app.features.agreement.queries import (
     save_adjudication,
 )
 from app.features.batches.completion_queries import complete_group_in_batch
-from app.features.batches.own_annotations import adopt_if_sole_annotator
-from app.features.batches.service import get_batch
+from app.features.batches.own_annotations import (
+    adopt_if_sole_annotator,
+    let_group_wait_for_reviewer,
+)
+from app.features.batches.queries import find_batch
+from app.features.batches.service import get_batch, read_batch
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved_group, solve_and_store_group
@@ -218,7 +222,8 @@ def compare_or_adopt_submission(
 def compare_submitted_annotations(
     store: Store, group_id: int, batch_id: int | None, paint: PaintUpdater | None = None
 ) -> str | None:
-    """Compare what was submitted of a group; where it agrees, the first annotation is taken over.
+    """Compare what was submitted of a group; where it agrees, the first annotation is taken over that
+    has a verdict.
 
     Each pair is compared, and all of them have to agree. ``paint`` reads the paint of edited lines
     again, as for every edit. May be called again at any time: what was compared already stays.
@@ -247,7 +252,7 @@ def compare_submitted_annotations(
                 group_id,
                 batch_id,
                 annotations,
-                annotations[0],
+                next((one for one in annotations if one.verdict is not None), annotations[0]),
                 outcome="take",
                 actor=BY_ITSELF,
                 paint=paint,
@@ -318,7 +323,7 @@ def adopt_and_decide(
         found: What the comparison came to, where it is not kept yet.
 
     Raises:
-        ConflictError: Somebody was faster.
+        ConflictError: Somebody was faster, or one of the annotations was returned meanwhile.
     """
     at = now()
     itself = actor == BY_ITSELF
@@ -333,9 +338,15 @@ def adopt_and_decide(
     values["state"] = AGREED if itself else DECIDED
 
     def record_decision(session: Session) -> None:
+        there = list_annotations_of_group(session, group_id)
+        rest = (annotation for annotation in annotations if annotation.id != taken.id)
+        if any(annotation not in there for annotation in rest):
+            raise _make_changed_case_error(group_id)
         if found is not None:
             put_agreement(session, found)
         dataset = save_adjudication(session, group_id, batch_id or 0, values)
+        if dataset is None:
+            raise _make_changed_case_error(group_id)
         complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
             complete_group_in_batch(session, batch_id, group_id, actor=actor, at=at)
@@ -344,7 +355,50 @@ def adopt_and_decide(
             note = f"as {taken.person} judged it"
             copy_verdict_to_original(session, taken, actor=actor, note=note)
 
-    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=record_decision)
+    return adopt_annotation(
+        store, taken.id, actor=actor, paint=paint, also=record_decision, decided=not itself
+    )
+
+
+def adopt_without_case(
+    store: Store,
+    taken: IndependentAnnotation,
+    annotations: Sequence[IndependentAnnotation],
+    *,
+    actor: str,
+    paint: PaintUpdater | None = None,
+) -> GroupState:
+    """Take an annotation over that waits for no decision; its batch asks for no other one then.
+
+    Args:
+        store: The database.
+        taken: The annotation.
+        annotations: Those that were submitted of its group in its batch.
+        actor: Who decided so.
+        paint: Reads the paint of edited lines again.
+
+    Raises:
+        ConflictError: It is not submitted, was decided about, or is of a gold group.
+    """
+
+    def finish_work(session: Session) -> None:
+        if taken.batch_id is None or find_batch(session, taken.batch_id) is None:
+            return
+        batch, at = read_batch(session, taken.batch_id, with_here=False), now()
+        if batch.verdicts == 1:
+            let_group_wait_for_reviewer(session, batch, taken, at=at)
+            return
+        complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
+        complete_group_in_batch(session, batch.id, taken.group_id, actor=actor, at=at)
+
+    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=finish_work)
+
+
+def _make_changed_case_error(group_id: int) -> ConflictError:
+    return ConflictError(
+        f"an annotation of group {group_id} was returned or decided about meanwhile",
+        hint="Open the case again: it may no longer wait for a decision.",
+    )
 
 
 def _find_stored_agreement(

@@ -7,6 +7,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.evaluation.rater_agreement import AgreementLimits
+from app.features.agreement import adjudicate
 from app.features.agreement import service as weigh
 from app.features.agreement.adjudicate import (
     adjudicate_case,
@@ -31,6 +32,7 @@ from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import (
     get_annotation,
     list_annotations,
+    submit_annotation,
 )
 from app.features.integrity.checks import examine_database
 from app.features.people.roles import Role
@@ -44,19 +46,20 @@ def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Inde
     """The take of a person who moves the ball of the first view and accepts."""
     take = begin_take(store, group_id, person=person)
     state = load_group_state(store, take.copy_id)
-    view = next(view for view in state.group.views if view.ball is not None)
-    assert view.ball is not None and view.ball.box is not None
     if moved:
-        ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-        state = submit_edit(
-            store,
-            take.copy_id,
-            make_set_ball_edit(view.key, ball),
-            if_match=state.etag,
-            actor=person,
-        )
+        state = move_ball(store, take.copy_id, person, moved)
     set_verdict(store, take.copy_id, "accepted", None, "seen", if_match=state.etag, actor=person)
     return get_annotation(store, take.id)
+
+
+def move_ball(store: Store, group_id: int, person: str, moved: float) -> GroupState:
+    """The group after somebody moved the ball of the first view."""
+    state = load_group_state(store, group_id)
+    view = next(view for view in state.group.views if view.ball is not None)
+    assert view.ball is not None and view.ball.box is not None
+    ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
+    edit = make_set_ball_edit(view.key, ball)
+    return submit_edit(store, group_id, edit, if_match=state.etag, actor=person)
 
 
 def ball_x(state: GroupState) -> float:
@@ -129,6 +132,26 @@ class TestAfterHandIn:
             broken.setattr(weigh, "adopt_annotation", faster)
             assert compare_or_adopt_submission(store, second.copy_id) == "open"
         assert [one.group for one in list_open_cases(store, state.dataset)] == [state.id]
+
+    def test_of_two_who_agree_the_one_who_judged_is_taken(self, store, state) -> None:
+        first = begin_take(store, state.id, person="ann")
+        submit_annotation(store, first.id, actor="ann")
+        second = judged(store, state.id, "ben", 1.0)
+        assert compare_or_adopt_submission(store, second.copy_id) == "agreed"
+        after = load_group_state(store, state.id)
+        assert (after.verdict.state, after.verdict.actor) == ("accepted", "ben")
+        assert ball_x(after) == ball_x(state) + 1
+
+    def test_what_was_corrected_meanwhile_otherwise_waits_for_a_decision(
+        self, store, state
+    ) -> None:
+        judged(store, state.id, "ann", 1.0)
+        second = judged(store, state.id, "ben", 2.0)
+        move_ball(store, state.id, "lea", 5.0)
+        assert compare_or_adopt_submission(store, second.copy_id) == "open"
+        assert ball_x(load_group_state(store, state.id)) == ball_x(state) + 5
+        after = adjudicate_case(store, state.id, second.id, actor="lea")
+        assert ball_x(after) == ball_x(state) + 2
 
     def test_two_who_do_not_wait_for_a_decision(self, store, state) -> None:
         judged(store, state.id, "ann")
@@ -205,6 +228,26 @@ class TestDecide:
         assert "rob can decide" in (read_case(store, state.id, actor="ann (token x)").refused or "")
         with pytest.raises(ForbiddenError, match="rob can decide"):
             adjudicate_case(store, state.id, takes[0].id, actor="ann")
+
+    @pytest.mark.parametrize("again", [False, True])
+    def test_decides_nothing_where_another_one_is_returned_at_the_same_moment(
+        self, store, state, takes, monkeypatch, again
+    ) -> None:
+        look = adjudicate.read_case
+
+        def returning(*arguments, **named):
+            case = look(*arguments, **named)
+            return_annotation(store, takes[0].id, "the ball", actor="lea")
+            if again:
+                submit_annotation(store, takes[0].id, actor="ann")
+                compare_or_adopt_submission(store, takes[0].copy_id)
+            return case
+
+        monkeypatch.setattr(adjudicate, "read_case", returning)
+        with pytest.raises(ConflictError, match="returned or decided about meanwhile"):
+            adjudicate_case(store, state.id, takes[1].id, actor="lea")
+        assert load_group_state(store, state.id).etag == state.etag
+        assert not any(get_annotation(store, one.id).settled for one in takes)
 
     def test_takes_nothing_that_does_not_wait_here(self, store, state, takes) -> None:
         with pytest.raises(NotFoundError, match="annotation 99"):

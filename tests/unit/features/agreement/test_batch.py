@@ -7,13 +7,19 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
-from app.features.agreement.adjudicate import adjudicate_case, list_open_cases, read_case
+from app.features.agreement.adjudicate import (
+    adjudicate_case,
+    adopt_into_group,
+    list_open_cases,
+    read_case,
+)
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
 from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import load_group_state, submit_edit
+from app.features.independent_annotations.service import get_annotation_of_copy
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
@@ -79,6 +85,21 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")
     assert get_batch(store, batch.id).settled == 2
     assert list_open_cases(store, batch.dataset_id) == []
+
+
+def test_one_that_a_lead_applies_early_ends_the_work_on_its_group(store, batch) -> None:
+    leases = LeaseService(store)
+    copies = [annotate(store, leases, batch, "ada", 1.0) for _ in range(2)]
+    begun = leases.lease_next_group(batch.id, BatchMember("bo")).group
+    first = get_annotation_of_copy(store, copies[0])
+    adopt_into_group(store, first, actor="lead")
+    assert get_batch(store, batch.id).settled == 1
+    # Who has begun it goes on, and nothing more is asked of it.
+    assert annotate(store, leases, batch, "bo", 30.0) == begun
+    assert compare_or_adopt_submission(store, begun) is None
+    assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 1.0)) == "agreed"
+    assert get_batch(store, batch.id).settled == 2
+    assert leases.lease_next_group(batch.id, BatchMember("ada")).group is None
 
 
 def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
