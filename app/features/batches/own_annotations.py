@@ -160,11 +160,12 @@ def get_visible_batch(store: Store, batch_id: int) -> Batch:
 
 
 def _list_waiting_groups(session: Session, batch: Batch) -> list[int]:
-    """The groups of a batch that wait; what was submitted otherwise waits for its reviewer."""
+    """The groups of a batch that wait for an annotation; what was submitted waits for its reviewer,
+    what was returned for its annotator."""
     return [
         row.group_id
         for row in read_batch_groups(session, batch.id)
-        if row.settled is None and row.submitted is None
+        if row.settled is None and row.submitted is None and row.submitted_by is None
     ]
 
 

@@ -282,7 +282,10 @@ def _resume_or_begin_annotation(
     waiting = next((annotation for annotation in mine if annotation.submitted is None), None)
     if waiting is not None:
         return waiting
-    begun = Counter(row.group_id for row in annotations if row.kind == INDEPENDENT)
+    # A group that waits again has an annotation that is settled: somebody else gets it.
+    begun = Counter(
+        row.group_id for row in annotations if row.kind == INDEPENDENT and row.settled is None
+    )
     had = {annotation.group_id for annotation in mine}
     free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]
     kind, choice = INDEPENDENT, free if terms.gold_every else free[:1]

@@ -188,19 +188,22 @@ def count_begun_and_free_groups(
 ) -> tuple[int, int]:
     """How many independent annotations of a batch a person has begun, and of how many of its groups they may make one.
 
-    ``verdicts`` people may have a group.
+    ``verdicts`` people may have a group; whose annotation is settled do not count where it waits again.
     """
     annotation, group = IndependentAnnotationModel, BatchGroupModel
     here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_select_copy_ids(dataset_id)))
     mine, this = annotation.person == person, annotation.group_id == group.group_id
     ends = (annotation.submitted.is_(None), annotation.settled.is_(None))
     begun_by_others = (
-        select(func.count()).where(*here, this, annotation.kind == INDEPENDENT).scalar_subquery()
+        select(func.count())
+        .where(*here, this, annotation.kind == INDEPENDENT, annotation.settled.is_(None))
+        .scalar_subquery()
     )
     free = select(func.count()).where(
         group.batch_id == batch_id,
         group.settled.is_(None),
         group.submitted.is_(None),
+        group.submitted_by.is_(None),
         ~exists().where(*here, this, mine),
         begun_by_others < verdicts,
     )

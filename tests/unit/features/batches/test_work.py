@@ -89,6 +89,24 @@ def judge(store, group: int, actor: str, state: str = "rejected") -> None:
     set_verdict(store, group, state, reason and "other", NOTED, if_match=etag, actor=actor)
 
 
+def originals(
+    store, leases: LeaseService, batch: int, member: BatchMember, state=None
+) -> list[int]:
+    """The groups of which somebody gets copies until nothing is left; each is judged, or submitted."""
+    found = []
+    while (copy := leases.lease_next_group(batch, member).group) is not None:
+        with store.read() as session:
+            annotation = find_annotation_of_copy(session, copy)
+        if annotation.kind == INDEPENDENT:
+            found.append(annotation.group_id)
+        if state is None:
+            leases.submit_group(batch, copy, member, actor=member.name)
+        else:
+            judge(store, copy, member.name, state)
+        compare_or_adopt_submission(store, copy)
+    return found
+
+
 class TestBatch:
     def test_holds_what_its_query_finds_in_its_order_and_leaves_out_what_is_given(
         self, store, dataset, groups
@@ -377,12 +395,29 @@ class TestLeases:
         (mine,) = list_own_batches(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.returned]) == (1, [groups[0]])
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
+        change_batch(store, batch, actor="lead", annotators=["ada", "cy"], no_gold=True)
+        change_batch(store, batch, actor="lead", gold_every=1000)
+        assert groups[0] not in originals(store, leases, batch, CY)
         back = leases.lease_next_group(batch, ADA)
         assert (back.group, back.returned.reason) == (groups[0], "too wide")
         leases.submit_group(batch, groups[0], ADA, actor="ada")
         assert leases.lease_next_group(batch, ADA).group is None
         judge(store, groups[0], "bo")
         assert leases.lease_next_group(batch, BO).group == groups[1]
+
+    @pytest.mark.parametrize("state", ["deferred", None])
+    def test_what_nobody_settled_among_gold_waits_for_the_next_one(
+        self, store, dataset, groups, leases, state
+    ):
+        make_gold(store, groups[5])
+        new = NewBatch("a", size=2, gold_every=1000)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        assert sorted(originals(store, leases, batch, BO, state)) == groups[:2]
+        assert get_batch(store, batch).settled == 0
+        (mine,) = list_own_batches(store, lambda _: CY)
+        assert mine.left == 3
+        assert sorted(originals(store, leases, batch, CY, "rejected")) == groups[:2]
+        assert get_batch(store, batch).settled == 2
 
     def test_what_was_submitted_before_a_stop_is_taken_over_when_the_server_starts(
         self, store, dataset, groups, leases
