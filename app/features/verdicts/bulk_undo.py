@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.db.log import NewLogEntry, append_entries
@@ -34,6 +33,7 @@ from app.features.verdicts.queries import (
     update_bulk_verdict,
 )
 from app.features.verdicts.service import check_verdict
+from app.features.verdicts.undo import make_restoring_verdicts
 
 
 @dataclass(frozen=True)
@@ -138,29 +138,11 @@ def _restore_chunk(
         session, list_groups_of_verdict_range(session, first, last)
     ).values():
         if first <= verdicts[0].id <= last:
-            again += _make_restoring_verdicts(verdicts, batch.actor, at)
+            again += make_restoring_verdicts(verdicts, batch.actor, at)
     numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
     if numbered:
         save_verdicts(session, batch.dataset_id, numbered, actor=actor, at=at)
     return numbered
-
-
-def _make_restoring_verdicts(
-    verdicts: Sequence[StoredVerdict], judge: str, at: str
-) -> list[StoredVerdict]:
-    """Verdicts that put a group back: its judge's own last one, then the one that counted.
-
-    The newest verdict counts, so what counted before is said last.
-    """
-    newest, earlier = verdicts[0], verdicts[1:]
-    own = next((item for item in earlier if item.actor == judge), None)
-    taken_back = replace(
-        newest, at=at, state="unreviewed", reason=None, note=None, override=None, fixed=False
-    )
-    again = [taken_back if own is None else own]
-    if earlier and earlier[0] is not own:
-        again.append(earlier[0])
-    return again
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, BackgroundTasks, Query, Response
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool
+from pydantic import (
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StrictBool,
+    model_validator,
+)
 
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.datasets.service import dataset_id
@@ -18,7 +26,8 @@ from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
 from app.features.verdicts.bulk import AffectedGroup, BulkPlan, BulkVerdictReport, RefusedGroups
 from app.features.verdicts.bulk_undo import RedoReport, UndoReport
-from app.features.verdicts.service import set_verdict
+from app.features.verdicts.service import check_verdict, set_verdict
+from app.features.verdicts.undo import redo_verdict, undo_verdict
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.http.documents import (
@@ -61,6 +70,23 @@ class VerdictEdit(BaseModel):
     state: VerdictState
     reason: Reason | None = None
     note: Annotated[str, Field(max_length=MAX_NOTE)] | None = None
+    undo_of: AwareDatetime | None = Field(
+        default=None,
+        description="Undo, with `state` `unreviewed`: `at` of a verdict of one's own. The verdict of "
+        "before returns as it was given; 409 when a newer one was given since.",
+    )
+    redo_of: AwareDatetime | None = Field(
+        default=None,
+        description="Redo: `at` of a verdict of one's own that was undone; 409 when the group was "
+        "edited since, or somebody else has judged it.",
+    )
+
+    @model_validator(mode="after")
+    def _require_one_meaning(self) -> Self:
+        given = (self.redo_of, self.reason, self.note)
+        if self.undo_of and (self.state != "unreviewed" or any(given)):
+            raise ValueError("undo_of goes with the state unreviewed, and with nothing else")
+        return self
 
 
 class DismissalEdit(BaseModel):
@@ -178,10 +204,19 @@ def put_verdict(
     if_match: IfMatch,
     background: BackgroundTasks,
 ) -> GroupState:
-    """Accept, reject with a reason, defer, or take a verdict back."""
+    """Accept, reject with a reason, defer, or take a verdict back.
+
+    `undo_of` undoes a verdict of one's own, and `redo_of` gives it again.
+    """
     store, values = services.store, (verdict.state, verdict.reason, verdict.note)
+    who = {"if_match": if_match, "actor": actor}
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
-        state = set_verdict(store, group, *values, if_match=if_match, actor=actor)
+        if verdict.undo_of is not None:
+            state = undo_verdict(store, group, verdict.undo_of, **who)
+        elif verdict.redo_of is not None:
+            state = redo_verdict(store, group, verdict.redo_of, check_verdict(*values), **who)
+        else:
+            state = set_verdict(store, group, *values, **who)
     # A verdict on an independent annotation of a group, and on nothing else, submits that.
     if state.is_copy:
         background.add_task(compare_or_adopt_submission, store, group, services.paint)
