@@ -1,14 +1,9 @@
 // @ts-check
-/** Notes that stand at a place of a view: lines such as "B 612,330: the ball is behind the post". */
+/** Notes of verdicts that stand at a place of a view, as they were written before comments had a place: lines such as "B 612,330: the ball is behind the post". */
 
 /** @import {PointJson} from '../api/types.js' */
 
 const PIN = /^([A-Z]) (-?\d+),(-?\d+): (.+)$/;
-
-/** @param {string} letter @param {PointJson} at image pixels @param {string} text @returns {string} */
-export function pinText(letter, at, text) {
-	return `${letter} ${Math.round(at.x)},${Math.round(at.y)}: ${text}`;
-}
 
 /**
  * The pins of a view among the lines of a note.

@@ -15,7 +15,7 @@ import { latest } from '../lib/latest.js';
 import { stored } from '../lib/storage.js';
 import { known, load, rememberAnswer } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
-import { did } from './last_action.js';
+import { did, learnTime } from './last_action.js';
 import { announce, complain } from './notice.js';
 import { discard, enqueue, outbox, revise } from './outbox.js';
 import { withDismissals } from './open_findings.js';
@@ -25,7 +25,7 @@ import { resetForGroup } from './workspace.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
-/** @import {Base, Item, Verdict} from './outbox.js' */
+/** @import {Base, Item, Turn, Verdict} from './outbox.js' */
 
 const PREVIEW_INTERVAL = 100;
 
@@ -50,9 +50,12 @@ const edits = computed(() => (draft.value ? [...pending.value, draft.value] : pe
 export const group = computed(() => {
 	const base = groupDocument.value;
 	if (!base) return null;
-	const said = own.value.findLast(({ verdict }) => verdict)?.verdict;
+	const last = own.value.findLast(({ verdict }) => verdict);
+	const said = last?.verdict;
 	const edited = edits.value.reduce(applyEdit, base);
 	if (!said) return edited;
+	// What undo restores is as it was, also where the group was edited after it.
+	if (last.turn?.field === 'undo_of') return { ...edited, verdict: { ...base.verdict, ...said } };
 	// Whether it was mended is the server's to say; of what was rejected it never is.
 	const fixed = base.verdict.fixed && said.state === 'accepted';
 	return { ...edited, verdict: { ...base.verdict, ...said, fixed, stale: false } };
@@ -164,15 +167,24 @@ export function submit(edit) {
 	wake();
 }
 
-/** Save a verdict. @param {Verdict} verdict */
-export function submitVerdict(verdict) {
+/**
+ * Save a verdict, or undo or redo one that this window gave.
+ *
+ * @param {Verdict} verdict what the group has by that
+ * @param {Turn & {at?: string}} [turn] `at`: when the verdict was given; it is told later where its own write still waits
+ * @returns {string | null} key of the write
+ */
+export function submitVerdict(verdict, turn) {
 	const at = groupDocument.value;
-	if (!at || refuses('review', at.dataset.name)) return;
-	enqueue({
-		path: `/groups/${at.id}/verdict`, body: verdict, etag: at.etag, group: at.id, method: 'PUT',
-		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key),
+	if (!at || refuses('review', at.dataset.name)) return null;
+	const { state, reason, note } = verdict;
+	const given = turn?.field === 'undo_of' ? { state: 'unreviewed' } : { state, reason, note };
+	const { id } = enqueue({
+		path: `/groups/${at.id}/verdict`, body: turn ? { ...given, [turn.field]: turn.at } : given, etag: at.etag, group: at.id, method: 'PUT',
+		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key), turn: turn && { field: turn.field, key: turn.key },
 	});
 	wake();
+	return id;
 }
 
 /**
@@ -244,10 +256,11 @@ function keepStation(group, station) {
 	if (kept.length || lastStations.value.length) lastStations.value = kept;
 }
 
-/** @param {Item} item @param {GroupDocument} answer */
-function delivered(item, answer) {
+/** @param {Item} item @param {GroupDocument} answer @param {any} [first] the answer to its first sending */
+function delivered(item, answer, first) {
 	batch(() => {
 		discard(({ id }) => id === item.id);
+		if (item.verdict && item.turn?.field !== 'undo_of' && first?.verdict?.at) nameVerdict(item.id, first.verdict.at);
 		// What follows builds on what this one has made.
 		revise((other) => (other.group === item.group && !other.held
 			? { ...other, etag: etagFor(other, answer) } : other));
@@ -259,6 +272,13 @@ function delivered(item, answer) {
 	else if (item.method === 'POST') announce(item.path.includes('/undo') ? 'Undone.' : 'Redone.');
 }
 
+/** When a verdict was given is known: what undoes or redoes it names it by that. @param {string} key @param {string} at */
+function nameVerdict(key, at) {
+	learnTime(key, at);
+	revise((other) => (other.turn?.key === key
+		? { ...other, body: { .../** @type {object} */ (other.body), [other.turn.field]: at } } : other));
+}
+
 /** @param {Item} item @param {GroupDocument} answer */
 function etagFor({ station, etag }, answer) {
 	if (station === null) return answer.etag;
@@ -267,16 +287,18 @@ function etagFor({ station, etag }, answer) {
 
 /** @param {Item} item @param {ApiError} error */
 function refused(item, error) {
-	const conflicting = error.isConflict && (item.edit !== null || item.verdict !== null);
+	// Undo and redo of a verdict are about the group as it was: there is nothing to choose.
+	const conflicting = error.isConflict && !item.turn && (item.edit !== null || item.verdict !== null);
 	const dropped = conflicting ? [] : outbox.value.filter((other) => other.group === item.group && !other.held);
 	batch(() => {
 		// What was said on top of it falls with it, or waits with it.
+		if (conflicting) discard((other) => other.group === item.group && Boolean(other.turn));
 		if (conflicting) revise((other) => (other.group === item.group ? { ...other, held: true } : other));
 		else discard((other) => dropped.includes(other));
 		expected.value = null;
 		if (isGroup(error.current)) takeOver(error.current);
 	});
-	if (error.isConflict && !isGroup(error.current)) load(item.group).then(renew, () => {});
+	if ((error.isConflict || item.turn) && !isGroup(error.current)) load(item.group).then(renew, () => {});
 	if (!conflicting) complain(refusalText(item, dropped, error));
 	listener(item, error);
 	for (const other of dropped) if (other.id !== item.id && other.verdict) listener(other, error);

@@ -5,7 +5,7 @@ import { stored } from '../lib/storage.js';
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Said */
 /** @typedef {{kind: 'edit', dataset: string, group: number, number: number, times: number}} EditDone   `times` in a row */
-/** @typedef {{kind: 'verdict', dataset: string, group: number, number: number, given: Said, before: Said}} VerdictDone */
+/** @typedef {{kind: 'verdict', dataset: string, group: number, number: number, given: Said, before: Said, key?: string, at?: string}} VerdictDone   `key`: of its write; `at`: when the server has it from */
 /** @typedef {{kind: 'batch', dataset: string, batch: number, text: string}} BatchDone */
 /** @typedef {{kind: string, view: string | null, marking: string | null, suggested: string | null, number: number | null}} FindingName */
 /** @typedef {{kind: 'dismissal', dataset: string, group: number, number: number, finding: FindingName, dismissed: boolean}} DismissalDone */
@@ -44,6 +44,15 @@ export function didAgain(action, as) {
 	if (!undone.value.includes(action)) return;
 	undone.value = undone.value.filter((other) => other !== action);
 	actions.value = withAction(actions.value, as ?? action);
+}
+
+/** The server has a verdict: by its time it is named where it is undone or redone. @param {string} key of its write @param {string} at */
+export function learnTime(key, at) {
+	/** @param {Action} action @returns {Action} */
+	const timed = (action) => (action.kind === 'verdict' && action.key === key ? { ...action, at } : action);
+	for (const list of [actions, undone]) {
+		if (list.value.some((action) => action.kind === 'verdict' && action.key === key)) list.value = list.value.map(timed);
+	}
 }
 
 /** It cannot be done again, or was done again elsewhere. @param {Action} action */

@@ -15,6 +15,7 @@ import { myName } from './me.js';
 /** @import {Edit} from './edits.js' */
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Verdict */
+/** @typedef {{field: 'undo_of' | 'redo_of', key: string}} Turn   undo or redo of the verdict that a write of that key gave */
 /** @typedef {{lines: Record<string, PointJson[] | null>, balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson}} Base */
 /**
  * @typedef {object} Item
@@ -29,6 +30,7 @@ import { myName } from './me.js';
  * @property {number | null} station the static camera whose state that is, else the group's
  * @property {Edit | null} edit
  * @property {Verdict | null} verdict
+ * @property {Turn} [turn] what undoes or redoes a verdict
  * @property {Base | null} base what the edit or verdict found
  * @property {string | null} person who made it; null where nobody logs in
  * @property {string} [barred] why the person may not; it waits until they may, or drop it

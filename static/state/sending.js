@@ -13,7 +13,7 @@ import { adopt, claimTab, isKept, outbox, revise, unbar } from './outbox.js';
 
 /**
  * @typedef {object} Receiver who hears what became of a write
- * @property {(item: Item, answer: GroupDocument) => void} delivered
+ * @property {(item: Item, answer: GroupDocument, first: any) => void} delivered   `first`: the answer to its first sending
  * @property {(item: Item, error: ApiError) => void} refused
  */
 
@@ -96,7 +96,7 @@ async function send({ id, path, method, body, etag, ...rest }) {
 		wasRefused.value = false;
 		savedAt.value = Date.now();
 		pause = FIRST_RETRY;
-		receiver.delivered(item, answer);
+		receiver.delivered(item, answer, json);
 		return true;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;

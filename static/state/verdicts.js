@@ -8,18 +8,16 @@ import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
 import { group, groupDocument, onRefused, settle, submit, submitVerdict } from './group.js';
 import { frozen } from './return_group.js';
-import { actions, did, didAgain, forget, forgetUndone, tookBack } from './last_action.js';
+import { actions, did, didAgain, forget, forgetUndone, tookBack, undone } from './last_action.js';
 import { batchId, currentId, goNext, query, queueAddress, returnTo, reviewAddress } from './navigation.js';
 import { isMoving, nextOfBatch } from './leases.js';
 import { announce, complain, inform } from './notice.js';
+import { outbox } from './outbox.js';
 import { reasonText } from './reasons.js';
 import { refuses } from './rights.js';
 import { asking, focused } from './workspace.js';
 
 /** @import {VerdictDone} from './last_action.js' */
-
-/** The server takes no longer note. */
-const MAX_NOTE = 2000;
 
 /** The reason last used, for `X X`. */
 export const lastReason = signal(/** @type {string | null} */ (null));
@@ -106,9 +104,9 @@ export function cancelAsking() {
 
 /** @param {string} state @param {string | null} reason @param {string | null} note */
 function decide(state, reason, note) {
-	const group = groupDocument.value;
-	if (!group || isMoving.value) return;
-	if (refuses('review', group.dataset.name)) return;
+	const at = groupDocument.value;
+	if (!at || isMoving.value) return;
+	if (refuses('review', at.dataset.name)) return;
 	if (frozen.value) {
 		asking.value = null;
 		complain(frozen.value);
@@ -121,14 +119,13 @@ function decide(state, reason, note) {
 	asking.value = null;
 	if (reason) lastReason.value = reason;
 	settle();
-	const { state: was, reason: because, note: said } = group.verdict;
-	did({
-		kind: 'verdict', dataset: group.dataset.name, group: group.id, number: group.number, given: { state, reason, note },
-		before: { state: was, reason: because, note: said },
-	});
-	submitVerdict({ state, reason, note });
-	announce(`Group ${group.number} ${state}.`);
-	leave(group.dataset.name);
+	const given = { state, reason, note };
+	const before = group.value?.verdict ?? at.verdict;
+	const key = submitVerdict(given);
+	if (key === null) return;
+	did({ kind: 'verdict', dataset: at.dataset.name, group: at.id, number: at.number, given, before, key });
+	announce(`Group ${at.number} ${state}.`);
+	leave(at.dataset.name);
 }
 
 /** Verdicts that the server has refused. */
@@ -147,49 +144,65 @@ async function leave(dataset) {
 	});
 }
 
-/** Keep a note with the verdict that the group has; the group stays on screen. @param {string} text */
-export function addNote(text) {
-	const present = group.value?.verdict;
-	if (!present || refuses('review', group.value?.dataset.name)) return;
-	asking.value = null;
-	const note = [present.note, text].filter(Boolean).join('\n').slice(0, MAX_NOTE);
-	submitVerdict({ state: present.state, reason: present.reason, note });
-	announce('Note saved.');
+/** As it is by now: the server may have answered meanwhile. @param {import('./last_action.js').Action[]} list @param {VerdictDone} action */
+function presently(list, action) {
+	return list.find((one) => one.kind === 'verdict' && one.key !== undefined && one.key === action.key) ?? action;
 }
 
-/** Take a verdict of this window back, and return to its group. @param {VerdictDone} action */
-export async function undoVerdict(action) {
+/** Take a verdict of this window back, and return to its group. @param {VerdictDone} before */
+export async function undoVerdict(before) {
+	const isThere = await returnTo(before.group);
+	const action = /** @type {VerdictDone} */ (presently(actions.value, before));
 	forget(action);
-	if (!(await returnTo(action.group)) || !group.value) return;
-	const { state, reason } = group.value.verdict;
-	if (state !== action.given.state || reason !== action.given.reason) {
+	if (!isThere || !group.value) return;
+	const { state, reason, at } = group.value.verdict;
+	// While it is on its way, it is the server that knows when it was given.
+	const isNewest = state === action.given.state && reason === action.given.reason && (isUnsent(action) || at === action.at);
+	if (!isNewest) {
 		complain(`Group ${action.number} was reviewed again since; the new verdict stays.`);
 		return;
 	}
-	submitVerdict(action.before);
-	tookBack(action);
-	announce(`The verdict on group ${action.number} was undone.`);
+	if (action.key && submitVerdict(action.before, { field: 'undo_of', key: action.key, at: action.at })) {
+		tookBack(action);
+		announce(`The verdict on group ${action.number} was undone.`);
+	}
 }
 
-/** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
-export async function redoVerdict(action) {
-	if (!(await returnTo(action.group)) || !group.value) return;
+/** Give a verdict again that was taken back, on its group. @param {VerdictDone} before */
+export async function redoVerdict(before) {
+	if (!(await returnTo(before.group)) || !group.value) return;
+	const action = /** @type {VerdictDone} */ (presently(undone.value, before));
 	const { state, reason } = group.value.verdict;
 	if (state !== action.before.state || reason !== action.before.reason) {
 		forgetUndone(action);
 		complain(`Group ${action.number} was reviewed since; the new verdict stays.`);
 		return;
 	}
-	didAgain(action);
-	submitVerdict(action.given);
+	if (!action.key || !(action.at || isUnsent(action))) {
+		forgetUndone(action);
+		complain(`The verdict on group ${action.number} cannot be redone any more; give it again.`);
+		return;
+	}
+	const key = submitVerdict(action.given, { field: 'redo_of', key: action.key, at: action.at });
+	if (key === null) return;
+	didAgain(action, { ...action, key, at: undefined });
 	announce(`Group ${action.number} ${action.given.state} again.`);
 }
 
+/** Whether the server has not answered a verdict yet. @param {VerdictDone} action */
+function isUnsent({ key }) {
+	return outbox.value.some((item) => item.id === key);
+}
+
 // A verdict that was refused brings its group back to the screen; the notice says why.
-onRefused(({ verdict, group: id }) => {
+onRefused(({ id: key, verdict, turn, group: id }) => {
 	if (!verdict) return;
 	refusals += 1;
-	const given = actions.value.findLast((action) => action.kind === 'verdict' && action.group === id);
-	if (given) forget(given);
+	const lost = new Set([key, turn?.field === 'undo_of' ? turn.key : key]);
+	for (const action of [...actions.value, ...undone.value]) {
+		if (action.kind !== 'verdict' || !action.key || !lost.has(action.key)) continue;
+		forget(action);
+		forgetUndone(action);
+	}
 	if (currentId() !== id) navigate(reviewAddress(id));
 });

@@ -19,15 +19,13 @@ export const maximised = signal(/** @type {string | null} */ (null));
 /** The object that keys move. */
 export const selected = signal(/** @type {Selection | null} */ (null));
 /** What the person is asked before a verdict can be given; null when nothing. */
-export const asking = signal(/** @type {null | 'reason' | 'view' | 'viewNote' | 'note' | 'override' | 'pin' | 'swap'} */ (null));
+export const asking = signal(/** @type {null | 'reason' | 'view' | 'viewNote' | 'note' | 'override' | 'swap'} */ (null));
 /** Whether Tab walks through the objects of the focused view. */
 export const editing = signal(false);
 
 /** @typedef {{letter: string, view: string, at: {x: number, y: number}}} PointerPlace   image pixels */
 /** What the pointer is over; null when that is no view. */
 export const pointerPlace = signal(/** @type {PointerPlace | null} */ (null));
-/** Where a note belongs while it is asked for. */
-export const pinPlace = signal(/** @type {PointerPlace | null} */ (null));
 /** Whether the magnifying glass is held. */
 export const loupe = signal(false);
 /** What a click draws; null when nothing. `ask`: the person chooses what. */
@@ -121,6 +119,5 @@ export function resetForGroup() {
 	editing.value = false;
 	asking.value = null;
 	drawing.value = null;
-	pinPlace.value = null;
 	otherInstant.value = null;
 }

@@ -24,7 +24,7 @@ import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/
 import { filled, fitAll, fitPanel, isZoomed, toggleFilled, viewportOf, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
-	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, residualLines, pinPlace, pointerPlace, projections,
+	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, residualLines, projections,
 	selected, stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { navigate } from '../lib/router.js';
@@ -164,12 +164,6 @@ function openHistory() {
 	if (at) navigate(historyAddress(at.id));
 }
 
-/** Ask for a note at the pointer. */
-function askNote() {
-	pinPlace.value = pointerPlace.value;
-	asking.value = 'pin';
-}
-
 /** Show the gates with all that they say. */
 function showGates() {
 	gatesOpen.value = !gatesOpen.value;
@@ -214,8 +208,7 @@ const VERDICT = [
 	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', needs: 'annotate', run: useView },
 	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', needs: 'annotate', run: askViewReason },
 	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card (checked, it is fine)', group: 'Verdict', needs: 'review', run: dismissShown },
-	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', needs: 'review', run: askNote },
-	{ keys: ['Shift+c'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
+	{ keys: ['Shift+c', 'Shift+n'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
 ];
 
 /** @type {Binding[]} */

@@ -9,10 +9,9 @@ import { doubt, suggestedReason } from '../state/advice.js';
 import { frozen } from '../state/return_group.js';
 import { REASONS } from '../state/reasons.js';
 import {
-	accept, addNote, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
+	accept, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
-import { asking, pinPlace } from '../state/workspace.js';
-import { pinText } from '../lib/pins.js';
+import { asking } from '../state/workspace.js';
 import { SubmitButton } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
 
@@ -93,17 +92,6 @@ function NoteForm({ title, button, onNote = answer }) {
 	`;
 }
 
-/** A note, at the place that the pointer had. */
-function PinForm() {
-	const place = pinPlace.value;
-	const where = place ? ` at ${place.letter} ${Math.round(place.at.x)}, ${Math.round(place.at.y)}` : '';
-	return html`
-		<${NoteForm}
-			title=${`Note${where}`} button="Save"
-			onNote=${(/** @type {string} */ text) => addNote(place ? pinText(place.letter, place.at, text) : text)}
-		/>`;
-}
-
 /** What speaks against accepting a group. @param {GroupDocument} group */
 function acceptTitle(group) {
 	const failing = group.solution?.first_failing;
@@ -121,7 +109,6 @@ function Ask({ group }) {
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
 	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with this group?" button="Reject" />`;
-	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
 	return html`<${NoteForm} title=${acceptTitle(group)} button="Accept" />`;

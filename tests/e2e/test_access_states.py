@@ -15,7 +15,7 @@ OpenPage = Callable[..., Page]
 STATES = {
     "chooser": (["n"], ".chooser"),
     "keys": (["?"], "dialog[open]"),
-    "note": (["Shift+n"], ".ask"),
+    "comment": (["Shift+n"], "#comment-new:focus"),
     "margins": (["g"], ".gates__margin"),
     "alone": (["2", "2"], ".image-panel__stage[data-ready=true]"),
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.screen import Document, Screen, interior_point, until, withdraw_verdict
+from tests.e2e.screen import Document, Screen, interior_point, until
 
 Review = Callable[..., Screen]
 
@@ -164,19 +164,23 @@ class TestLooking:
         expect(caption).to_have_count(0)
         undo(screen, before)
 
-    def test_a_note_stands_where_the_pointer_was(self, review: Review) -> None:
+    def test_a_comment_stands_where_the_pointer_was_and_judges_nothing(
+        self, review: Review
+    ) -> None:
         screen = review(1)
         view = first_view(screen)
         _, _, point = interior_point(view)
         screen.page.mouse.move(*screen.place(view, point["x"], point["y"]))
         screen.press("Shift+n")
-        expect(screen.page.locator("#verdict-note")).to_be_focused()
+        before = screen.document()["verdict"]
+        expect(screen.page.locator("#comment-new")).to_be_focused()
         screen.page.keyboard.type("look here")
-        screen.press("Enter")
-        screen.saved()
-        note = screen.document()["verdict"]["note"]
-        assert note.startswith("A ") and note.endswith(": look here")
-        withdraw_verdict(screen.page, screen.group)
+        screen.press("Control+Enter")
+        thread = screen.page.locator(".talk__threads > li", has_text="look here")
+        expect(thread).to_be_visible()
+        assert screen.document()["verdict"] == before
+        thread.get_by_role("button", name="Delete").click()
+        expect(thread).to_have_count(0)
 
     def test_single_letters_can_be_switched_off(self, review: Review) -> None:
         screen = review(1)

@@ -1,11 +1,11 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { pinsOf, pinText } from '../../static/lib/pins.js';
+import { pinsOf } from '../../static/lib/pins.js';
 
 describe('pins', () => {
 	it('come back as they were written', () => {
-		const text = pinText('B', { x: 612.4, y: 330 }, 'behind the post: look');
+		const text = 'B 612,330: behind the post: look';
 		assert.deepEqual(pinsOf(`first\n${text}`, 'B'), [{ at: { x: 612, y: 330 }, text: 'behind the post: look' }]);
 	});
 
