@@ -43,7 +43,8 @@ export function countOf({ all, ids }, total) {
 /** The query that finds what is ticked. @param {Ticks} from @param {string} q that of the rows */
 export function queryOf({ all, ids }, q) {
 	const listed = [...ids].sort((a, b) => a - b).join(',');
-	if (!all) return `id:${listed}`;
+	// Rows that do not match any more are not decided about: somebody may have judged them meanwhile.
+	if (!all) return withField(q, 'sort', [`id:${listed}`]);
 	return withField(q, 'sort', ids.size > 0 ? [`-id:${listed}`] : []);
 }
 

@@ -36,11 +36,13 @@ const REFUSALS = /** @type {{[reason: string]: string}} */ ({
 	no_picture: 'none of their views has a picture, and accepting that needs a note',
 });
 
-/** @param {{preview: BulkPreview, q: string}} props */
-function Outcome({ preview, q }) {
+/** @param {{preview: BulkPreview, q: string, ticked: number}} props `ticked`: rows that are asked about one by one; 0: none are */
+function Outcome({ preview, q, ticked }) {
+	const gone = Math.max(ticked - preview.matches, 0);
 	return html`
 		<div role="status">
 			<p><strong>${count(preview.would_change)}</strong> of ${count(preview.matches)} ${preview.matches === 1 ? 'group changes' : 'groups change'}.</p>
+			${gone ? html`<p><span data-grade="warn">${plural(gone, 'ticked group')} not changed:</span> no longer in this list, for example because somebody reviewed ${gone === 1 ? 'it' : 'them'} meanwhile</p>` : null}
 			${preview.refused.length ? html`
 				<ul class="bulk__refused">${preview.refused.map(({ reason, groups }) => html`
 					<li key=${reason}><span data-grade="warn">${plural(groups, 'group')} not changed:</span> ${REFUSALS[reason] ?? words(reason)}</li>`)}
@@ -138,7 +140,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 			<${Which} q=${q} total=${total} ticked=${ticked} chosen=${chosen} choose=${choose} />
 			<${Fields} ask=${ask} change=${(/** @type {Partial<BulkRequest>} */ values) => setAsk({ ...ask, ...values })} />
 			<div class="bulk__outcome">
-				${preview.value ? html`<${Outcome} preview=${preview.value} q=${q} />` : preview.error ? null : html`<p role="status">Counting…</p>`}
+				${preview.value ? html`<${Outcome} preview=${preview.value} q=${q} ticked=${chosen && ticked ? ticked.count : 0} />` : preview.error ? null : html`<p role="status">Counting…</p>`}
 				${state.error || preview.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(preview.error)}</p>` : null}
 			</div>
 		<//>

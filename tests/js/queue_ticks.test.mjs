@@ -24,10 +24,17 @@ describe('withRows', () => {
 
 describe('queryOf', () => {
 	it('names the ticked groups, or what is left out of all that match', () => {
-		assert.equal(queryOf(withRows(NONE, [19, 3], true), 'jac<0.5 sort:jac'), 'id:3,19');
+		assert.equal(queryOf(withRows(NONE, [19, 3], true), ''), 'id:3,19');
+		assert.equal(queryOf(withRows(NONE, [19], true), 'id:3,19'), 'id:3,19 id:19');
 		assert.equal(queryOf({ all: true, ids: new Set() }, 'jac<0.5 sort:jac'), 'jac<0.5');
 		assert.equal(queryOf({ all: true, ids: new Set([19, 3]) }, 'jac<0.5 sort:jac'), 'jac<0.5 -id:3,19');
 		assert.equal(queryOf({ all: true, ids: new Set([3]) }, 'id:3,4,5'), 'id:3,4,5 -id:3');
+	});
+});
+
+describe('queryOf a list that goes on changing', () => {
+	it('leaves ticked rows alone that do not match any more', () => {
+		assert.equal(queryOf(withRows(NONE, [19, 3], true), 'status:unreviewed sort:jac'), 'status:unreviewed id:3,19');
 	});
 });
 
