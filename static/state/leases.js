@@ -108,7 +108,9 @@ function heard({ group, here }) {
 		announce(`${other.person} has taken this group over.`);
 	} else {
 		lease.value = { ...held, here };
-		if (held.state !== 'mine' && held.state !== 'none' && here.length === 0) take(held.batch, group);
+		// Of two tabs of mine the one that closes ends the lease of both; a verdict or a submission ends it for good.
+		const isOver = held.state === 'mine' && (isMoving.value || waits(group) || submitting.has(group));
+		if (held.state !== 'none' && here.length === 0 && !isOver) take(held.batch, group);
 	}
 }
 

@@ -74,4 +74,33 @@ describe('a lease', () => {
 		assert.equal(asked.at(-1), 'PUT /batches/1/groups/9/lease');
 		navigate('/groups');
 	});
+
+	it('is taken again where another tab of the same person ended it, and not while the group is left', async (t) => {
+		/** @type {any} */
+		let stream;
+		globalThis.EventSource = /** @type {any} */ (class {
+			kinds = /** @type {any} */ ({});
+			constructor() { stream = this; }
+			addEventListener(kind, hear) { this.kinds[kind] = hear; }
+			close() {}
+		});
+		globalThis.document.hidden = false;
+		Object.defineProperty(globalThis, 'navigator', { configurable: true, value: { onLine: true } });
+		t.after(() => { outbox.value = []; navigate('/groups'); });
+		const tell = (here) => stream.kinds.work({ data: JSON.stringify({ batch: 1, group: 7, here }) });
+		navigate('/groups');
+		navigate('/review/7?q=batch:1');
+		await new Promise((resolve) => { setTimeout(resolve); });
+		assert.equal(lease.value?.state, 'mine');
+		asked = [];
+		tell([{ person: 'local', since: '' }]);
+		assert.deepEqual(asked, []);
+		tell([]);
+		assert.deepEqual(asked, ['PUT /batches/1/groups/7/lease']);
+		asked = [];
+		outbox.value = /** @type {any} */ ([{ ...item, verdict: {} }]);
+		tell([]);
+		outbox.value = [];
+		assert.deepEqual(asked, []);
+	});
 });
