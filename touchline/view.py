@@ -166,7 +166,7 @@ class Group:
         key: Its name in the dataset.
         match: ``<league>/<season>/<match>``, or empty.
         label: For people.
-        split: ``train``, ``valid``, ``test`` or empty, also where its views are split.
+        split: ``train``, ``valid``, ``test``; empty where it is in none, or its views are split.
         pitch: Length and width, metres.
         views: In their order, the main camera first.
         ball: In 3D, or None.
@@ -193,7 +193,7 @@ class Group:
             key=row["group"],
             match=row["match"],
             label=row["label"],
-            split=row["group_split"] or row["split"],
+            split=row["split"] if row["group_split"] is None else row["group_split"],
             pitch=(row["pitch_length"], row["pitch_width"]),
             views=views,
             ball=next((view.ball_3d for view in views if view.ball_3d is not None), None),

@@ -20,10 +20,10 @@ from app.formats.picture_finder import (
     PictureFinder,
     PictureSearchResult,
     drop_contested_pictures,
-    parse_split_name,
     split_picture_name,
 )
 from app.formats.report import ReaderReport
+from app.formats.split_names import parse_split_name
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize

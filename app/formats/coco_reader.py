@@ -32,7 +32,6 @@ from app.formats.coco_annotation import (
 from app.formats.coco_frames import CocoFileFrames, CocoFrame, find_split_in_folders, group_frames
 from app.formats.fields import id_to_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
-from app.formats.frame_names import UNASSIGNED
 from app.formats.json_reader import describe_document, is_gamestate, read_json
 from app.formats.picture_finder import (
     LabelLocation,
@@ -42,6 +41,7 @@ from app.formats.picture_finder import (
 )
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
+from app.formats.split_names import UNASSIGNED
 from app.formats.synloc import camera_from_synloc, is_synloc_image_record
 from app.formats.trees import open_tree_context
 from app.formats.view_state import GroupAssembler, RecordFieldReader, ViewWithGroupHead

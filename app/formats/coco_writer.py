@@ -15,7 +15,7 @@ from typing import IO, Any
 from app.formats.ball_names import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.formats.camera_json import camera_to_json
 from app.formats.export_record import ExportRecord, choose_ball_box, find_export_frame_name
-from app.formats.frame_names import UNASSIGNED
+from app.formats.split_names import split_in_file_name
 from app.formats.view_state import group_head_to_json, view_to_json
 from app.json_text import json_text
 from app.soccer.frames import Box, box_to_corner_origin
@@ -51,7 +51,8 @@ def write_coco(
         records: Groups; one is in memory at a time.
         everything: Whether views that failed a gate say where the 3D ball is.
         boxes: One of ``BOX_KINDS``.
-        every_view: Whether views outside lie with all others, as they do with ``everything``.
+        every_view: Whether views outside lie with all others, as they do with ``everything``; but
+            not those that show a ball without a box, which would teach that there is none.
         info: What stands under ``info``.
 
     Returns:
@@ -67,9 +68,9 @@ def write_coco(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                teaches = every_view or record.is_training_view(view)
+                teaches = record.teaches_truth(view, boxes, every_view)
                 prefix = PREFIX if teaches else OUTSIDE
-                name = f"{prefix}{record.split_of_view(view) or UNASSIGNED}.json"
+                name = f"{prefix}{split_in_file_name(record.split_of_view(view))}.json"
                 if name not in files:
                     files[name] = stack.enter_context(_CocoFileWriter(folder / name, info or {}))
                 counts["images" if teaches else "images_outside"] += 1

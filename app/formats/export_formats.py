@@ -175,7 +175,7 @@ def write_format(
                 info=info,
             )
         case "yolo":
-            return write_yolo(root, records, put, boxes=boxes)
+            return write_yolo(root, records, put, boxes=boxes, every_view=options.every_view)
         case _:
             found = write_parquet(
                 root,

@@ -82,14 +82,33 @@ class ExportRecord:
     def is_training_view(self, view: View) -> bool:
         """Whether a detector may learn from a view: its ball holds in 3D, or it shows none.
 
-        In any other view a ball was annotated that the other views do not confirm.
+        In any other view a ball was annotated that the other views do not confirm. A view that a
+        person left out teaches nothing, not even that it shows no ball.
         """
-        shown = any(not ball.out_of_view for ball in view.balls)
-        return not shown or self.has_ball_3d(view)
+        return view.included and (not _shows_ball(view) or self.has_ball_3d(view))
 
-    def keep_training_views(self) -> ExportRecord:
-        """The same group with the views alone from which a detector may learn."""
-        views = tuple(view for view in self.group.views if self.is_training_view(view))
+    def teaches_truth(self, view: View, boxes: str, every_view: bool) -> bool:
+        """Whether what a detector would learn from a view is what the view shows.
+
+        A view that shows a ball and has no box would teach that there is none, also where every view
+        is asked for: its ball is only a point, or there are several to pick from.
+
+        Args:
+            view: One of the group's.
+            boxes: One of ``BOX_KINDS``.
+            every_view: Whether views count from which no detector should learn (``is_training_view``).
+        """
+        if _shows_ball(view) and choose_ball_box(self, view, boxes) is None:
+            return False
+        return every_view or self.is_training_view(view)
+
+    def keep_training_views(
+        self, boxes: str = "optimized", every_view: bool = False
+    ) -> ExportRecord:
+        """The same group with the views alone that ``teaches_truth`` keeps."""
+        views = tuple(
+            view for view in self.group.views if self.teaches_truth(view, boxes, every_view)
+        )
         return replace(self, group=replace(self.group, views=views))
 
     @property
@@ -104,8 +123,18 @@ class ExportRecord:
         return f"{self.verdict}: {self.reason}" if self.reason else self.verdict
 
 
+def _shows_ball(view: View) -> bool:
+    """Whether a ball is annotated in a view, and not as out of view."""
+    return any(not ball.out_of_view for ball in view.balls)
+
+
 def choose_ball_box(record: ExportRecord, view: View, kind: str) -> Box | None:
-    """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it."""
+    """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it.
+
+    None where several balls are annotated: nobody has picked one.
+    """
+    if view.ball is None:
+        return None
     boxes = collect_ball_boxes(record.solution, view)
     return boxes.get(kind) or boxes.get("annotated")
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from app.errors import InputError
+from app.formats.split_names import parse_split_name
 from app.object_store.path import split_pinned_address
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, View
@@ -21,8 +22,8 @@ VIDEO_SUFFIXES = (
 )
 FOLDER = "Frames-v3"
 """Beside the labels of a match, where SoccerNet's readers look for loose frames."""
-UNASSIGNED = "unassigned"
-"""Stands for the split of groups that are in none."""
+OTHER = "other"
+"""Folder of splits that neither train nor validate nor test."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 
@@ -73,8 +74,14 @@ def _key_digest(key: str) -> str:
 
 
 def folder_name_of_split(split: str) -> str:
-    """Name of a split as a folder; YOLO says ``val``, and what has no split trains."""
-    return {"valid": "val", "test": "test", "challenge": "test"}.get(split, "train")
+    """Name of a split as a folder: YOLO says ``val``, and what has no split trains.
+
+    A split that is called otherwise, such as ``fold-3``, may be held out: it does not train.
+    """
+    if not split.strip():
+        return "train"
+    folders = {"train": "train", "valid": "val", "test": "test", "challenge": "test"}
+    return folders.get(parse_split_name(split), OTHER)
 
 
 def guess_frame_suffix(view: View) -> str:

@@ -12,12 +12,13 @@ from app.formats import fields
 from app.formats.ball_names import is_ball_name
 from app.formats.fields import IdIndex
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
-from app.formats.frame_names import UNASSIGNED, strip_image_suffix
+from app.formats.frame_names import strip_image_suffix
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
+from app.formats.split_names import parse_split_name, split_in_file_name
 from app.formats.trees import open_tree_context
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
@@ -43,7 +44,7 @@ def sequence_folder(match: str, split: str) -> str:
         >>> sequence_folder("epl/2015-2016/2015-08-08 - 18-30 Chelsea 2 - 2 Swansea", "test")
         'test/epl_2015-2016_2015-08-08 - 18-30 Chelsea 2 - 2 Swansea'
     """
-    return f"{split or UNASSIGNED}/{(match or SEQUENCE).replace('/', '_')}"
+    return f"{split_in_file_name(split)}/{(match or SEQUENCE).replace('/', '_')}"
 
 
 def frame_file_name(group: Group, view: View) -> str:
@@ -80,6 +81,7 @@ def sequence_frame_path(group: Group, view: View, split: str, suffix: str) -> st
 
 _IDS = {1: "player", 2: "goalkeeper", 3: "referee", 4: BALL, 5: PITCH, 6: "camera"}
 _FOLDERS = ("img1/", "", "frames/")
+_SIDES = ("x", "y", "w", "h")
 
 
 def read_gamestate(
@@ -152,7 +154,7 @@ class _LabelledSequence:
         self._inside = list_files_in_folder(names, self._folder)
         self.key = self._sequence_key()
         parts = PurePosixPath(name).parts
-        self.split = next((part for part in reversed(parts) if part in SPLITS), "")
+        self.split = _find_split_in_folders(parts)
 
     def _sequence_key(self) -> str:
         folders = PurePosixPath(self._folder).parts
@@ -287,15 +289,16 @@ class _LabelledSequence:
 
     def _add_ball(self, image: _AnnotatedImage, item: dict[str, Any], where: str) -> None:
         try:
-            image.balls.append(_read_ball(item))
+            image.balls.append(read_ball_annotation(item))
         except ValueError as error:
             self._report.add_problem_at(
                 self.path, where, "bbox_image", f"{error}; kept for export and not used"
             )
             image.kept.setdefault("others", []).append(item)
             return
-        rest = {name: value for name, value in item.items() if name != "bbox_image"}
-        image.kept.setdefault("balls", []).append(rest)
+        # With its box: the place on the pitch is that of this box alone.
+        box = {name: item["bbox_image"][name] for name in _SIDES}
+        image.kept.setdefault("balls", []).append({**item, "bbox_image": box})
 
     def _find_frame(self, key: str) -> Media | None:
         for folder in _FOLDERS:
@@ -304,6 +307,13 @@ class _LabelledSequence:
                 return self._tree.media(name)
         self._report.counts["views without frame"] += 1
         return None
+
+
+def _find_split_in_folders(parts: tuple[str, ...]) -> str:
+    """The split that a folder of a file says, the innermost first; empty where none does."""
+    said = next((part for part in reversed(parts) if part in SPLITS), "")
+    # A sequence may have a name like ``test-12``: the folder around the sequences says the split.
+    return said or next(filter(None, map(parse_split_name, reversed(parts[:-2]))), "")
 
 
 def _read_side_length(image: Mapping[str, Any], name: str) -> int:
@@ -315,14 +325,18 @@ def _read_side_length(image: Mapping[str, Any], name: str) -> int:
 
 def _read_bbox_image(item: Mapping[str, Any]) -> Box:
     place = fields.require_object(item.get("bbox_image"))
-    missing = [name for name in ("x", "y", "w", "h") if name not in place]
+    missing = [name for name in _SIDES if name not in place]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    return Box(*(fields.parse_pixel_coordinate(place[name]) for name in ("x", "y", "w", "h")))
+    return Box(*(fields.parse_pixel_coordinate(place[name]) for name in _SIDES))
 
 
-def _read_ball(item: Mapping[str, Any]) -> BallAnnotation:
-    """A box without area is the ball's centre alone."""
+def read_ball_annotation(item: Mapping[str, Any]) -> BallAnnotation:
+    """The ball of an annotation; a box without area is the ball's centre alone.
+
+    Raises:
+        ValueError: It has no sound box.
+    """
     box = _read_bbox_image(item)
     if box.width < 0 or box.height < 0:
         raise ValueError("has a negative width or height")

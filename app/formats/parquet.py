@@ -484,8 +484,9 @@ def _parse_view_row(row: Mapping[str, Any], path: str, record: str) -> ViewWithG
         for name in ("lines", "balls", "given", "picture", "proposed", "extras")
     }
     pitch = [row.get("pitch_length"), row.get("pitch_width")]
-    split = row.get("group_split") or row.get("split") or ""
-    value = {**row, **parsed, "pitch": None if None in pitch else pitch, "split": split}
+    # Where views of a group are split, each by its camera, the group itself is in no split.
+    split = row.get("split") if row.get("group_split") is None else row["group_split"]
+    value = {**row, **parsed, "pitch": None if None in pitch else pitch, "split": split or ""}
     if row.get("left_out_reason") is not None:
         value["left_out"] = {"reason": row["left_out_reason"], "note": row.get("left_out_note")}
     state = RecordFieldReader(value, path, record)

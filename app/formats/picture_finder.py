@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 from urllib.parse import unquote
 
 from app.formats.frame_names import IMAGE_SUFFIXES
+from app.formats.split_names import parse_split_name
 
 _LOCAL = re.compile(r"^.{0,2000}?[?&]d=", re.DOTALL)
 """Label Studio's own address of a file on its disk: ``/data/local-files/?d=images/1.jpg``."""
@@ -39,19 +40,7 @@ def split_picture_name(name: str) -> tuple[str, ...]:
     return tuple(part for part in text.split("/") if part not in ("", ".", ".."))
 
 
-_SPLIT = re.compile(r"(train|val|test|challenge)(?:ing|id|idation)?(?:[-_ ]?(?:set|\d{1,4}))?")
 _WORDS = re.compile(r"[^a-z0-9]+")
-
-
-def parse_split_name(name: str) -> str:
-    """The split that a name is; empty where it is none.
-
-    Example:
-        >>> [parse_split_name(name) for name in ("train2017", "Validation", "val", "cam1")]
-        ['train', 'valid', 'valid', '']
-    """
-    found = _SPLIT.fullmatch(name.strip().lower())
-    return "" if found is None else {"val": "valid"}.get(found[1], found[1])
 
 
 def find_split_in_word(name: str) -> str:

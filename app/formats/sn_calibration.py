@@ -16,7 +16,6 @@ from app.formats.fields import parse_image_size
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import (
     IMAGE_SUFFIXES,
-    UNASSIGNED,
     frame_path_by_match,
     map_frame_names_to_owners,
     view_file_path,
@@ -25,6 +24,7 @@ from app.formats.json_reader import describe_document, read_json, read_json_line
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import IMAGE, SPLITS
+from app.formats.split_names import UNASSIGNED, split_in_file_name
 from app.json_text import json_text
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -68,7 +68,7 @@ def make_split_folder_name(split: str, size: ImageSize) -> str:
         >>> make_split_folder_name("test", ImageSize(1280, 720))
         'test-1280x720'
     """
-    return f"{split or UNASSIGNED}-{size.width}x{size.height}"
+    return f"{split_in_file_name(split)}-{size.width}x{size.height}"
 
 
 def parse_split_folder_name(folder: str) -> tuple[str, ImageSize] | None:

@@ -26,7 +26,7 @@ from app.formats.sn_calibration import (
     read_line_documents,
     read_match_info,
 )
-from app.formats.soccernet_v3 import SPLITS
+from app.formats.split_names import parse_split_name
 from app.formats.trees import open_tree_context
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
@@ -345,4 +345,4 @@ def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> 
 def _parse_split_of_folder(folder: str) -> str:
     """The split that a folder says, or nothing."""
     named = parse_split_folder_name(folder)
-    return named[0] if named else folder if folder in SPLITS else ""
+    return named[0] if named else parse_split_name(folder)

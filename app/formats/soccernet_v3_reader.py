@@ -20,12 +20,12 @@ from app.formats.soccernet_v3 import (
     LABELS,
     MATCH_DEPTH,
     REST,
-    SPLITS,
     ImageRecord,
     MatchFrameFinder,
     group_label,
     record_from_json,
 )
+from app.formats.split_names import read_split_name
 from app.formats.trees import open_tree_context
 from app.soccer.group import Group, Station, View
 from app.wording import plural
@@ -230,9 +230,12 @@ class _MatchLabelsReader:
             key=f"{self.key}/{action}",
             views=tuple(views),
             match=self.key,
-            split=_read_split(metadata.get("set")),
+            split=self._read_split(metadata.get("set")),
             label=group_label(self.key, action, metadata),
         )
+
+    def _read_split(self, value: Any) -> str:
+        return read_split_name(value, self.report) if isinstance(value, str) else ""
 
     def _read_record(self, image: str, value: Any) -> ImageRecord | None:
         try:
@@ -255,7 +258,3 @@ class _MatchLabelsReader:
             shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")
             images = plural(len(self.missing), "image has", "images have")
             self.report_problem(None, None, f"{images} no frame file: {shown}")
-
-
-def _read_split(value: Any) -> str:
-    return value if isinstance(value, str) and value in SPLITS else ""

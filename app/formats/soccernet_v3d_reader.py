@@ -18,6 +18,7 @@ from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrameFinder, group_label
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3_reader import MatchReader
+from app.formats.split_names import read_split_name
 from app.formats.trees import open_tree_context
 from app.geometry.camera import Camera
 from app.json_text import quote_text
@@ -157,7 +158,7 @@ class _TableRowParser:
             size=ImageSize(self._read_side_length("img_w"), self._read_side_length("img_h")),
             ball=self._read_ball_annotation(),
             camera=self._read_given_camera(),
-            split=self._read_optional_text("set"),
+            split=read_split_name(self._read_optional_text("set"), self._report),
         )
 
     def _read_optional_text(self, name: str) -> str:

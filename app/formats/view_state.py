@@ -16,6 +16,7 @@ from app.formats.camera_json import camera_from_json, camera_to_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_v3 import BALLS, GAME, IMAGE, RECORD, REST
+from app.formats.split_names import read_split_name
 from app.geometry.camera import validate_camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.codec import (
@@ -380,9 +381,9 @@ class GroupAssembler:
     def _make_group(self, items: list[ViewWithGroupHead]) -> Group:
         self._report.imported += len(items)
         items.sort(key=lambda item: item.position)
-        return items[0].head.make_group(
-            tuple(self._with_shared_station(item.view) for item in items)
-        )
+        head = items[0].head
+        head = replace(head, split=read_split_name(head.split, self._report))
+        return head.make_group(tuple(self._with_shared_station(item.view) for item in items))
 
     def _with_shared_station(self, view: View) -> View:
         station = view.station

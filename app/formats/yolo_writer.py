@@ -13,14 +13,19 @@ from typing import IO, Any
 
 from app.formats.csv_text import CsvTableWriter
 from app.formats.export_record import ExportRecord, choose_ball_box
-from app.formats.frame_names import folder_name_of_split, frame_path_in_split, guess_frame_suffix
+from app.formats.frame_names import (
+    OTHER,
+    folder_name_of_split,
+    frame_path_in_split,
+    guess_frame_suffix,
+)
 from app.formats.view_files import PutText, make_disk_writer
 from app.json_text import json_text
 from app.soccer.frames import Box, ImageSize, box_to_corner_origin
 from app.soccer.group import View
 from app.wording import plural
 
-LISTS = ("train", "val", "test")
+LISTS = ("train", "val", "test", OTHER)
 HELD_OUT = 10
 """Where no split validates, one in so many training images does."""
 ENOUGH_MATCHES = 5
@@ -152,10 +157,11 @@ def write_yolo(
     put: PutText | None = None,
     *,
     boxes: str = "optimized",
+    every_view: bool = True,
 ) -> dict[str, int]:
     """Write labels, lists and ``data.yaml`` below an existing folder.
 
-    Every view has a label file; one without a ball box is empty, which says "no ball here".
+    A label file that is empty says "no ball here": views that show a ball without a box are left out.
     Boxes are clipped at the image border. Where no split validates, some of what trains is held
     out; what tests never validates. ``frames.csv`` says which image is which view, and
     whether it is there: a frame that was not copied must be put under its name before training.
@@ -165,20 +171,26 @@ def write_yolo(
         records: Groups; one is in memory at a time.
         put: Takes the label files; below ``root`` by default.
         boxes: One of ``BOX_KINDS``.
+        every_view: Whether views count from which no detector should learn.
 
     Returns:
         Counts: ``groups``, ``labels`` (files), ``boxes`` (files with one), ``balls`` (views in
-        which the 3D ball holds), ``images``, ``images_missing``.
+        which the 3D ball holds), ``images``, ``images_missing``, ``views_left_out``.
     """
-    names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
+    names = (
+        *("groups", "labels", "boxes", "balls", "images", "images_missing"),
+        "views_left_out",
+    )
     counts = dict.fromkeys(names, 0)
     put = put or make_disk_writer(root)
     with ExitStack() as stack:
         lists = stack.enter_context(ImageListWriter(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
         table = CsvTableWriter(file, _COLUMNS)
-        for record in records:
-            counts["groups"] += 1
+        for whole in records:
+            record = whole.keep_training_views(boxes, every_view)
+            counts["views_left_out"] += len(whole.group.views) - len(record.group.views)
+            counts["groups"] += bool(record.group.views)
             for view in record.group.views:
                 image = _write_label_file(put, record, view, table, boxes, counts)
                 split, group = folder_name_of_split(record.split_of_view(view)), record.group
@@ -201,7 +213,7 @@ def _write_label_file(
         group, view, split, guess_frame_suffix(view)
     )
     label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
-    box = choose_ball_box(record, view, boxes) if view.ball else None
+    box = choose_ball_box(record, view, boxes)
     line = None if box is None else format_yolo_label(box_to_corner_origin(box), view.size)
     put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
@@ -246,5 +258,10 @@ def _write_data_yaml(root: Path, lists: ImageListWriter, counts: dict[str, int])
     )
     val = "val.txt" if "val" in lists.used else "train.txt"
     test = "test: test.txt\n" if "test" in lists.used else ""
-    text = _DATA.format(missing=sentence, validation=lists.sentence, val=val, test=test)
+    validation = lists.sentence
+    if OTHER in lists.used:
+        validation += (
+            f"\n# {OTHER}.txt holds the images of splits that neither train nor validate nor test."
+        )
+    text = _DATA.format(missing=sentence, validation=validation, val=val, test=test)
     (root / "data.yaml").write_text(text, encoding="utf-8")

@@ -62,6 +62,11 @@ from app.soccer.choices import PicturesWritten, TrainingViews
 
 IMAGES: tuple[str, ...] = get_args(PicturesWritten)
 VIEWS: tuple[str, ...] = get_args(TrainingViews)
+_NO_TRAINING_VIEW = (
+    "A view that shows a ball needs a box of it: the annotated one, or the optimised one of a ball"
+    " that another view confirms. Ask for optimised boxes (boxes: optimized), or for every view"
+    " (views: all)."
+)
 TRIED = 100
 """Groups that are tried before an export is promised."""
 
@@ -491,16 +496,21 @@ class _ExportRun:
         )
 
     def _iterate_records(self) -> Iterator[ExportRecord]:
-        # A frame without its label would teach that it shows no ball: it stays out as well.
-        chosen = self._options.format == "yolo" and not self._options.includes_every_view
+        options = self._options
         for place, (found, facts) in enumerate(self._source.items(), 1):
-            record = found.keep_training_views() if chosen else found
+            record = found
+            if options.format == "yolo":
+                # A frame without its label would teach that it shows no ball: it stays out as well.
+                record = found.keep_training_views(options.boxes, options.includes_every_view)
             if record.group.views:
                 self._licences.add(find_licence(record.group.match))
                 names = self._names.assign_keys(record.group, record.splits)
                 self._images.add(record.group, facts, record.splits, names)
                 self._note_verdict(record)
-                yield replace(record, frames=self._images.placed, names=names)
+                # The writer counts what it leaves out.
+                yield replace(found, frames=self._images.placed, names=names)
+            else:
+                yield found
             if self._progress is not None:
                 self._progress(place, self._source.count)
 
@@ -518,5 +528,5 @@ def _require_content(dataset: str, format: str, counts: Mapping[str, int]) -> No
     if not counts[count]:
         raise InputError(
             f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export',
-            hint="Ask for every view (views: all)." if format == "yolo" else None,
+            hint=_NO_TRAINING_VIEW if format == "yolo" else None,
         )

@@ -135,9 +135,29 @@ class TestWriteCoco:
         ball = BallAnnotation(point=ImagePoint(5.0, 6.0))
         group = replace(group, views=(replace(group.views[0], balls=(ball,)),))
         counts = write_coco(tmp_path, [solved(group, ball=False)], every_view=True)
-        assert counts["annotations"] == 0
-        image = instances(tmp_path, "train")["images"][0]
+        assert (counts["annotations"], counts["images"], counts["images_outside"]) == (0, 0, 1)
+        # Among those that teach it would say that there is no ball.
+        (path,) = (tmp_path / "annotations").iterdir()
+        assert path.name == "outside_train.json"
+        (image,) = json.loads(path.read_text())["images"]
         assert image["touchline"]["balls"][0]["point"] == [5.0, 6.0]
+
+    def test_a_view_with_several_balls_lies_outside_though_every_view_is_asked(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        group = soccer_group()
+        (ball,) = group.views[1].balls
+        several = replace(group.views[1], balls=(ball, ball))
+        counts = write_coco(tmp_path, [solved(group.with_view(several))], every_view=True)
+        assert (counts["images"], counts["images_outside"]) == (1, 1)
+        assert len(instances(tmp_path, "train")["annotations"]) == 1
+
+    def test_a_split_is_part_of_a_file_name_whatever_it_holds(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group(split="fold/1"))])
+        (path,) = (tmp_path / "annotations").iterdir()
+        assert path.name == "instances_fold-1.json"
 
     def test_views_of_one_group_may_be_in_two_splits(
         self, tmp_path: Path, solved: Solved, issia_group: Make

@@ -31,6 +31,16 @@ class TestExportRecord:
         keys = [view.key for view in record.keep_training_views().group.views]
         assert keys == ["7.png", "7_1.png", "7_3.png"]
 
+    def test_a_view_that_a_person_left_out_teaches_nothing_unless_every_view_is_asked(
+        self, soccer_group: Callable[..., Group], solved: Solved
+    ) -> None:
+        group = soccer_group(replays=2)
+        apart = replace(group.views[2], balls=(), included=False)
+        record = solved(group.with_view(apart))
+        assert not record.is_training_view(apart)
+        assert len(record.keep_training_views().group.views) == 2
+        assert len(record.keep_training_views(every_view=True).group.views) == 3
+
     def test_calibrated_means_through_the_gates_on_cameras(
         self, soccer_group: Callable[..., Group], solved: Solved
     ) -> None:

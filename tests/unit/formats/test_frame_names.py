@@ -60,6 +60,12 @@ class TestSplitFolder:
             "train", "val", "test", "test", "train",
         ]  # fmt: skip
 
+    def test_held_out_data_do_not_train_however_their_split_is_spelled(self) -> None:
+        splits = ("val", "Validation", "Test", "testing", "fold-3", "../x", "Train")
+        assert [folder_name_of_split(split) for split in splits] == [
+            "val", "val", "test", "test", "other", "other", "train",
+        ]  # fmt: skip
+
 
 class TestLikelySuffix:
     def test_follows_the_frame_and_is_jpeg_for_videos(self, soccer_group: Make) -> None:

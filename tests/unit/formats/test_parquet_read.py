@@ -47,6 +47,26 @@ class TestReadParquet:
             assert list(read_parquet(place, report)) == groups
         assert report.problems == []
 
+    def test_a_group_split_by_camera_is_in_no_split_itself(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group(split="")
+        splits = dict(zip((view.key for view in group.views), ("train", "test"), strict=True))
+        write_parquet(tmp_path, [replace(solved(group), splits=splits)])
+        assert [group.split for group in read_parquet(tmp_path, report)] == [""]
+        table = pq.read_table(tmp_path / "views.parquet").drop_columns(["group_split"])
+        pq.write_table(table, tmp_path / "views.parquet")
+        # Of an export that does not say it, the first view tells.
+        assert [group.split for group in read_parquet(tmp_path, report)] == ["train"]
+
+    def test_a_split_has_one_spelling(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        groups = [soccer_group(split="Validation"), soccer_group("8.png", split="fold-3")]
+        write_parquet(tmp_path, map(solved, groups))
+        assert [group.split for group in read_parquet(tmp_path, report)] == ["valid", "fold-3"]
+        assert "fold-3" in report.remarks[0]
+
     @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + b"\x00" * 200 + b"PAR1"])
     def test_a_damaged_file_is_reported(
         self, tmp_path: Path, report: ReaderReport, content: bytes

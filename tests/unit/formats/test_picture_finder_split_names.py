@@ -2,21 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.formats.picture_finder import find_split_in_word, parse_split_name
-
-
-class TestSplitOf:
-    @pytest.mark.parametrize(
-        ("name", "split"),
-        [
-            ("train", "train"), ("Train", "train"), ("training", "train"), ("train2017", "train"),
-            ("train_set", "train"), ("val", "valid"), ("valid", "valid"), ("Validation", "valid"),
-            ("val2017", "valid"), ("test", "test"), ("Testing", "test"), ("challenge", "challenge"),
-            ("cam1", ""), ("contest", ""), ("latest", ""), ("valley", ""), ("default", ""), ("test_data", ""),
-        ],
-    )  # fmt: skip
-    def test_names_of_folders(self, name: str, split: str) -> None:
-        assert parse_split_name(name) == split
+from app.formats.picture_finder import find_split_in_word
 
 
 class TestSplitIn:

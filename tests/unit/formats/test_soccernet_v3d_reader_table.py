@@ -131,6 +131,14 @@ class TestReadSnv3dTable:
         assert table.rows[MATCH]["7.png"]["7.png"].ball is None
         assert [item.field for item in report.problems] == ["ball_bbox"]
 
+    @pytest.mark.parametrize(("said", "split"), [("val", "valid"), (" Test", "test"), ("x", "x")])
+    def test_a_split_has_one_spelling(
+        self, read: Read, report: ReaderReport, said: str, split: str
+    ) -> None:
+        table = read(HEAD + row(set=said))
+        assert table.find_split_of_group(MATCH, "7.png") == split
+        assert len(report.remarks) == (split == "x")
+
     def test_the_split_lists_come_before_the_column(self, read: Read, report: ReaderReport) -> None:
         folder = MATCH.split("/")[-1]
         table = read(HEAD + row(), test=f"{folder}/7\n{folder}/7_1\n\nnot a view\n")

@@ -10,7 +10,8 @@ import yaml
 
 from app.formats.export_record import ExportRecord
 from app.formats.yolo_writer import format_yolo_label, write_yolo
-from app.soccer.frames import Box, ImageSize
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group
 
 Solved = Callable[..., ExportRecord]
@@ -58,6 +59,7 @@ class TestWriteYolo:
         counts = write_yolo(tmp_path, records)
         assert counts == {
             "groups": 3, "labels": 6, "boxes": 6, "balls": 6, "images": 0, "images_missing": 6,
+            "views_left_out": 0,
         }  # fmt: skip
         data = yaml.safe_load((tmp_path / "data.yaml").read_text())
         assert (data["names"], data["nc"]) == ({0: "ball"}, 1)
@@ -80,6 +82,34 @@ class TestWriteYolo:
         assert (first["image"], first["present"]) == ("images/train/x_7.png", "True")
         assert (second["present"], second["view"]) == ("False", "7_1.png")
         assert second["group"] == f"{match}/7.png"
+
+    @pytest.mark.parametrize("every_view", [False, True])
+    def test_a_view_whose_ball_has_no_box_is_left_out_and_counted(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, every_view: bool
+    ) -> None:
+        group = soccer_group(replays=4)
+        (box,) = group.views[0].balls
+        balls = [
+            (BallAnnotation(point=ImagePoint(5.0, 6.0)),),
+            (box, replace(box, box=Box(10.0, 10.0, 9.0, 9.0))),
+            (BallAnnotation(out_of_view=True),),
+            (),
+        ]
+        views = [replace(view, balls=of) for view, of in zip(group.views[1:], balls, strict=True)]
+        record = solved(replace(group, views=(group.views[0], *views)))
+        counts = write_yolo(tmp_path, [record], boxes="annotated", every_view=every_view)
+        assert (counts["labels"], counts["boxes"], counts["views_left_out"]) == (3, 1, 2)
+        with (tmp_path / "frames.csv").open(newline="") as file:
+            assert [row["view"] for row in csv.DictReader(file)] == [
+                "7.png", "7_3.png", "7_4.png",
+            ]  # fmt: skip
+        assert len(list(tmp_path.rglob("labels/**/*.txt"))) == 3
+
+    def test_a_group_of_which_nothing_is_written_is_not_counted(
+        self, tmp_path: Path, solved: Solved, issia_group: Make
+    ) -> None:
+        counts = write_yolo(tmp_path, [solved(issia_group())], boxes="annotated")
+        assert (counts["groups"], counts["labels"], counts["views_left_out"]) == (0, 0, 2)
 
     @pytest.mark.parametrize("place", ["here", "elsewhere"])
     def test_the_data_file_works_from_anywhere(
@@ -110,6 +140,18 @@ class TestWriteYolo:
             images = {name: set(trained_on(root / "data.yaml", name)) for name in ("val", "test")}
             assert len(images["test"]) == 2
             assert not images["val"] & images["test"]
+
+    def test_a_split_that_nobody_knows_has_a_list_of_its_own(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        groups = [soccer_group("7.png"), soccer_group("8.png", split="fold/3")]
+        write_yolo(tmp_path, map(solved, groups))
+        listed = (tmp_path / "other.txt").read_text().split()
+        assert len(listed) == 2
+        assert all(line.startswith("./images/other/") for line in listed)
+        train, val = (trained_on(tmp_path / "data.yaml", name) for name in ("train", "val"))
+        assert {image.parent.name for image in [*train, *val]} == {"train"}
+        assert "# other.txt holds the images of splits" in (tmp_path / "data.yaml").read_text()
 
     def test_the_last_groups_of_a_few_matches_are_held_out(
         self, tmp_path: Path, solved: Solved, soccer_group: Make

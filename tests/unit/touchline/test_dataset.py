@@ -12,7 +12,7 @@ import pytest
 
 import touchline
 from app.formats.export_record import ExportRecord
-from tests.unit.touchline.conftest import zipped
+from tests.unit.touchline.conftest import write_export, zipped
 from touchline.errors import DataError, MissingPackageError
 
 
@@ -22,6 +22,16 @@ def version(export: Path) -> touchline.Dataset:
 
 
 class TestRecords:
+    def test_a_group_split_by_camera_claims_no_split(
+        self, records: list[ExportRecord], tmp_path: Path
+    ) -> None:
+        group = records[0].group
+        splits = {view.key: "test" if index else "train" for index, view in enumerate(group.views)}
+        record = replace(records[0], group=replace(group, split=""), splits=splits)
+        (found,) = touchline.open(write_export(tmp_path / "out", [record], images=False))
+        assert found.split == ""
+        assert [view.split for view in found.views] == list(splits.values())
+
     def test_cameras_and_balls_are_those_of_the_solution_to_the_last_bit(
         self, version: touchline.Dataset, records: list[ExportRecord]
     ) -> None:
