@@ -27,6 +27,7 @@ from app.formats.gamestate_reader import (
     PITCH_ID,
     frame_file_name,
     get_gamestate_metadata,
+    read_ball_annotation,
     sequence_folder,
 )
 from app.formats.safe_path import resolve_inside
@@ -53,6 +54,7 @@ _CATEGORIES: list[dict[str, Any]] = [
     {"supercategory": "object", "id": 7, "name": "other"},
 ]
 _OTHER = 7
+BOX = "bbox_image"
 _BALL: dict[str, Any] = {
     "track_id": None,
     "supercategory": "object",
@@ -83,7 +85,7 @@ class _LabelsFile:
     tracks: dict[Hashable, int] = field(default_factory=dict)
 
     def to_json_text(self) -> str:
-        info = _compact_json(self.kept.get("info") or self._make_sequence_info())
+        info = _compact_json(self._make_sequence_info())
         categories = _compact_json(self.kept.get("categories") or _CATEGORIES)
         images, annotations = ",\n".join(self.images), ",\n".join(self.annotations)
         return (
@@ -92,8 +94,13 @@ class _LabelsFile:
         )
 
     def _make_sequence_info(self) -> dict[str, Any]:
-        info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
-        return {**info, "seq_length": len(self.images)}
+        kept, length = self.kept.get("info"), len(self.images)
+        if not kept:
+            info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
+            return {**info, "seq_length": length}
+        # Some of its images may not be in this export.
+        is_stale = "seq_length" in kept and str(kept["seq_length"]) != str(length)
+        return {**kept, "seq_length": length} if is_stale else dict(kept)
 
     def next_image_id(self) -> str:
         """Id of the next image; no sequence of an export has the same."""
@@ -222,7 +229,11 @@ def _image_to_json(
         frame_file_name(record.group, record.with_export_file_key(view)),
     )
     if isinstance(kept, dict):
-        return kept | ({"file_name": name} if view.key in record.names else {})
+        return {
+            **kept,
+            **({"file_name": name} if view.key in record.names else {}),
+            **_find_labels_added_here(kept, view),
+        }
     return {
         "is_labeled": True,
         "image_id": file.next_image_id(),
@@ -237,6 +248,14 @@ def _image_to_json(
         "ignore_regions_y": [],
         "ignore_regions_x": [],
     }
+
+
+def _find_labels_added_here(kept: Mapping[str, Any], view: View) -> dict[str, bool]:
+    """What an image says it has no label of, and has one by now."""
+    lines = bool(view.station.lines)
+    balls = any(ball.center is not None for ball in view.balls)
+    added = {"is_labeled": lines or balls, "has_labeled_pitch": lines}
+    return {name: True for name, is_there in added.items() if is_there and kept.get(name) is False}
 
 
 def _can_store_camera(camera: Camera | None) -> bool:
@@ -305,20 +324,33 @@ def _make_bbox_pitch(place: Sequence[float]) -> dict[str, float]:
 def _make_ball_annotations(
     file: _LabelsFile, record: ExportRecord, view: View
 ) -> Iterator[dict[str, Any]]:
-    rest = get_gamestate_metadata(view).get("balls") or []
-    balls = [ball for ball in view.balls if ball.center is not None]
-    for index, ball in enumerate(balls):
-        kept = rest[index] if index < len(rest) else _make_ball_fields(file, record, view, index)
-        yield {**_BALL, **kept, "bbox_image": _make_bbox_of_ball(ball)}
+    rest: list[dict[str, Any]] = [*(get_gamestate_metadata(view).get("balls") or [])]
+    for index, ball in enumerate(view.balls):
+        if ball.center is None:
+            continue
+        nearest, box = rest[index : index + 1], _make_bbox_of_ball(ball)
+        kept = next((item for item in nearest + rest if _is_ball_as_it_came(item, ball)), None)
+        if kept is not None:
+            yield {**_BALL, **kept, BOX: {**box, **kept[BOX]}}
+        elif nearest and BOX not in nearest[0]:
+            # Read before its box was kept with it.
+            yield {**_BALL, **nearest[0], BOX: box}
+        else:
+            # Drawn here, or moved: then it is the same ball at another place.
+            kept = (
+                nearest[0] if nearest else {"track_id": file.assign_track_number(("ball", index))}
+            )
+            place = _locate_spot_below_ball(record, view)
+            yield {**_BALL, **kept, "bbox_pitch": place, BOX: box}
 
 
-def _make_ball_fields(
-    file: _LabelsFile, record: ExportRecord, view: View, index: int
-) -> dict[str, Any]:
-    return {
-        "track_id": file.assign_track_number(("ball", index)),
-        "bbox_pitch": _locate_spot_below_ball(record, view),
-    }
+def _is_ball_as_it_came(item: Mapping[str, Any], ball: BallAnnotation) -> bool:
+    """Whether an annotation that was kept is of the box or point that a ball has now."""
+    try:
+        came = read_ball_annotation(item)
+    except ValueError:
+        return False
+    return (came.box, came.point) == (ball.box, ball.point)
 
 
 def _locate_spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:

@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from app.formats.gamestate_reader import read_gamestate, sequence_frame_path
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
-from app.soccer.annotation import Extras
+from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media
 from tests.cameras import WIDE_LENSES, wide
@@ -275,6 +275,89 @@ class TestWriteGamestate:
             for path in sorted(tmp_path.rglob("Labels-GameState.json"))
         ]
         assert counts == [2, 4]
+
+
+class TestWriteWhatWasChanged:
+    PLACE: ClassVar = {"x_bottom_middle": 1.5, "y_bottom_middle": 2.5}
+
+    def balls(self, root: Path) -> list[Value]:
+        return [item for item in written(root)["annotations"] if item["category_id"] == 4]
+
+    def test_a_ball_keeps_its_place_on_the_pitch_while_it_is_the_one_that_came(
+        self, read: Read, labels: Value, tmp_path: Path
+    ) -> None:
+        labels["annotations"][1]["bbox_pitch"] = self.PLACE
+        group = read(labels)[0]
+        view = group.views[0]
+        moved = replace(view, balls=(BallAnnotation(box=Box(90.0, 80.0, 4.0, 6.0)),))
+        for name, shown, place in (("same", view, self.PLACE), ("moved", moved, None)):
+            write(tmp_path / name, [group.with_view(shown)])
+            (ball,) = self.balls(tmp_path / name)
+            # It is the same ball, wherever it is.
+            assert (ball["bbox_pitch"], ball["track_id"]) == (place, 3)
+
+    def test_a_ball_out_of_view_takes_nothing_from_the_next_one(
+        self, read: Read, labels: Value, tmp_path: Path
+    ) -> None:
+        other = {"x": 50, "y": 60, "w": 4, "h": 6}
+        labels["annotations"].append(
+            annotation("9", "306000001", 4, bbox_image=other, track_id=8, bbox_pitch=self.PLACE)
+        )
+        group = read(labels)[0]
+        _, second = group.views[0].balls
+        gone = replace(group.views[0], balls=(BallAnnotation(out_of_view=True), second))
+        write(tmp_path / "out", [group.with_view(gone)])
+        (ball,) = self.balls(tmp_path / "out")
+        assert (ball["track_id"], ball["bbox_pitch"]) == (8, self.PLACE)
+
+    def test_balls_that_were_read_without_their_box_stay_as_they_came(
+        self, read: Read, labels: Value, tmp_path: Path
+    ) -> None:
+        labels["annotations"][1]["bbox_pitch"] = self.PLACE
+        group = read(labels)[0]
+        view = group.views[0]
+        kept = dict(view.extras.metadata["gamestate"])
+        kept["balls"] = [{k: v for k, v in kept["balls"][0].items() if k != "bbox_image"}]
+        extras = replace(view.extras, metadata={"gamestate": kept})
+        write(tmp_path / "out", [group.with_view(replace(view, extras=extras))])
+        (ball,) = self.balls(tmp_path / "out")
+        assert (ball["track_id"], ball["bbox_pitch"]) == (3, self.PLACE)
+
+    def test_lines_that_were_drawn_since_are_said_to_be_labelled(
+        self, read: Read, labels: Value, tmp_path: Path
+    ) -> None:
+        for image in labels["images"]:
+            image |= {"is_labeled": False, "has_labeled_pitch": False}
+        labels["annotations"] = labels["annotations"][3:4]
+        write(tmp_path / "out", read(labels))
+        said = [
+            (image["is_labeled"], image["has_labeled_pitch"])
+            for image in written(tmp_path / "out")["images"]
+        ]
+        assert said == [(True, True), (False, False)]
+
+    def test_the_length_of_a_sequence_is_that_of_the_export(
+        self, read: Read, labels: Value, tmp_path: Path
+    ) -> None:
+        for name, said, told in (("part", 750, 1), ("text", "1", "1")):
+            labels["info"]["seq_length"] = said
+            write(tmp_path / name, read(labels)[:1])
+            assert written(tmp_path / name)["info"] == labels["info"] | {"seq_length": told}
+
+    def test_a_split_makes_one_folder_whatever_it_is_called(
+        self, tmp_path: Path, soccer_group: Make
+    ) -> None:
+        write(tmp_path, [soccer_group(match="m", split="fold/../1")])
+        assert (tmp_path / "fold-..-1/m/Labels-GameState.json").is_file()
+
+    @pytest.mark.parametrize(
+        ("folder", "split"),
+        [("Validation/test-12", "valid"), ("val/a", "valid"), ("b/test-12", ""), ("test", "test")],
+    )
+    def test_a_folder_around_the_sequences_says_the_split(
+        self, read: Read, labels: Value, folder: str, split: str
+    ) -> None:
+        assert {group.split for group in read(labels, folder)} == {split}
 
 
 class TestWhatEvaluatorsAskFor:
