@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,7 +19,8 @@ def to_datasets(version: Dataset, *, images: bool = True) -> Any:
     """A version as ``datasets.DatasetDict``, one row a view that counts.
 
     Columns: those of ``touchline.samples``; ``image`` is a feature of its own, with the bytes of
-    the frame as they are, so ``with_format("torch")`` and the viewer show it. What is not there is
+    the frame, so ``with_format("torch")`` and the viewer show it; one of another size than its
+    annotations is resized to theirs, as a PNG. What is not there is
     null. Boxes are ours, (0, 0) the centre of the first pixel: one that is cropped from pixel edges,
     as COCO's are, begins half a pixel further right and down.
 
@@ -62,8 +64,19 @@ def _rows(views: list[View], images: bool) -> Iterator[dict[str, Any]]:
     for view in views:
         row = {name: _plain(value) for name, value in sample_of(view).items()}
         if images:
-            row["image"] = {"bytes": view.frame(), "path": None}
+            row["image"] = {"bytes": _picture(view), "path": None}
         yield row
+
+
+def _picture(view: View) -> bytes:
+    """The frame in the size that boxes, centres and P refer to: as it is where it has that size."""
+    content, image = view.frame(), package("PIL.Image")
+    as_it_is = view.image(resize=False)
+    if as_it_is.shape[:2] == (view.height, view.width):
+        return content
+    resized = io.BytesIO()
+    image.fromarray(view.image()).save(resized, format="PNG")
+    return resized.getvalue()
 
 
 def _plain(value: Any) -> Any:
