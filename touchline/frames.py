@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from touchline.errors import DataError
+from touchline.errors import DataError, HashError
 from touchline.files import Export, Files
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 ARCHIVE, FOLDER = "Frames-v3.zip", "Frames-v3"
 """Where SoccerNet has the frames of a match."""
+AS_STORED = "Touchline-As-Stored"
+"""Header of a frame that is sent as its file holds it."""
 _INSIDE = ("", "v3_frames/", "Frames-v3/", "frames/")
 
 
@@ -31,7 +34,7 @@ class NoFrames:
     def read(self, view: View) -> bytes:
         """Raises DataError."""
         raise DataError(
-            f"no place is configured for the frame of {view.key} is",
+            f"no place is configured for the frame of {view.key}",
             "Give the folder, zip or server that has the frames: touchline.open(..., frames=...).",
         )
 
@@ -98,15 +101,25 @@ class ServerFrames:
     Args:
         client: The server.
         dataset: Name of the dataset.
+        manifest: Of the export whose views are read: says what their frames were.
     """
 
-    def __init__(self, client: Client, dataset: str):
+    def __init__(self, client: Client, dataset: str, manifest: Mapping[str, Any] | None = None):
         self._client, self._dataset = client, dataset
+        self._known = {
+            (item.get("group"), item.get("view")): item
+            for item in (manifest or {}).get("media", ())
+        }
         self._groups: dict[str, int] = {}
         self._views: dict[tuple[str, str], str] = {}
 
     def read(self, view: View) -> bytes:
-        """The file's content; DataError where it is not there."""
+        """The file's content.
+
+        Raises:
+            DataError: It is not there.
+            HashError: It is another file than the one that was exported.
+        """
         if not self._groups:
             rows = self._client.pages("groups", dataset=self._dataset)
             self._groups = {row["key"]: row["id"] for row in rows}
@@ -119,7 +132,22 @@ class ServerFrames:
         address = self._views.get((view.group, view.key))
         if address is None:
             raise DataError(f"{view.group} no longer has the view {view.key}")
-        return self._client.read(address)
+        answer = self._client.send("GET", address)
+        content: bytes = answer.content
+        # What the server made of a file (turned, of a video) says nothing of the file.
+        if answer.headers.get(AS_STORED) == "true":
+            self._require_same(view, content)
+        return content
+
+    def _require_same(self, view: View, content: bytes) -> None:
+        known = self._known.get((view.group, view.key), {})
+        found = {"bytes": len(content), "crc32": zlib.crc32(content)}
+        if any(name in known and known[name] != value for name, value in found.items()):
+            raise HashError(
+                f"the frame of {view.key} of {view.group} is not the one that was exported: its file"
+                f' was changed on the server, or "{self._dataset}" was imported again with another',
+                "Open the frames that were annotated (frames=), or freeze and open a newer version.",
+            )
 
 
 def _places(name: str) -> Iterator[str]:

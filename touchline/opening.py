@@ -70,11 +70,11 @@ def _is_address(source: str | Path) -> bool:
 
 def _frames(said: str | Path | None, export: Export, server: tuple[Client, str] | None) -> Frames:
     if said is not None and _is_address(said):
-        return ServerFrames(Client(str(said)), str(export.manifest["dataset"]))
+        return ServerFrames(Client(str(said)), str(export.manifest["dataset"]), export.manifest)
     if said is not None:
         return FileFrames(Path(said))
     if server is not None and not export.has_frames:
-        return ServerFrames(*server)
+        return ServerFrames(*server, export.manifest)
     return ExportFrames(export)
 
 

@@ -37,6 +37,7 @@ from app.media.files import (
     make_video_stamp,
     read_cached_frame,
     read_encoded_frame,
+    read_picture_header,
     read_video_times,
 )
 from app.media.images import JPEG
@@ -152,16 +153,18 @@ class EncodedPicture:
         kind: Media type, by the bytes themselves.
         data: The bytes.
         digest: Of the bytes, 32 hexadecimal digits.
+        as_stored: Whether they are known to be those of the file: not scaled, turned or decoded.
     """
 
     kind: str
     data: bytes
     digest: str
+    as_stored: bool = False
 
     @staticmethod
-    def of(kind: str, data: bytes) -> EncodedPicture:
+    def of(kind: str, data: bytes, as_stored: bool = False) -> EncodedPicture:
         """The picture of these bytes."""
-        return EncodedPicture(kind, data, digest_content(data))
+        return EncodedPicture(kind, data, digest_content(data), as_stored)
 
 
 class FrameProvider:
@@ -492,7 +495,9 @@ def make_picture(
 ) -> EncodedPicture:
     """A picture, made in this process."""
     data = read_encoded_frame(media, width, flipped, settings)
-    return EncodedPicture.of(guess_content_type(data), data)
+    header = read_picture_header(media) if width is None and not flipped else None
+    as_stored = media.frame is None and header is not None and header.orientation == 1
+    return EncodedPicture.of(guess_content_type(data), data, as_stored)
 
 
 def index_video(media: Media, settings: Settings) -> tuple[str, Times | None]:

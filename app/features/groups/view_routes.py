@@ -59,6 +59,7 @@ SECONDS = 3600
 CLIENT_GONE = 499
 """What the log calls the answer that nobody reads."""
 NO_NEIGHBOURS = "This dataset has no frames before or after this one."
+AS_STORED = "Touchline-As-Stored"
 FRAME: Responses = {
     200: {
         "description": "The frame as JPEG, PNG or WebP.",
@@ -66,7 +67,14 @@ FRAME: Responses = {
             kind: {"schema": {"type": "string", "format": "binary"}}
             for kind in ("image/jpeg", "image/png", "image/webp")
         },
-        "headers": {"ETag": {"description": "Of these bytes.", "schema": {"type": "string"}}},
+        "headers": {
+            "ETag": {"description": "Of these bytes.", "schema": {"type": "string"}},
+            AS_STORED: {
+                "description": "`true` where these are the bytes of the file: not scaled, not turned,"
+                " and not of a video. Absent elsewhere.",
+                "schema": {"type": "string"},
+            },
+        },
     },
     304: {"description": "Not changed."},
 }
@@ -203,6 +211,8 @@ async def get_image(
         return Response(status_code=CLIENT_GONE)
     etag = f'"{picture.digest}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
+    if width is None and picture.as_stored:
+        headers[AS_STORED] = "true"
     if is_not_modified(request, etag):
         return Response(status_code=304, headers=headers)
     return Response(picture.data, media_type=picture.kind, headers=headers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,10 @@ from PIL.PngImagePlugin import PngInfo
 import touchline
 from app.formats.export_record import ExportRecord
 from app.media.images import read_header
-from tests.unit.touchline.conftest import HASH, write_export, zipped
+from tests.unit.touchline.conftest import HASH, Answers, write_export, zipped
+from touchline.client import Client
 from touchline.errors import DataError, HashError
-from touchline.frames import FileFrames
+from touchline.frames import FileFrames, ServerFrames
 
 
 @pytest.fixture
@@ -102,6 +104,37 @@ class TestFrames:
         (tmp_path / "empty").mkdir()
         with pytest.raises(DataError, match="has no frame"):
             touchline.open(bare, frames=tmp_path / "empty").views[0].frame()
+
+    @pytest.mark.parametrize("as_stored", ["true", None])
+    @pytest.mark.parametrize(
+        ("known", "same"),
+        [
+            ({}, True), ({"bytes": 9, "crc32": zlib.crc32(b'"picture"')}, True),
+            ({"bytes": 8}, False), ({"bytes": 9, "crc32": 5}, False),
+        ],
+    )  # fmt: skip
+    def test_a_server_that_has_another_file_by_now_is_not_believed(
+        self,
+        export: Path,
+        answers: Answers,
+        known: dict[str, int],
+        same: bool,
+        as_stored: str | None,
+    ) -> None:
+        view = touchline.open(export).views[0]
+        answers.say(200, {"items": [{"key": view.group, "id": 1}], "next": None})
+        answers.say(200, {"views": [{"key": view.key, "image": "/api/v1/views/1/image"}]})
+        answers.say(
+            200, "picture", **({} if as_stored is None else {"Touchline_As_Stored": as_stored})
+        )
+        media = [{"group": view.group, "view": view.key, **known}]
+        frames = ServerFrames(Client(answers.address), "league", {"media": media})
+        # What the server made of a file, or an older one sends, is not the file.
+        if same or as_stored is None:
+            assert frames.read(view) == b'"picture"'
+        else:
+            with pytest.raises(HashError, match="is not the one that was exported"):
+                frames.read(view)
 
     def test_a_file_that_would_be_the_frame_of_two_views_is_refused(
         self, records: list[ExportRecord], tmp_path: Path

@@ -273,6 +273,23 @@ class TestPreconditions:
 
 
 class TestImage:
+    @pytest.mark.parametrize(("query", "flipped"), [("", False), ("?width=16", False), ("", True)])
+    def test_it_says_whether_it_is_sent_as_its_file_holds_it(
+        self, app, api, tmp_path, group, query, flipped
+    ) -> None:
+        path = tmp_path / "7.png"
+        cv2.imwrite(str(path), np.full((72, 128, 3), 90, dtype=np.uint8))
+        view = group.views[0]
+        station = replace(view.station, flipped=flipped)
+        seen = replace(view, station=station, media=Media(str(path)))
+        store = app.state.services.store
+        import_groups(store, "framed", [group.with_view(seen)], source="test", actor="local")
+        row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
+        shown = api.get(f"{API}/groups/{row['id']}").json()["views"][0]
+        answer = api.get(f"{API}/views/{shown['id']}/image{query}")
+        as_stored = answer.headers.get("Touchline-As-Stored") == "true"
+        assert as_stored is (answer.content == path.read_bytes()) is (not query and not flipped)
+
     @pytest.fixture
     def frames(self, app, tmp_path, group) -> Path:
         """A match's archive: its first frame is no image, its second is not there."""
