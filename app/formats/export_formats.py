@@ -62,6 +62,10 @@ TRACKS = ("tracks", "tracab", "cdf", "npz")
 """Formats of the ball over time: they hold no groups, and no pictures."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
+WITHOUT_PIXELS = ("sn-calibration", "yolo")
+"""Formats whose coordinates are parts of the picture, so that its size does not matter."""
+OTHER_SIZE = "pictures_of_another_size"
+UNCHECKED = "pictures_unchecked"
 LAYOUTS: Mapping[str, FrameName] = {
     "gamestate": sequence_frame_path,
     "sn-calibration": line_frame_path,
@@ -265,3 +269,21 @@ def describe_missing_frames(format: str, counts: Mapping[str, int]) -> dict[str,
     """What a manifest says of frames that a format needs and that were not copied."""
     sentence = describe_missing_content(format, counts)
     return {} if sentence is None else {"missing_images": sentence}
+
+
+def describe_pictures_to_look_at(counts: Mapping[str, int]) -> dict[str, str]:
+    """What a manifest says of pictures that are not just what the records say."""
+    said, other, unchecked = {}, counts.get(OTHER_SIZE, 0), counts.get(UNCHECKED, 0)
+    if other:
+        pictures = plural(other, "picture has", "pictures have")
+        said[OTHER_SIZE] = (
+            f"{pictures} another size than the annotations: scale each to the width and height of its"
+            " record before you use pixels of it"
+        )
+    if unchecked:
+        pictures = plural(unchecked, "picture was", "pictures were")
+        said[UNCHECKED] = (
+            f"{pictures} missing when the version was frozen: nothing says that those of today are the"
+            " ones that were annotated"
+        )
+    return said

@@ -36,11 +36,15 @@ from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
     FORMATS,
+    OTHER_SIZE,
     TRACKS,
+    UNCHECKED,
     USERS,
+    WITHOUT_PIXELS,
     WriteOptions,
     describe_box_settings,
     describe_missing_frames,
+    describe_pictures_to_look_at,
     describe_view_settings,
     find_frame_path_rule,
     make_export_key_assigner,
@@ -223,9 +227,19 @@ def export_dataset(
             _require_content(source.dataset, format, counts)
             if images != "none" and "images_missing" not in counts:
                 counts["pictures"] = frames.present_count
+            counts |= _count_pictures_to_look_at(format, frames)
             write_manifest(root, run.manifest(counts), progress)
     left_out = source.left_out if isinstance(source, LiveSource) else {}
     return ExportReport(out, format, source.count, counts, left_out, tuple(frames.missing))
+
+
+def _count_pictures_to_look_at(format: str, frames: ExportImageWriter) -> dict[str, int]:  # noqa: A002
+    """Pictures that who uses the export has to know of; only what there is."""
+    found = {
+        OTHER_SIZE: 0 if format in WITHOUT_PIXELS else frames.other_size,
+        UNCHECKED: frames.unchecked,
+    }
+    return {name: count for name, count in found.items() if count}
 
 
 @contextmanager
@@ -483,6 +497,7 @@ class _ExportRun:
                 **describe_box_settings(self._options.format, self._options.boxes),
                 **describe_view_settings(self._options.format, self._options.includes_every_view),
                 **describe_missing_frames(self._options.format, counts),
+                **describe_pictures_to_look_at(counts),
             },
             licence=source.licence or terms,
             version=source.version,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby, islice
 from pathlib import Path, PurePosixPath
@@ -10,7 +11,14 @@ from typing import Any, Protocol
 
 from app.db.json_columns import Json
 from app.db.session import Session
-from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
+from app.errors import (
+    ImageError,
+    InputError,
+    NotFoundError,
+    OverloadedError,
+    StorageError,
+    TooLargeError,
+)
 from app.features.datasets.service import DatasetHead
 from app.features.exports.queries import (
     count_left_out_groups,
@@ -43,6 +51,7 @@ from app.formats.frame_names import (
 from app.formats.safe_path import resolve_inside
 from app.media.files import read_media_size_and_crc, read_picture_header
 from app.media.frames import EncodedPicture
+from app.media.images import ImageHeader, read_header
 from app.object_store.path import is_address, split_pinned_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -302,6 +311,8 @@ class ExportImageWriter:
         media: Size and checksum of each frame, for the manifest.
         missing: Frames that could not be had, with the reason.
         placed: Where the frames of the newest group are, by view; relative to the export.
+        unchecked: How many frames were placed of which nothing was known when they were frozen.
+        other_size: How many frames were placed whose size is not that of their annotations.
     """
 
     def __init__(
@@ -310,6 +321,8 @@ class ExportImageWriter:
         self.media: list[Mapping[str, Any]] = []
         self.missing: list[str] = []
         self.placed: dict[str, str] = {}
+        self.unchecked = 0
+        self.other_size = 0
         self._root, self._images, self._read = root, images, read
         self._layout = layout
         self._splits: Mapping[str, str] = {}
@@ -358,8 +371,11 @@ class ExportImageWriter:
             return
         try:
             self._place_picture(group, view, media)
-        except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
+        except (NotFoundError, ImageError, TooLargeError, StorageError, OverloadedError) as error:
             self._note_missing(group, view, error.message)
+            return
+        # The address of a frame in an object store says which it is.
+        self.unchecked += frozen is not None and not frozen and not is_address(media.path)
 
     @property
     def present_count(self) -> int:
@@ -381,11 +397,26 @@ class ExportImageWriter:
             )
             if target is not None:
                 target.symlink_to(media.path)
+                self._note_size(view, read_picture_header(media))
             return
-        picture = self._read(media, None, view.station.flipped)
+        picture = self._read_picture(media, view.station.flipped)
         target = self._prepare_picture_path(group, view, _SUFFIXES[picture.kind])
         if target is not None:
             target.write_bytes(picture.data)
+            with suppress(ImageError):
+                self._note_size(view, read_header(picture.data))
+
+    def _read_picture(self, media: Media, flipped: bool) -> EncodedPicture:
+        """A picture; once more where the machine ended the process that made it."""
+        try:
+            return self._read(media, None, flipped)
+        except OverloadedError:
+            # Where it ends again the picture may be the reason: the others are exported.
+            return self._read(media, None, flipped)
+
+    def _note_size(self, view: View, header: ImageHeader | None) -> None:
+        size = None if header is None else ImageSize(header.width, header.height)
+        self.other_size += size is not None and size != view.size
 
     def _can_link_to_file(self, view: View, media: Media) -> bool:
         """Whether a link to its file shows a frame as it was annotated: a mirrored picture is

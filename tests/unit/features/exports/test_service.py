@@ -25,6 +25,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.export_formats import list_options_of_format
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -351,6 +352,35 @@ class TestImages:
             report = export_dataset(store, "demo", "yolo", out, everything=True, images=images)
             assert len(report.missing_images) == named
             assert all("no picture came with it" in line for line in report.missing_images)
+
+    @pytest.mark.parametrize("form", ["coco", "gamestate", "parquet", "yolo"])
+    def test_pictures_of_another_size_than_their_annotations_are_said(
+        self, store, framed, tmp_path, form
+    ) -> None:
+        report = export_dataset(
+            store, "demo", form, tmp_path / "out", everything=True, images="copy"
+        )
+        manifest = json.loads((tmp_path / "out/manifest.json").read_text())
+        # Of YOLO, whose coordinates are parts of the picture, it does not matter.
+        said = manifest["settings"].get("pictures_of_another_size", "")
+        count = 0 if form == "yolo" else 1
+        assert report.counts.get("pictures_of_another_size", 0) == count
+        assert said.startswith("1 picture has another size than the annotations") is bool(count)
+
+    def test_a_picture_that_was_missing_when_its_version_was_frozen_is_said(
+        self, store, fill, make_group, tmp_path
+    ) -> None:
+        group, path = make_group(7), tmp_path / "7.png"
+        fill(group.with_view(replace(group.views[0], media=Media(str(path)))))
+        freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        cv2.imwrite(str(path), np.full((72, 128, 3), 90, dtype=np.uint8))
+        freeze_dataset(store, "demo", FreezeRequest("v2", groups="passing"), actor="ann")
+        for version, count in (("v1", 1), ("v2", 0)):
+            out = tmp_path / version
+            report = export_dataset(store, "demo", "coco", out, version=version, images="copy")
+            manifest = json.loads((out / "manifest.json").read_text())
+            assert report.counts.get("pictures_unchecked", 0) == count
+            assert ("pictures_unchecked" in manifest["settings"]) is bool(count)
 
     def test_labels_name_the_images_that_were_copied(self, store, framed, tmp_path) -> None:
         _, data = framed

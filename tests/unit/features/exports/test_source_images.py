@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from app.config import Settings
+from app.errors import OverloadedError
 from app.features.exports.source import ExportImageWriter
-from app.media.frames import make_picture
+from app.media.frames import EncodedPicture, make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 
@@ -49,3 +50,27 @@ def test_a_mirrored_picture_is_turned_right_not_linked(tmp_path: Path, picture: 
     assert not target.is_symlink()
     seen = cv2.imread(str(target))
     assert seen[20, 10, 0] > 150 > seen[20, 50, 0]
+
+
+@pytest.mark.parametrize(("times", "calls"), [(1, 2), (9, 2)])
+def test_a_picture_that_ends_its_process_is_tried_once_more_and_costs_itself_alone(
+    tmp_path: Path, picture: Path, times: int, calls: int
+) -> None:
+    other = picture.with_name("8.png")
+    other.write_bytes(picture.read_bytes())
+    asked: list[str] = []
+
+    def read(media: Media, width: int | None, turn: bool) -> EncodedPicture:
+        if media.path == str(picture):
+            asked.append(media.path)
+            if len(asked) <= times:
+                raise OverloadedError("frame 7.png was killed")
+        return make_picture(media, width, turn, Settings(home=tmp_path / "home"))
+
+    station = Station("7.png", ImageSize(60, 40))
+    views = [View(path.name, station, media=Media(str(path))) for path in (picture, other)]
+    images = ExportImageWriter(tmp_path / "out", "copy", read)
+    images.add(Group("m/7.png", tuple(views), "m"))
+    assert len(asked) == calls
+    assert images.missing == ([] if times == 1 else ["m/7.png, 7.png: frame 7.png was killed"])
+    assert "8.png" in images.placed
