@@ -102,7 +102,13 @@ def mentioned(row: Row) -> list[Mentioned]:
 
 def _one(field: str) -> bool:
     """Without those that are another name of the same kind of field."""
-    return field not in ("options/lines/upload", "images_upload", "cameras_upload", "careful")
+    return field not in (
+        "options/lines/upload",
+        "options/frames/upload",
+        "images_upload",
+        "cameras_upload",
+        "careful",
+    )
 
 
 @dataclass

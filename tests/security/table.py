@@ -6,11 +6,13 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 from fastapi import FastAPI
+from pydantic import BaseModel
 
+from app.features.imports.schemas import UploadOrFolder
 from app.features.maintenance import routes as maintenance
 from app.http.permissions import Permission
 from app.http.route import Route
@@ -73,9 +75,33 @@ def rows(of: str = "") -> list[Row]:
 
 def permissions() -> dict[str, Permission]:
     """Who may ask each route of the application but its pages, as the routes say."""
+    return {name: route.permission for name, route in _routes_by_name().items()}
+
+
+def body_model(row: Row) -> type[BaseModel] | None:
+    """The shape of a route's JSON body, where it has one."""
+    route = _routes_by_name().get(str(row))
+    field = None if route is None else route.body_field
+    model = None if field is None else field.field_info.annotation
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+def places_of_files(model: type[BaseModel], path: str = "") -> list[str]:
+    """Where a body names an upload or a folder, by path as permissions write it."""
+    found = []
+    for name, field in model.model_fields.items():
+        for kind in (field.annotation, *get_args(field.annotation)):
+            if kind is UploadOrFolder:
+                found.append(path + name)
+            elif isinstance(kind, type) and issubclass(kind, BaseModel):
+                found += places_of_files(kind, f"{path}{name}/")
+    return found
+
+
+def _routes_by_name() -> dict[str, Route]:
     routers = [("", maintenance.health_router), *((PREFIX, router) for router in ROUTERS)]
     return {
-        f"{method} {prefix}{route.path}": route.permission
+        f"{method} {prefix}{route.path}": route
         for prefix, router in routers
         for route in router.routes
         if isinstance(route, Route)

@@ -22,7 +22,7 @@ from tests.security.apart import (
     mentioned,
     opened,
 )
-from tests.security.table import Row, rows
+from tests.security.table import Row, body_model, places_of_files, rows
 
 RANKS = [role.value for role in Role]
 DATA = [
@@ -182,13 +182,43 @@ class TestNewDatasets:
     def test_folders_of_the_operator_are_for_leads_of_all_datasets(self, apart: Apart) -> None:
         upload = apart.ask("lead", "POST", "/uploads?name=b.zip", b"PK").json()["id"]
         folder, sent = {"folder": "x"}, {"upload": upload}
-        for source, options in ((folder, {}), (sent, {"lines": folder})):
+        for source, options in (
+            (folder, {}),
+            (sent, {"lines": folder}),
+            (sent, {"frames": folder}),
+            (sent, {"frames": sent}),
+        ):
             body = {"dataset": MINE, "format": "issia", "source": source, "options": options}
             refused = apart.ask("lead", "POST", "/imports", {**body, "dry_run": True})
             assert (refused.status_code, "in all datasets" in refused.text) == (403, True)
         asked = {"dataset": MINE, "format": "issia", "source": folder, "dry_run": True}
         looked_for = apart.ask("mine-lead", "POST", "/imports", asked)
         assert (looked_for.status_code, "has allowed no folder" in looked_for.text) == (400, True)
+
+    def test_what_others_have_uploaded_is_no_list_of_frames(self, apart: Apart) -> None:
+        upload = apart.ask("mine-lead", "POST", "/uploads?name=c.zip", b"PK").json()["id"]
+        body = {"dataset": MINE, "format": "coco", "source": {"upload": upload}, "dry_run": True}
+        told = []
+        for other in (apart.ids[THEIRS][OwnedKind.UPLOAD], "8" * 32):
+            options = {"frames": {"upload": other}}
+            answer = apart.ask("mine-lead", "POST", "/imports", {**body, "options": options})
+            text = re.sub("urn:uuid:.{36}", "", answer.text).replace(other, "*")
+            told.append((answer.status_code, text))
+        assert told[0] == told[1]
+        assert told[0][0] == 404
+
+    def test_permissions_know_every_place_of_files_that_a_body_may_name(self) -> None:
+        found = []
+        for row in rows():
+            permission, model = PERMISSIONS.get(str(row)), body_model(row)
+            for place in [] if model is None or permission is None else places_of_files(model):
+                found.append((str(row), place))
+                assert permission.body.get(f"{place}/upload") is OwnedKind.UPLOAD, (row, place)
+                kinds = {permission.body.get(place), permission.body.get(f"{place}/folder")}
+                assert OwnedKind.FOLDER in kinds, (row, place)
+        imports = [place for name, place in found if name == f"POST {API}/imports"]
+        assert sorted(imports) == ["options/frames", "options/lines", "source"]
+        assert (f"POST {API}/recordings", "source") in found
 
 
 class TestMembers:

@@ -71,8 +71,11 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
         "dataset": OwnedKind.NEW_DATASET,
         "source/upload": OwnedKind.UPLOAD,
         "options/lines/upload": OwnedKind.UPLOAD,
+        "options/frames/upload": OwnedKind.UPLOAD,
         "source/folder": OwnedKind.FOLDER,
         "options/lines/folder": OwnedKind.FOLDER,
+        # Wherever a list of frames itself is, it names files of the operator's stores.
+        "options/frames": OwnedKind.FOLDER,
     },
 )
 @respond_with(make_job_response)

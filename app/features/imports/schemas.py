@@ -77,7 +77,8 @@ class ImportOptions(BaseModel):
     )
     frames: UploadOrFolder | None = Field(
         default=None,
-        description="A JSON list of where frames lie in object stores, apart from the labels.",
+        description="A JSON list of where frames lie in object stores, apart from the labels; it needs a "
+        "lead of all datasets.",
     )
 
 
