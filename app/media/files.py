@@ -246,6 +246,27 @@ def read_media_size_and_crc(media: Media) -> dict[str, int]:
     return {"bytes": size, "crc32": crc}
 
 
+def is_same_picture(old: Media, new: Media) -> bool | None:
+    """Whether two frames show the same picture; None where that is not known.
+
+    Files that are gone, videos and object stores, which would have to be fetched, tell nothing.
+    """
+    if old == new:
+        return True
+    facts = read_media_size_and_crc(old), read_media_size_and_crc(new)
+    if old.frame is not None or new.frame is not None or not all(facts):
+        return None
+    if facts[0]["bytes"] != facts[1]["bytes"]:
+        return False
+    if "crc32" in facts[0] and "crc32" in facts[1]:
+        return facts[0]["crc32"] == facts[1]["crc32"]
+    try:
+        contents = [_read_first_bytes(media, facts[0]["bytes"]) for media in (old, new)]
+    except (NotFoundError, ImageError, StorageError):
+        return None
+    return contents[0] == contents[1]
+
+
 def has_member(media: Media, member: str) -> bool:
     """Whether the archive that a frame lies in has a member of that name.
 

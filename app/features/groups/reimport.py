@@ -14,6 +14,7 @@ from app.features.groups.revision_queries import has_same_station, refresh_input
 from app.features.groups.view_queries import StoredStation, list_groups_of_station, save_station
 from app.features.imports.queries import list_shared_stations
 from app.features.queue.refresh_queries import refresh_queue
+from app.media.files import is_same_picture
 from app.soccer.codec import (
     camera_from_log_entry,
     station_digest,
@@ -38,12 +39,13 @@ class KeptEditFinding:
 class MergedGroup:
     """A group after its dataset changed.
 
-    ``base`` is the group as it would be had nobody edited it.
+    ``base`` is the group as it would be had nobody edited it; ``dropped`` are keys of views that went.
     """
 
     group: Group
     base: Group
     kept: tuple[KeptEditFinding, ...]
+    dropped: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,9 @@ def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGro
 
     Shared stations are the incoming group's own; they are followed once, elsewhere.
     """
+    if stored.edited and _shows_another_match(stored.group, incoming):
+        return _keep_group_of_another_match(stored, incoming)
+    dropped: list[str] = []
     views: list[View] = []
     bases: list[View] = []
     kept: list[KeptEditFinding] = []
@@ -69,14 +74,63 @@ def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGro
         bases.append(base)
         kept.extend(noticed)
     for view in stored.group.views:
-        if incoming.view(view.key) is None and stored.is_view_edited(view.key):
+        if incoming.view(view.key) is not None:
+            continue
+        if not stored.is_view_edited(view.key):
+            dropped.append(view.key)
+        else:
             views.append(view)
             bases.append(view)
             sentence = f"{view.key} is no longer in the imported files; it is kept because a person edited it"
             kept.append(KeptEditFinding(view.key, sentence))
     return MergedGroup(
-        replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
+        replace(incoming, views=tuple(views)),
+        replace(incoming, views=tuple(bases)),
+        tuple(kept),
+        tuple(dropped),
     )
+
+
+def _shows_another_match(old: Group, new: Group) -> bool:
+    """Whether a group of the same key is one of another match, or of another split of no match."""
+    if old.match and new.match:
+        differs = old.match != new.match
+    else:
+        differs = bool(old.split and new.split) and old.split != new.split
+    return differs and not any(
+        _is_same_picture(view, other)
+        for view in old.views
+        if (other := new.view(view.key)) is not None
+    )
+
+
+def _is_same_picture(old: View, new: View) -> bool | None:
+    if old.media is None or new.media is None:
+        return None
+    return is_same_picture(old.media, new.media)
+
+
+def _shows_another_frame(old: View, new: View) -> bool:
+    return (
+        old.media is not None
+        and new.media is not None
+        and old.media.path == new.media.path
+        and old.media.frame != new.media.frame
+    )
+
+
+def _keep_group_of_another_match(stored: StoredGroup, incoming: Group) -> MergedGroup:
+    what = "match" if stored.group.match and incoming.match else "split"
+    kept = [
+        KeptEditFinding(
+            view.key,
+            f"the imported files have a group of another {what} under the same name; this group is kept "
+            "because a person edited it",
+        )
+        for view in stored.group.views
+        if stored.is_view_edited(view.key)
+    ]
+    return MergedGroup(stored.group, incoming, tuple(kept))
 
 
 def update_station_from_dataset(
@@ -127,7 +181,22 @@ def _update_view_from_dataset(
     old = stored.group.view(view.key)
     if old is None or not has_same_station(stored, view):
         return view, view, []
+    edited = stored.is_view_edited(view.key)
+    if edited and _is_same_picture(old, view) is False:
+        sentence = (
+            f"the imported files have another picture for {view.key}; the picture on which a person "
+            "worked is kept with its annotations"
+        )
+        station = view.station if view.station.shared else old.station
+        return replace(old, station=station), view, [KeptEditFinding(view.key, sentence)]
     kept: list[KeptEditFinding] = []
+    if edited and _shows_another_frame(old, view):
+        # All cameras of an instant move together, so this one follows, too.
+        sentence = (
+            f"the imported files show another frame of the video in {view.key}; check the edits, which "
+            "are kept"
+        )
+        kept.append(KeptEditFinding(view.key, sentence))
     result = base = view
     if not view.included and not old.included:
         # Saying why is no edit of what is solved; the dataset's word counts where it has one.
