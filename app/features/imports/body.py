@@ -66,7 +66,7 @@ GONE = "this group is no longer in the imported files; it is kept until a person
 
 
 def filter_missing_groups_of_read_matches(
-    session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
+    session: Session, dataset_id: int, matches: Collection[str], missing: Collection[int]
 ) -> list[int]:
     """Those of the missing groups whose match came all the same: they are truly gone.
 
@@ -75,14 +75,18 @@ def filter_missing_groups_of_read_matches(
     Args:
         session: Any session.
         dataset_id: The dataset.
-        seen: Keys of the groups that came.
+        matches: Those of which groups came; an empty one means groups of no match.
         missing: Ids of groups that the same source brought last and that did not come.
     """
     if not missing:
         return []
     groups = list_known_groups(session, dataset_id)
-    matches = {group.match for group in groups if group.key in seen}
     return [group.id for group in groups if group.id in missing and group.match in matches]
+
+
+def count_new_missing_group_findings(session: Session, ids: Sequence[int]) -> int:
+    """How many findings ``save_missing_group_findings`` would save."""
+    return len(set(ids) - filter_groups_with_finding(session, ids, GONE))
 
 
 def save_missing_group_findings(
@@ -145,11 +149,15 @@ class GroupLimits:
         count = len(group.views)
         if count > MAX_VIEWS:
             problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
-            self._report.add_problem_at(self._source, group.key, None, problem)
+            self.report_group_left_out(group.key, problem)
             return None
         return replace(
             group, views=tuple(self._drop_densest_markings(group, view) for view in group.views)
         )
+
+    def report_group_left_out(self, group: str, problem: str) -> None:
+        """Tell of a group that is left out, by its key, and why."""
+        self._report.add_problem_at(self._source, group, None, problem)
 
     def _drop_densest_markings(self, group: Group, view: View) -> View:
         station = view.station

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from app.db.log import NewLogEntry, append_entries
@@ -21,6 +20,8 @@ from app.features.groups.view_queries import (
 from app.features.imports.ingest import IngestReport, open_import_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
+from app.formats.frame_names import strip_image_suffix
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.codec import camera_to_json, covariance_to_json
 from app.soccer.frames import ImageSize
@@ -60,6 +61,7 @@ def import_given_cameras(
     sizes: Mapping[str, ImageSize] | None = None,
     covariances: Mapping[str, Any] | None = None,
     dry_run: bool = False,
+    limit_report: ReaderReport | None = None,
 ) -> IngestReport:
     """Attach given calibrations to what they name; attaching them again changes nothing.
 
@@ -77,15 +79,17 @@ def import_given_cameras(
         sizes: The same by name, where their files state it: they count before ``size``.
         covariances: How well they are known, by name, as ``read_cameras`` read it.
         dry_run: Dry run: report what would happen, change nothing.
+        limit_report: What the files hold; hears of cameras that fit nothing, or views of several matches.
 
     Returns:
         ``changed`` and ``unchanged`` count views and static cameras that a camera was attached to;
-        ``problems`` name cameras that fit nothing, several views, or pictures of another size.
+        ``problems`` name cameras that fit several views, or pictures of another size.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
-    report, found = IngestReport(), get_dataset_head(store, dataset)
+    found = get_dataset_head(store, dataset)
+    report = IngestReport(left_out=ReaderReport() if limit_report is None else limit_report)
     with store.read() as session:
         places = _read_stations_by_name(session, found.id)
     known: list[tuple[NamedStation, GivenCamera]] = []
@@ -93,15 +97,15 @@ def import_given_cameras(
         fitting = _find_stations_of_name(places, name)
         matches = {place.match for place in fitting}
         if not fitting:
-            report.problems.append(
-                f'camera "{name}": no view has this name{_format_example_names(places)}'
-            )
+            problem = f"no view has this name{_format_example_names(places)}"
+            report.left_out.add_problem_at(source, f'camera "{name}"', None, problem)
             continue
         if len(matches) > 1:
-            report.problems.append(
-                f'camera "{name}": views of {len(matches)} matches have this name; call it '
-                f'"{sorted(matches)[0]}/{name}", or like the other match'
+            problem = (
+                f'views of {len(matches)} matches have this name; call it "{sorted(matches)[0]}/{name}", '
+                "or like the other match"
             )
+            report.left_out.add_problem_at(source, f'camera "{name}"', None, problem)
             continue
         if len(fitting) > 1:
             report.problems.append(f'camera "{name}" is that of {len(fitting)} views of this name')
@@ -128,7 +132,7 @@ def import_given_cameras(
 def _read_stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
     places: dict[str, list[NamedStation]] = {}
     for row in list_dataset_views(session, dataset_id):
-        stem = str(PurePosixPath(row.key).with_suffix(""))
+        stem = strip_image_suffix(row.key)
         own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
         names = (
             {row.station}

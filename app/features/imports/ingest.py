@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -43,6 +44,7 @@ from app.features.imports.body import (
     MAX_VIEWS,
     GroupLimits,
     collect_view_and_station_ids,
+    count_new_missing_group_findings,
     filter_missing_groups_of_read_matches,
     make_import_entry_body,
     save_missing_group_findings,
@@ -78,7 +80,10 @@ class IngestReport:
         findings: Edits that a changed source met, and pictures of another shape than declared.
         without_picture: Groups of which no view has a picture.
         missing: Groups that this source brought before and does not bring any more; they stay.
-        problems: What to tell about single groups, or about the missing ones.
+        problems: What to tell about the groups; nothing was left out by it.
+        left_out: Takes what was left out, with the reason.
+        dropped_views: Views that left groups of which others came, by the group's key.
+        replaced: Groups that changed and came from another source before, by that source.
     """
 
     new: int = 0
@@ -88,6 +93,26 @@ class IngestReport:
     missing: int = 0
     without_picture: int = 0
     problems: list[str] = field(default_factory=list)
+    left_out: ReaderReport = field(default_factory=ReaderReport, compare=False)
+    dropped_views: dict[str, int] = field(default_factory=dict)
+    replaced: Counter[str] = field(default_factory=Counter)
+
+    def describe_replaced_parts(self, source: str) -> list[str]:
+        """What took the place of parts of earlier imports, a sentence each."""
+        sentences = []
+        if self.dropped_views:
+            views = plural(sum(self.dropped_views.values()), "view")
+            groups = plural(len(self.dropped_views), "group")
+            were = "was" if sum(self.dropped_views.values()) == 1 else "were"
+            are = "is" if were == "was" else "are"
+            sentences.append(f"{views} of {groups} {are} no longer in the files and {were} removed")
+        for before, count in sorted(self.replaced.items()):
+            have = "has" if count == 1 else "have"
+            sentences.append(
+                f"{plural(count, 'group')} came from {before} before and now {have} other pictures or "
+                f"annotations from {source}"
+            )
+        return sentences
 
 
 @dataclass(frozen=True)
@@ -131,8 +156,10 @@ def import_groups(
             an earlier import go.
         limit_report: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """
-    report, seen, done = IngestReport(), set[str](), 0
-    limits = GroupLimits(source, ReaderReport() if limit_report is None else limit_report)
+    left_out = ReaderReport() if limit_report is None else limit_report
+    report, seen, done = IngestReport(left_out=left_out), dict[str, str](), 0
+    limits = GroupLimits(source, left_out)
+    before = _list_keys_of_no_match(store, dataset)
     sound, stations = _prepare_storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
@@ -147,14 +174,29 @@ def import_groups(
     if done:
         with store.read() as session:
             missing = _find_and_report_missing_groups(session, origin, seen, report)
-            gone = filter_missing_groups_of_read_matches(session, origin.dataset_id, seen, missing)
+            # Files of no match are of one series only where some of it came again.
+            matches = {match for key, match in seen.items() if match or key in before}
+            gone = filter_missing_groups_of_read_matches(
+                session, origin.dataset_id, matches, missing
+            )
+            if dry_run:
+                report.findings += count_new_missing_group_findings(session, gone)
         for start in range(0, 0 if dry_run else len(gone), BATCH):
             with store.write() as session:
                 ids = gone[start : start + BATCH]
                 report.findings += save_missing_group_findings(
                     session, origin.dataset_id, ids, source=origin.source, actor=actor
                 )
+    report.problems += report.describe_replaced_parts(source)
     return report
+
+
+def _list_keys_of_no_match(store: Store, dataset: str) -> set[str]:
+    """Keys of the groups that a dataset has of no match."""
+    with store.read() as session:
+        row = find_dataset(session, dataset)
+        known = [] if row is None else list_known_groups(session, int(row.id))
+    return {group.key for group in known if not group.match}
 
 
 class _DryRunRollback(Exception):  # noqa: N818
@@ -206,18 +248,20 @@ def _find_and_report_missing_groups(
 
 
 def _prepare_storable_groups(
-    groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
+    groups: Iterable[Group], seen: dict[str, str], report: IngestReport, limits: GroupLimits
 ) -> Iterator[Group]:
-    """Groups that can be stored, their media by absolute path."""
+    """Groups that can be stored, their media by absolute path; ``seen`` takes the match of each key."""
     for group in groups:
         keys = [view.key for view in group.views]
         if group.key in seen:
-            report.problems.append(f"group {group.key} appears twice; the first one counts")
+            limits.report_group_left_out(group.key, "appears twice; the first one counts")
         elif len(set(keys)) < len(keys):
-            report.problems.append(f"group {group.key} has two views with the same name")
+            limits.report_group_left_out(
+                group.key, "has two views with the same name; it is left out"
+            )
         else:
             # One that is left out is not missing: the source brought it.
-            seen.add(group.key)
+            seen[group.key] = group.match
             held = limits.trim_group_to_limits(group)
             if held is not None:
                 report.without_picture += all(view.media is None for view in held.views)
@@ -265,16 +309,32 @@ def import_group_chunk(
     known = {item.key: item for item in list_known_groups(session, origin.dataset_id, keys)}
     gone = filter_groups_with_finding(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
+    changed: list[tuple[int, Group, str]] = []
+    replaced: list[int] = []
     for group in batch:
-        digest = hash_imported_group(group)
-        if group.key not in known:
+        digest, there = hash_imported_group(group), known.get(group.key)
+        if there is None:
             fresh.append((group, digest))
-        elif known[group.key].source_hash == digest and known[group.key].id not in gone:
+        elif there.source_hash == digest and there.id not in gone:
             report.unchanged += 1
         else:
-            _update_group(session, origin, known[group.key].id, group, digest, shared.ids, report)
+            changed.append((there.id, group, digest))
+            if there.source_hash != digest:
+                replaced.append(there.id)
+    report.replaced.update(_find_other_sources(session, origin, replaced))
+    for identity, group, digest in changed:
+        _update_group(session, origin, identity, group, digest, shared.ids, report)
     insert_new_groups(session, origin, fresh, shared.ids)
     report.new += len(fresh)
+
+
+def _find_other_sources(
+    session: Session, origin: ImportContext, group_ids: Sequence[int]
+) -> list[str]:
+    """The sources that last brought groups, but for this one, once for each group."""
+    entries = find_newest_imports(session, group_ids) if group_ids else []
+    sources = (str(entry.body["source"]) for entry in entries)
+    return [source for source in sources if source != origin.source]
 
 
 def insert_new_groups(
@@ -320,11 +380,16 @@ def _update_group(
     stored, at = read_groups(session, [group_id])[group_id], now()
     followed = update_group_from_dataset(stored, incoming)
     if (count := len(followed.group.views)) > MAX_VIEWS:
-        report.problems.append(
-            f"group {incoming.key} would have {count} views with those that people edited, a group "
-            f"may have {MAX_VIEWS}; it stays as it is"
+        report.left_out.add_problem_at(
+            origin.source,
+            incoming.key,
+            None,
+            f"would have {count} views with those that people edited, a group may have {MAX_VIEWS}; "
+            "it stays as it is",
         )
         return
+    if followed.dropped:
+        report.dropped_views[incoming.key] = len(followed.dropped)
     if (pitch := _find_edited_pitch(session, stored, incoming)) is not None:
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
     if incoming.match == stored.group.match:

@@ -244,7 +244,7 @@ def merge_edits(
         progress: Called with the number of groups done.
         dry_run: Dry run: report what would happen, change nothing.
     """
-    result = IngestReport()
+    result = IngestReport(left_out=report)
     with open_tree_context(path, report, limits) as tree:
         if tree is None:
             return result

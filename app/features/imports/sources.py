@@ -322,6 +322,7 @@ def import_source(
             sizes=sizes,
             covariances=covariances,
             dry_run=dry_run,
+            limit_report=report,
         )
         return ImportResult(source, report, result)
     if source.format == "touchline":

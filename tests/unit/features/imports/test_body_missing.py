@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from app.features.groups.edit import make_set_ball_edit
@@ -56,6 +58,32 @@ class TestNoteGone:
     def test_a_dry_run_says_nothing_to_others(self, store, three, make_group) -> None:
         assert bring(store, [make_group(7)], dry_run=True).missing == 2
         assert GONE not in told(store, three[1])
+
+    def test_a_dry_run_counts_the_findings_that_the_import_saves(
+        self, store, three, make_group
+    ) -> None:
+        for groups in ([make_group(7)], [make_group(9)]):
+            dry = bring(store, groups, dry_run=True)
+            done = bring(store, groups)
+            assert (dry.findings, dry.missing) == (done.findings, done.missing)
+            assert done.findings == 1
+
+    def test_other_pictures_of_no_match_in_a_file_of_the_same_name_make_nothing_missing(
+        self, store, fill, make_group
+    ) -> None:
+        plain = [replace(make_group(number), match="") for number in (1, 2, 3, 4)]
+        ids = fill(*plain[:2])
+        report = bring(store, plain[2:])
+        assert (report.missing, report.findings) == (2, 0)
+        assert GONE not in told(store, ids[0])
+
+    def test_a_picture_of_no_match_that_left_its_series_is_missing(
+        self, store, fill, make_group
+    ) -> None:
+        plain = [replace(make_group(number), match="") for number in (1, 2, 3)]
+        ids = fill(*plain[:2])
+        assert bring(store, plain[1:]).findings == 1
+        assert GONE in told(store, ids[0])
 
     def test_an_edit_stays_and_the_log_replays(self, store, three, make_group) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))

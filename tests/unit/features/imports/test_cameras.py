@@ -111,11 +111,27 @@ class TestIngestCameras:
         fill(make_group(7), other, solved=False)
         report = attach(store, {"7": opposite, "99": opposite})
         assert report.changed == 0
-        assert report.problems == [
-            'camera "7": views of 2 matches have this name; call it '
-            f'"{make_group(7).match}/7", or like the other match',
-            'camera "99": no view has this name; views are called "7", "7_1"',
+        assert report.problems == []
+        assert [(error.record, error.problem) for error in report.left_out.problems] == [
+            (
+                'camera "7"',
+                f'views of 2 matches have this name; call it "{make_group(7).match}/7", '
+                "or like the other match",
+            ),
+            ('camera "99"', 'no view has this name; views are called "7", "7_1"'),
         ]
+
+    def test_a_view_whose_name_has_a_dot_is_called_by_its_whole_name(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        group = make_group(7)
+        keys = ("north.left", "north.right.png")
+        views = [replace(view, key=key) for view, key in zip(group.views, keys, strict=False)]
+        (number,) = fill(replace(group, views=tuple(views)), solved=False)
+        report = attach(store, {"north.left": opposite, "north.right": opposite})
+        assert (report.changed, report.left_out.problems) == (2, [])
+        found = load_group_state(store, number).group.views
+        assert [view.station.given for view in found[:2]] == [opposite, opposite]
 
     def test_views_of_one_match_that_are_called_alike_have_one_camera(
         self, store, fill, make_group, opposite

@@ -104,7 +104,7 @@ class TestIngest:
     def test_an_import_that_yields_no_group_makes_no_dataset(self, store) -> None:
         assert vars(again(store)) == {
             "new": 0, "changed": 0, "unchanged": 0, "findings": 0, "missing": 0, "problems": [],
-            "without_picture": 0,
+            "without_picture": 0, "left_out": ReaderReport(), "dropped_views": {}, "replaced": {},
         }  # fmt: skip
         with pytest.raises(NotFoundError):
             get_dataset(store, "demo")
@@ -144,8 +144,9 @@ class TestIngest:
         self, store, fill, make_group
     ) -> None:
         report = again(store, make_group(7), make_group(7))
-        assert (report.new, len(report.problems)) == (1, 1)
-        assert "7.png appears twice" in report.problems[0]
+        assert (report.new, report.problems) == (1, [])
+        (problem,) = report.left_out.problems
+        assert "7.png: appears twice" in problem.message
 
     def test_a_group_of_too_many_views_is_left_out_and_is_not_missing(
         self, store, make_group, monkeypatch
@@ -281,6 +282,17 @@ class TestAChangedSource:
         kept = load_group_state(store, state.id).group
         assert [view.key for view in kept.views] == ["7.png", "7_1.png"]
 
+    def test_views_that_are_no_longer_in_the_files_are_told(self, store, fill, make_group) -> None:
+        groups = [make_group(7), make_group(8)]
+        fill(*groups)
+        cut = [replace(group, views=group.views[:1]) for group in groups]
+        gone = sum(len(group.views) - 1 for group in groups)
+        told = f"{gone} views of 2 groups are no longer in the files and were removed"
+        dry = import_groups(store, "demo", cut, source="test", actor="ann", dry_run=True)
+        assert dry.problems == [told]
+        assert again(store, *cut).problems == [told]
+        assert again(store, *cut).problems == []
+
     def test_views_that_people_edited_do_not_add_up_beyond_what_a_group_may_have(
         self, store, state, make_group, monkeypatch
     ) -> None:
@@ -294,8 +306,9 @@ class TestAChangedSource:
         report = again(store, other)
         assert (report.changed, report.findings) == (0, 0)
         assert load_group_state(store, state.id).group == before
-        (problem,) = report.problems
-        assert "would have 3 views with those that people edited, a group may have 2" in problem
+        (problem,) = report.left_out.problems
+        told = "would have 3 views with those that people edited, a group may have 2"
+        assert told in problem.message
 
     def test_a_static_camera_that_changed_makes_its_groups_stale(
         self, store, fill, make_static

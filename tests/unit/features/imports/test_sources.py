@@ -531,6 +531,22 @@ class TestLinesOfAnotherDay:
         assert all(view.station.lines for view in group.views)
 
 
+class TestWhatIsLeftOut:
+    def test_a_camera_that_fits_nothing_makes_an_import_one_in_part(
+        self, store: Store, fill: Fill, make_group: Make, tmp_path: Path, opposite
+    ) -> None:
+        fill(make_group(7))
+        (tmp_path / "cameras").mkdir()
+        write_cameras(tmp_path / "cameras", {"7": opposite, "99": opposite})
+        source = ImportSource("cameras", tmp_path / "cameras")
+        imported = import_source(store, "demo", source, store.settings)
+        values = imported.to_report_values()
+        assert (values["outcome"], values["changed"]) == ("partial", 1)
+        (skipped,) = values["skipped"]
+        assert skipped["record"] == 'camera "99"'
+        assert "no view has this name" in skipped["problem"]
+
+
 class TestMirroredPeople:
     """People of ISSIA's camera 2, who are mirrored in its files (``formats.issia``)."""
 

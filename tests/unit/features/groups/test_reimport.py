@@ -1,0 +1,158 @@
+"""What becomes of a person's work when other files come under the same names."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from app.db.store import Store
+from app.features.datasets.service import get_dataset
+from app.features.groups.edit import make_set_ball_edit
+from app.features.groups.replay import replay_log
+from app.features.groups.state import GroupState
+from app.features.groups.state_snapshot_queries import read_state_snapshot
+from app.features.groups.submit import load_group_state, submit_edit
+from app.features.imports.ingest import IngestReport
+from app.features.imports.sources import ImportSource, import_source
+from app.features.queue.service import list_groups
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+
+BALL = BallAnnotation(box=Box(300.0, 100.0, 12.0, 12.0))
+TOP = {"Side line top": [{"x": 0.1, "y": 0.2}, {"x": 0.9, "y": 0.2}]}
+BOTTOM = {"Side line bottom": [{"x": 0.1, "y": 0.8}, {"x": 0.9, "y": 0.8}]}
+
+
+def picture(colour: tuple[int, int, int], size: tuple[int, int] = (640, 360)) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", size, colour).save(file, "JPEG")
+    return file.getvalue()
+
+
+RED, BLUE = picture((200, 0, 0)), picture((0, 0, 200), (800, 450))
+
+
+def zipped(path: Path, members: Mapping[str, object]) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content if isinstance(content, bytes) else json.dumps(content))
+    return path
+
+
+def bring(store: Store, path: Path, form: str = "frames", *, dry_run: bool = False) -> IngestReport:
+    source = ImportSource(form, path)
+    return import_source(store, "cup", source, store.settings, dry_run=dry_run).result
+
+
+def first_group(store: Store) -> GroupState:
+    (row, *_) = list_groups(store, get_dataset(store, "cup").id, limit=9).items
+    return load_group_state(store, row.id)
+
+
+def draw_ball(store: Store) -> GroupState:
+    state = first_group(store)
+    edit = make_set_ball_edit(state.group.views[0].key, BALL)
+    submit_edit(store, state.id, edit, if_match=state.etag, actor="ann")
+    return first_group(store)
+
+
+class TestOtherPictures:
+    def test_the_picture_on_which_a_person_worked_stays_and_it_is_said(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        bring(store, zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED}))
+        before = draw_ball(store).group
+        other = zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": BLUE})
+        assert bring(store, other, dry_run=True).findings == 1
+        report = bring(store, other)
+        assert (report.changed, report.findings) == (1, 1)
+        state = first_group(store)
+        assert state.group == before
+        with store.read() as session:
+            assert replay_log(session) == read_state_snapshot(session)
+        again = bring(store, other)
+        assert (again.unchanged, again.findings) == (1, 0)
+
+    def test_the_same_picture_in_another_file_is_followed(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        bring(store, zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED}))
+        draw_ball(store)
+        moved = zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": RED})
+        assert bring(store, moved).findings == 0
+        (view,) = first_group(store).group.views
+        assert view.media is not None
+        assert (view.media.path, view.balls) == (str(moved), (BALL,))
+
+    def test_the_picture_of_a_file_that_is_gone_is_followed(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        gone = zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED})
+        bring(store, gone)
+        draw_ball(store)
+        gone.unlink()
+        assert bring(store, zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": BLUE})).findings == 0
+
+    def test_a_corrected_picture_on_which_nobody_worked_is_followed(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        bring(store, zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED}))
+        mended = zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": BLUE})
+        assert bring(store, mended).findings == 0
+        (view,) = first_group(store).group.views
+        assert view.media is not None
+        assert (view.media.path, view.size.width) == (str(mended), 800)
+
+    def test_loose_files_of_one_length_are_compared_by_what_they_hold(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        for folder, end in (("a", b"\x01"), ("b", b"\x02")):
+            (tmp_path / folder).mkdir()
+            (tmp_path / folder / "0001.jpg").write_bytes(RED + end)
+        bring(store, tmp_path / "a")
+        before = draw_ball(store).group
+        assert bring(store, tmp_path / "b").findings == 1
+        assert first_group(store).group == before
+
+
+class TestOtherMatches:
+    @pytest.mark.parametrize("what", ["split", "match"])
+    def test_a_group_that_a_person_edited_stays_what_it_was(
+        self, store: Store, tmp_path: Path, what: str
+    ) -> None:
+        made = []
+        for name, lines in (("train", TOP), ("test", BOTTOM)):
+            folder = name if what == "split" else "x"
+            info = {} if what == "split" else {f"{folder}/match_info.json": match_info(name)}
+            made.append(zipped(tmp_path / f"{name}.zip", {f"{folder}/00001.json": lines, **info}))
+        bring(store, made[0], "sn-calibration")
+        before = draw_ball(store).group
+        report = bring(store, made[1], "sn-calibration")
+        assert (report.changed, report.findings) == (1, 1)
+        assert first_group(store).group == before
+        with store.read() as session:
+            assert replay_log(session) == read_state_snapshot(session)
+
+    def test_what_took_the_place_of_another_source_is_told(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        train = zipped(tmp_path / "train.zip", {"train/00001.json": TOP, "train/00002.json": TOP})
+        test = zipped(tmp_path / "test.zip", {"test/00001.json": BOTTOM, "test/00003.json": TOP})
+        assert bring(store, train, "sn-calibration").problems == []
+        told = f"1 group came from {train} before and now has other pictures or annotations from {test}"
+        for dry_run in (True, False):
+            assert bring(store, test, "sn-calibration", dry_run=dry_run).problems == [told]
+        assert bring(store, test, "sn-calibration").problems == []
+        assert first_group(store).group.split == "test"
+
+
+def match_info(match: str) -> dict[str, object]:
+    record = {"league": "l", "season": "s", "match": match}
+    return {"00001.jpg": record}
