@@ -196,6 +196,10 @@ class PredictionReader:
             found: Found = task.future.result()
         except DatasetFormatError as error:
             raise _remove_folder_from_error(error, files) from error
+        for one in found:
+            one.report.problems = [
+                _remove_folder_from_error(problem, files) for problem in one.report.problems
+            ]
         return found
 
     def close(self) -> None:

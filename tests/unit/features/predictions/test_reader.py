@@ -78,6 +78,14 @@ class TestPredictionReader:
         assert there.value.path == "b.json"
         assert there.value.hint == here.value.hint
 
+    def test_files_of_problems_are_called_by_their_names_alone(self, reader_of, tmp_path) -> None:
+        box = b'{"category_id": 1, "bbox": [600, 300, 14, 14], "score": %s, "image_id": "7.png"}'
+        files = written(tmp_path / "a.json", b"[%s, %s]" % (box % b"0.5", box % b'"high"'))
+        boxes, _ = reader_of().read(files, NAMES, ImportLimits.of(Settings()))
+        (problem,) = boxes.report.problems
+        assert problem.path == "a.json"
+        assert str(tmp_path) not in problem.message
+
     def test_a_file_of_another_kind_is_called_by_its_name_alone(self, reader_of, tmp_path) -> None:
         other = written(tmp_path / "x.csv", b"a,b")
         with pytest.raises(DatasetFormatError) as refused:
