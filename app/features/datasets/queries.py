@@ -369,6 +369,15 @@ def list_unused_uploads(session: Session, settings: Settings) -> list[str]:
     ]
 
 
+def is_upload_in_use(session: Session, settings: Settings, upload_id: str) -> bool:
+    """Whether a view has its frame in an upload, or it is a recording."""
+    folder = f"{settings.uploads.absolute() / upload_id}/"
+    return any(
+        session.scalar(select(column).where(column.startswith(folder, autoescape=True)).limit(1))
+        for column in (ViewModel.media_path, RecordingModel.path)
+    )
+
+
 def list_unused_frame_files(session: Session, settings: Settings) -> list[str]:
     """Folders and files of the home's recordings that no view and no recording uses."""
     used = {path.parent.name for path in _paths_in_use(session)}

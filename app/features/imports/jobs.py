@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -12,7 +13,7 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import ConflictError, InputError, TooLargeError
-from app.features.datasets.queries import find_dataset, has_more_groups
+from app.features.datasets.queries import find_dataset, has_more_groups, is_upload_in_use
 from app.features.datasets.service import get_dataset_head, require_valid_name
 from app.features.imports.sources import FORMATS, ImportSource, import_source
 from app.features.imports.upload_queries import (
@@ -141,10 +142,7 @@ def run_import_job(jobs: Jobs, store: Store, settings: Settings, progress: JobPr
     source = resolve_source(settings, request)
     sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
     progress(0, None, sentence)
-    if not request.dry_run and "upload" in request.source:
-        # Frames are read where they are, so the file must stay from the first group on.
-        mark_upload_permanent(settings, request.source["upload"])
-    with leave_work_to_next_server(progress):
+    with _keep_upload_in_use(store, request), leave_work_to_next_server(progress):
         outcome = import_in_worker(
             store,
             request.dataset,
@@ -166,6 +164,25 @@ def run_import_job(jobs: Jobs, store: Store, settings: Settings, progress: JobPr
     return _make_import_result(
         outcome, request, **_request_following_jobs(jobs, store, request, actor)
     )
+
+
+@contextmanager
+def _keep_upload_in_use(store: Store, request: ImportRequest) -> Iterator[None]:
+    """Let an upload stay while it is imported, and afterwards where a dataset reads frames from it."""
+    upload, settings = request.source.get("upload"), store.settings
+    if upload is None or request.dry_run:
+        yield
+        return
+    # Frames are read where they are, so the file must stay from the first group on.
+    marked = mark_upload_permanent(settings, upload)
+    try:
+        yield
+    finally:
+        with store.read() as session:
+            used = is_upload_in_use(session, settings, upload)
+        # One that was kept before is another's to release, who may be at work with it.
+        if used or marked:
+            mark_upload_permanent(settings, upload, kept=used)
 
 
 def import_in_worker(
@@ -209,9 +226,10 @@ def import_in_this_process(
 ) -> ImportOutcome:
     """The import itself, in this process."""
     settings = store.settings
-    imported = import_source(
-        store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
-    )
+    with source.hide_places_in_errors():
+        imported = import_source(
+            store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
+        )
     result = imported.result
     nothing = None if imported.imported_anything else imported.explain_nothing_imported()
     return ImportOutcome(imported.to_report_values(), bool(result.new + result.changed), nothing)
@@ -301,6 +319,8 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
             f'"{request.format}" cannot be imported; {", ".join(FORMATS)} can', pointer="/format"
         )
     path, name = _resolve_source_path(settings, request.source)
+    lines, lines_name = _resolve_optional_path(settings, request.lines)
+    frames, frames_name = _resolve_optional_path(settings, request.frames)
     options = dict(request.options)
     size = options.pop("size", None)
     offset = options.pop("frame_offset", 8)
@@ -310,10 +330,8 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
         request.format,
         path,
         size=None if size is None else ImageSize(*size),
-        lines=None if request.lines is None else _resolve_source_path(settings, request.lines)[0],
-        frames=None
-        if request.frames is None
-        else _resolve_source_path(settings, request.frames)[0],
+        lines=lines,
+        frames=frames,
         calibration=options.get("calibration"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
@@ -321,9 +339,17 @@ def resolve_source(settings: Settings, request: ImportRequest) -> ImportSource:
         ball_category=options.get("ball_category", ""),
         grouping=options.get("grouping", ""),
         propose=options.get("propose", True),
+        lines_name=lines_name,
+        frames_name=frames_name,
     )
     source.require_used_options(policy=request.policy is not None)
     return source
+
+
+def _resolve_optional_path(
+    settings: Settings, source: Mapping[str, str] | None
+) -> tuple[Root | None, str]:
+    return (None, "") if source is None else _resolve_source_path(settings, source)
 
 
 def _resolve_source_path(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, get_args
@@ -131,6 +132,7 @@ class ImportSource:
         ball_category: COCO: name or id of the category that is the ball; empty: by its name.
         grouping: Pictures: which are one group (``frames_reader``); empty: each is one.
         propose: Pictures: whether cameras are proposed for them once they are imported.
+        lines_name: What people call ``lines``; ``frames_name`` likewise.
     """
 
     format: str
@@ -145,6 +147,8 @@ class ImportSource:
     ball_category: str = ""
     grouping: str = ""
     propose: bool = True
+    lines_name: str = ""
+    frames_name: str = ""
 
     def require_used_options(self, *, policy: bool = False) -> None:
         """Refuse an option that the format does not use.
@@ -179,10 +183,24 @@ class ImportSource:
         """A text without the place of a source that has a name of its own."""
         if not self.name:
             return text
-        for path in (self.path, self.path.parent, self.lines, self.frames):
+        places = [(str(self.path), "", self.name), (str(self.path.parent), "", self.name)]
+        for path, name in ((self.lines, self.lines_name), (self.frames, self.frames_name)):
             if path is not None:
-                text = text.replace(f"{path}/", "").replace(str(path), self.name)
+                called = name or path.name
+                places.append((str(path), f"{called}/", called))
+        # One may lie in the folder of another.
+        for place, before, called in sorted(places, key=lambda item: len(item[0]), reverse=True):
+            text = text.replace(f"{place}/", before).replace(place, called)
         return text
+
+    @contextmanager
+    def hide_places_in_errors(self) -> Iterator[None]:
+        """Errors about files call them as people do, where the source has a name of its own."""
+        try:
+            yield
+        except DatasetFormatError as error:
+            path, problem = self.shown(error.path), self.shown(error.problem)
+            raise DatasetFormatError(path, error.record, error.field, problem) from error
 
 
 @dataclass(frozen=True)

@@ -145,13 +145,18 @@ def list_uploads(settings: Settings) -> list[Upload]:
     )
 
 
-def mark_upload_permanent(settings: Settings, upload_id: str) -> None:
-    """Let an upload never expire: a dataset reads frames from it."""
+def mark_upload_permanent(settings: Settings, upload_id: str, *, kept: bool = True) -> bool:
+    """Let an upload never expire: a dataset reads frames from it. Or let it expire again.
+
+    Returns:
+        Whether that is another than before.
+    """
     with lock_upload_records(settings):
         upload = get_upload(settings, upload_id)
-        if not upload.kept:
+        if upload.kept != kept:
             with _convert_storage_errors():
-                write_upload_record(settings.uploads / upload_id, replace(upload, kept=True))
+                write_upload_record(settings.uploads / upload_id, replace(upload, kept=kept))
+    return upload.kept != kept
 
 
 def delete_upload(

@@ -153,10 +153,26 @@ class TestStartImport:
         assert get_dataset(app.state.services.store, "fresh").policy == PAPER
         assert (dry["solve_job"], done["solve_job"]) == (None, ANY)
 
-    def test_an_upload_is_read_in_place_and_stays(self, app, api, tree) -> None:
+    @pytest.mark.parametrize("content", ["labels", "nothing"])
+    def test_an_upload_from_which_no_frame_is_read_may_expire(
+        self, app, api, tree, content: str
+    ) -> None:
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w") as archive:
-            for path in tree.rglob("*.json"):
+            if content == "labels":
+                (labels,) = tree.rglob("Labels-v3.json")
+                archive.write(labels, labels.relative_to(tree))
+        job = uploaded(app, api, packed.getvalue())
+        assert job.state == ("done" if content == "labels" else "failed")
+        (upload,) = api.get("/api/v1/uploads").json()["items"]
+        assert not upload["kept"]
+        assert api.delete(f"/api/v1/uploads/{upload['id']}").status_code == 204
+
+    def test_an_upload_is_read_in_place_and_stays(self, app, api, tree, group) -> None:
+        add_pictures(tree, group)
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as archive:
+            for path in [*tree.rglob("*.json"), *tree.rglob("*.png")]:
                 archive.write(path, path.relative_to(tree))
         headers = {"Content-Type": "application/octet-stream"}
         upload = api.post(
@@ -296,6 +312,20 @@ class TestOutcome:
         assert "docs/formats.md" in job.problem["hint"]
         assert (job.result["outcome"], job.result["read"]) == ("nothing", 0)
         assert "fresh" not in api.get("/api/v1/datasets").text
+
+    def test_a_list_of_frames_that_is_none_is_called_by_its_own_name(self, app, api, tree) -> None:
+        (tree / "list.json").write_text('{"x": 1}')
+        asked = body(options={"frames": {"folder": "data/list.json"}})
+        job = finished(app, api.post(API, json=asked))
+        assert job.state == "failed"
+        assert job.problem["detail"].startswith("data/list.json")
+        assert str(tree) not in str(job.problem)
+
+    def test_problems_of_a_list_of_frames_name_it_and_not_the_source(self, app, api, tree) -> None:
+        (tree / "list.json").write_text('{"frames": [{"group": "a"}]}')
+        asked = body(options={"frames": {"folder": "data/list.json"}})
+        (skipped,) = finished(app, api.post(API, json=asked)).result["skipped"]
+        assert (skipped["file"], skipped["record"]) == ("data/list.json", "frames/0")
 
     def test_another_format_that_it_looks_like_is_named(self, app, api, tree) -> None:
         job = finished(app, api.post(API, json=body(format="coco")))
