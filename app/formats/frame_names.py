@@ -111,6 +111,11 @@ Claims = Callable[[Group, View, str], Mapping[str, Hashable]]
 """The names that a view would have in an export, from its group and split; whose each would be."""
 
 
+def compose_name(name: str) -> str:
+    """A name with each accent in its letter: macOS writes folders with accents of their own."""
+    return unicodedata.normalize("NFC", name)
+
+
 def normalize_file_name(name: str) -> str:
     """The same for names that a disk may take for one: they differ in case or composition only."""
     return unicodedata.normalize("NFC", name).casefold()

@@ -9,6 +9,7 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
+from app.formats.frame_names import compose_name
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
@@ -76,7 +77,7 @@ class MatchReader:
         path = self.tree.shown(folder + self.file)
         try:
             labels = self._read_labels(folder, path)
-            match = _build_match_key(self.tree.path, folder, labels.get(GAME))
+            match = compose_name(_build_match_key(self.tree.path, folder, labels.get(GAME)))
             if match in self.seen:
                 problem = f"is a second file of match {match}; {self.seen[match]} is used"
                 raise DatasetFormatError(path, None, None, problem)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -12,10 +12,19 @@ from app.formats import fields
 from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root, list_files_in_folder
+from app.formats.frame_names import compose_name
 from app.formats.json_reader import parse_literal
 from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
-from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrameFinder, group_label
+from app.formats.soccernet_v3 import (
+    GAME,
+    IMAGE,
+    MATCH_DEPTH,
+    SPLIT_FILES,
+    TABLE,
+    MatchFrameFinder,
+    group_label,
+)
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3_reader import MatchReader
 from app.formats.split_names import read_split_name
@@ -152,7 +161,9 @@ class _TableRowParser:
         if not self._read_truth_value("action"):
             replay = self._read_whole_number("replay")
         return TableRow(
-            match="/".join(map(self._read_folder_name, ("league", "season", "match"))),
+            match=compose_name(
+                "/".join(map(self._read_folder_name, ("league", "season", "match")))
+            ),
             action=action,
             replay=replay,
             size=ImageSize(self._read_side_length("img_w"), self._read_side_length("img_h")),
@@ -224,6 +235,17 @@ class _TableRowParser:
             return None
 
 
+def _map_match_folders(names: Iterable[str], folder: str) -> dict[str, str]:
+    """The folders of matches below another as they are spelt, by the composed key of the match."""
+    found: dict[str, str] = {}
+    for name in names:
+        parts = name.removeprefix(folder).split("/")
+        if name.startswith(folder) and len(parts) > MATCH_DEPTH:
+            match = "/".join(parts[:MATCH_DEPTH])
+            found.setdefault(compose_name(match), f"{folder}{match}/")
+    return found
+
+
 def _read_split_lists(
     tree: FileTree, names: list[str], folder: str, report: ReaderReport
 ) -> dict[tuple[str, str], str]:
@@ -255,7 +277,7 @@ def _read_split_list(
             report.add_problem_at(
                 shown, f"line {number}", None, "is not <match>/<action>[_<replay>]"
             )
-        elif found.setdefault((PurePosixPath(match).name, stem), split) != split:
+        elif found.setdefault((compose_name(PurePosixPath(match).name), stem), split) != split:
             report.add_problem_at(
                 shown,
                 f"line {number}",
@@ -366,11 +388,12 @@ class _DatasetReader:
         self, tree: FileTree, names: list[str], limits: ImportLimits
     ) -> Iterator[Group]:
         """The groups that stand in the table alone: balls and cameras, no lines."""
+        folders = _map_match_folders(names, self._table.folder)
         for match, actions in self._table.rows.items():
             new = [main for main in actions if (match, main) not in self._seen]
             if not new:
                 continue
-            folder = f"{self._table.folder}{match}/"
+            folder = folders.get(match, f"{self._table.folder}{match}/")
             inside = list_files_in_folder(names, folder)
             frames = MatchFrameFinder(tree, folder, inside, self._report)
             for main in new:

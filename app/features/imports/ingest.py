@@ -49,13 +49,14 @@ from app.features.imports.body import (
     make_import_entry_body,
     save_missing_group_findings,
 )
-from app.features.imports.queries import find_newest_imports, list_known_groups
+from app.features.imports.queries import KnownGroup, find_newest_imports, list_known_groups
 from app.features.independent_annotations.queries import is_copy_dataset
 from app.features.paint.queries import insert_paint_readings
 from app.features.pitches.queries import is_pitch_edited, read_edited_pitches
 from app.features.pitches.service import set_pitch_of_groups
 from app.features.policies.service import choose_first_policy
 from app.features.queue.refresh_queries import refresh_queue
+from app.formats.frame_names import compose_name
 from app.formats.issia import FramePersons
 from app.formats.report import ReaderReport
 from app.object_store.path import is_address
@@ -159,7 +160,9 @@ def import_groups(
     left_out = ReaderReport() if limit_report is None else limit_report
     report, seen, done = IngestReport(left_out=left_out), dict[str, str](), 0
     limits = GroupLimits(source, left_out)
-    before = _list_keys_of_no_match(store, dataset)
+    known = _list_groups_of_dataset(store, dataset)
+    before = {group.key for group in known if not group.match}
+    groups = _keep_stored_spelling(groups, known)
     sound, stations = _prepare_storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with open_import_session(store, keep=not dry_run) as session:
@@ -191,12 +194,35 @@ def import_groups(
     return report
 
 
-def _list_keys_of_no_match(store: Store, dataset: str) -> set[str]:
-    """Keys of the groups that a dataset has of no match."""
+def _list_groups_of_dataset(store: Store, dataset: str) -> list[KnownGroup]:
     with store.read() as session:
         row = find_dataset(session, dataset)
-        known = [] if row is None else list_known_groups(session, int(row.id))
-    return {group.key for group in known if not group.match}
+        return [] if row is None else list_known_groups(session, int(row.id))
+
+
+def _keep_stored_spelling(groups: Iterable[Group], known: Iterable[KnownGroup]) -> Iterator[Group]:
+    """The groups, those of matches that an earlier version stored with accents apart called as there."""
+    matches = {group.match for group in known}
+    apart = {
+        composed: match
+        for match in matches
+        if (composed := compose_name(match)) != match and composed not in matches
+    }
+    for group in groups:
+        match = apart.get(group.match)
+        yield group if match is None else _respell_match(group, match)
+
+
+def _respell_match(group: Group, match: str) -> Group:
+    def respell(key: str) -> str:
+        own = key.removeprefix(f"{group.match}/")
+        return key if own == key else f"{match}/{own}"
+
+    views = (
+        replace(view, station=replace(view.station, key=respell(view.station.key)))
+        for view in group.views
+    )
+    return replace(group, key=respell(group.key), match=match, views=tuple(views))
 
 
 class _DryRunRollback(Exception):  # noqa: N818

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import unicodedata
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,31 @@ def table(match: str, *rows: str) -> str:
     league, season, folder = match.split("/")
     head = "league,season,match,main_action,action,replay,img_w,img_h,ball_bbox,set"
     return "\n".join([head, *(f"{league},{season},{folder},{row}" for row in rows), ""])
+
+
+class TestNamesWithAccents:
+    """macOS writes folders with accents apart from their letters, tables write them together."""
+
+    MATCH = "germany_bundesliga/2014-2015/2015-02-21 - 17-30 Bayern M\u00fcnchen 2 - 1 K\u00f6ln"
+
+    @pytest.mark.parametrize("spelt", ["NFC", "NFD"])
+    def test_labels_table_and_lists_of_a_match_are_of_one_group(
+        self, tmp_path: Path, labels: Value, report: ReaderReport, spelt: Any
+    ) -> None:
+        folder = tmp_path / unicodedata.normalize(spelt, self.MATCH)
+        folder.mkdir(parents=True)
+        (folder / "Labels-v3D.json").write_text(json.dumps(labels))
+        rows = ["7,True,,1280,720,,", '8,True,,1280,720,"[1, 2, 3, 4]",']
+        (tmp_path / "SNv3D.csv").write_text(table(self.MATCH, *rows))
+        name = unicodedata.normalize("NFD", self.MATCH.rpartition("/")[2])
+        (tmp_path / "SNv3D-test.txt").write_text(f"{name}/7\n{name}/8\n")
+        (folder / "8.png").write_bytes(b"")
+        groups = list(read_soccernet_v3d(tmp_path, report))
+        assert [group.key for group in groups] == [f"{self.MATCH}/7.png", f"{self.MATCH}/8.png"]
+        assert [group.split for group in groups] == ["test", "test"]
+        media = groups[1].views[0].media
+        assert media is not None
+        assert media.path == str(folder / "8.png")
 
 
 class TestReadSoccernetV3d:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import unicodedata
 from dataclasses import replace
 
 import pytest
@@ -117,6 +118,22 @@ class TestIngest:
         with pytest.raises(NotFoundError):
             import_groups(store, "demo", failing(), source="test", actor="ann")
         assert list_datasets(store) == []
+
+    def test_a_match_that_was_stored_with_accents_apart_is_the_same_match(
+        self, store, fill, make_group
+    ) -> None:
+        def spelt(form: str) -> Group:
+            group, match = make_group(7), unicodedata.normalize(form, "l/s/K\u00f6ln")
+            views = tuple(
+                replace(view, station=replace(view.station, key=f"{match}/{view.key}"))
+                for view in group.views
+            )
+            return replace(group, key=f"{match}/7.png", match=match, views=views)
+
+        (number,) = fill(spelt("NFD"))
+        report = again(store, spelt("NFC"))
+        assert (report.new, report.unchanged, report.missing) == (0, 1, 0)
+        assert load_group_state(store, number).group == spelt("NFD")
 
     def test_a_dataset_that_is_there_is_filled(self, store, make_group) -> None:
         made = ensure_dataset(store, "demo", "ann")
