@@ -58,3 +58,28 @@ export function optionValue({ kind }, text) {
 	}
 	return said;
 }
+
+/** @typedef {{format: string, kind: 'upload' | 'folder', options: {[name: string]: any}}} ImportChoice   `kind`: where the files are; `options` are what the fields show */
+
+/** Another format: its fields begin empty. @param {ImportChoice} choice @param {string} format @returns {ImportChoice} */
+export function withFormat(choice, format) {
+	return choice.format === format ? choice : { ...choice, format, options: {} };
+}
+
+/** Files of elsewhere: the field of the lines begins empty. @param {ImportChoice} choice @param {'upload' | 'folder'} kind @returns {ImportChoice} */
+export function withSourceKind(choice, kind) {
+	if (choice.kind === kind) return choice;
+	const { lines: _, ...options } = choice.options;
+	return { ...choice, kind, options };
+}
+
+/**
+ * What a field says; nothing of a field that is shown no more, whose upload ended late.
+ *
+ * @param {ImportChoice} choice @param {ImportChoice} shown the choice for which the field was shown @param {string} name @param {unknown} value
+ * @returns {ImportChoice}
+ */
+export function withOption(choice, shown, name, value) {
+	const gone = shown.format !== choice.format || (name === 'lines' && shown.kind !== choice.kind);
+	return gone ? choice : { ...choice, options: { ...choice.options, [name]: value } };
+}

@@ -9,7 +9,7 @@ import { sentenceOf } from '../api/problem.js';
 import { withTick, withValue } from '../lib/field.js';
 import { param } from '../lib/router.js';
 import { datasets, loadDatasets } from '../state/datasets.js';
-import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
+import { IMPORT_FORMATS, optionValue, withFormat, withOption, withSourceKind } from '../state/import_formats.js';
 import { follow, isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
 import { ImportReport } from './import_report.js';
@@ -19,9 +19,7 @@ import { SourceChoice, UploadField } from './source_choice.js';
 
 /** @import {ImportSource, UploadJson} from '../api/imports.js' */
 /** @import {JobJson} from '../api/jobs.js' */
-/** @import {FormatOption} from '../state/import_formats.js' */
-
-/** @typedef {{[name: string]: any}} Options */
+/** @import {FormatOption, ImportChoice} from '../state/import_formats.js' */
 
 const POLICIES = [
 	{ name: '', label: 'automatic: touchline if most views have a picture, otherwise paper' },
@@ -84,10 +82,10 @@ function OptionField({ option, apart, change }) {
 	`;
 }
 
-/** Lines of static cameras are files of their own. @param {{source: ImportSource | null, change: (lines: ImportSource | undefined) => void}} props */
-function LinesField({ source, change }) {
+/** Lines of static cameras are files of their own. @param {{kind: ImportChoice['kind'], change: (lines: ImportSource | undefined) => void}} props */
+function LinesField({ kind, change }) {
 	const label = 'Line files of the cameras (optional)';
-	if (source && 'folder' in source) {
+	if (kind === 'folder') {
 		return html`
 			<div class="form__row">
 				<label for="import-lines">${label}</label>
@@ -99,12 +97,12 @@ function LinesField({ source, change }) {
 	return html`<${UploadField} id="import-lines" label=${label} hint="a zip of sn-calibration line files" onUploaded=${(/** @type {UploadJson | null} */ sent) => change(sent ? { upload: sent.id } : undefined)} />`;
 }
 
-/** Thresholds of a dataset that the import makes. @param {{kept: boolean, change: (policy: string) => void}} props `kept`: the dataset is there */
-function PolicyField({ kept, change }) {
+/** Thresholds of a dataset that the import makes. @param {{policy: string, kept: boolean, change: (policy: string) => void}} props `kept`: the dataset is there */
+function PolicyField({ policy, kept, change }) {
 	return html`
 		<div class="form__row">
 			<label for="import-policy">Policy</label>
-			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'This dataset exists already and keeps its policy' : ''} onChange=${withValue(change)}>
+			<select class="field" id="import-policy" value=${policy} disabled=${kept} title=${kept ? 'This dataset exists already and keeps its policy' : ''} onChange=${withValue(change)}>
 				${POLICIES.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 			</select>
 			<small>${kept ? 'This dataset already exists and keeps its policy. Change it on the Policy page.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
@@ -155,21 +153,30 @@ function useImport() {
 
 export function ImportPage() {
 	const [dataset, setDataset] = useState(param('dataset'));
-	const [format, setFormat] = useState(IMPORT_FORMATS[0].name);
+	const [choice, setChoice] = useState(/** @type {ImportChoice} */ ({ format: IMPORT_FORMATS[0].name, kind: 'upload', options: {} }));
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
-	const [options, setOptions] = useState(/** @type {Options} */ ({}));
 	const [policy, setPolicy] = useState('');
 	const { job, dry, dataset: imported, error, run } = useImport();
 	useEffect(() => { loadDatasets(); }, []);
+	const { format, kind, options } = choice;
 	const chosen = IMPORT_FORMATS.find(({ name }) => name === format) ?? IMPORT_FORMATS[0];
 	const name = dataset.trim();
 	const kept = (datasets.value ?? []).some((one) => one.name === name);
 	const busy = job !== null && !isOver(job);
 	const why = busy ? 'An import is under way' : !name ? 'Name the dataset first' : !source ? 'Choose a file or folder first' : '';
+	/** @param {string} next */
+	const choose = (next) => setChoice((before) => withFormat(before, next));
+	/** @param {string} option @param {unknown} value */
+	const say = (option, value) => setChoice((before) => withOption(before, choice, option, value));
+	/** @param {ImportSource | null} next */
+	function changeSource(next) {
+		setSource(next);
+		setChoice((before) => withSourceKind(before, next && 'folder' in next ? 'folder' : 'upload'));
+	}
 	/** @param {boolean} dry_run */
 	function start(dry_run) {
 		if (why || !source) return;
-		const asked = Object.entries(options).filter(([key, value]) => value !== undefined && (chosen.options.some((option) => option.name === key) || (key === 'lines' && chosen.lines)));
+		const asked = Object.entries(options).filter(([, value]) => value !== undefined);
 		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run, ...(policy && !kept && !chosen.keepsPolicy ? { policy } : {}) });
 	}
 	/** @param {SubmitEvent} event */
@@ -189,12 +196,12 @@ export function ImportPage() {
 							<datalist id="known-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
 							<small>A new name makes a new dataset. An import into an existing one updates what has changed in its files; edits of people stay.</small>
 						</div>
-						<${FormatChoice} format=${format} choose=${setFormat} />
-						<${SourceChoice} onSource=${setSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) setFormat(guessed); }} />
-						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} apart=${chosen.lines === true} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
+						<${FormatChoice} format=${format} choose=${choose} />
+						<${SourceChoice} onSource=${changeSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) choose(guessed); }} />
+						${chosen.options.map((option) => html`<${OptionField} key=${`${format}/${option.name}`} option=${option} apart=${chosen.lines === true} change=${(/** @type {any} */ value) => say(option.name, value)} />`)}
 						${chosen.lines ? html`
-							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
-						${chosen.keepsPolicy ? null : html`<${PolicyField} kept=${kept} change=${setPolicy} />`}
+							<${LinesField} key=${`${format}/${kind}`} kind=${kind} change=${(/** @type {ImportSource | undefined} */ lines) => say('lines', lines)} />` : null}
+						${chosen.keepsPolicy ? null : html`<${PolicyField} policy=${policy} kept=${kept} change=${setPolicy} />`}
 						<p class="buttons">
 							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Dry run</button>
 							<button data-needs="lead" data-of="" class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
