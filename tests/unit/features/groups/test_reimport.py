@@ -6,6 +6,7 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,11 +19,12 @@ from app.features.groups.replay import replay_log
 from app.features.groups.state import GroupState
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
-from app.features.imports.ingest import IngestReport
+from app.features.imports.ingest import IngestReport, import_groups
 from app.features.imports.sources import ImportSource, import_source
 from app.features.queue.service import list_groups
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
+from app.soccer.group import Group, Media
 
 BALL = BallAnnotation(box=Box(300.0, 100.0, 12.0, 12.0))
 TOP = {"Side line top": [{"x": 0.1, "y": 0.2}, {"x": 0.9, "y": 0.2}]}
@@ -120,6 +122,26 @@ class TestOtherPictures:
         before = draw_ball(store).group
         assert bring(store, tmp_path / "b").findings == 1
         assert first_group(store).group == before
+
+
+class TestOtherFrames:
+    def test_an_edited_view_of_a_video_follows_its_camera_and_is_to_be_checked(
+        self, store: Store, fill, make_static, tmp_path: Path
+    ) -> None:
+        def at(frame: int) -> Group:
+            group = make_static(10)
+            media = Media(str(tmp_path / "cam1.mp4"), frame=frame)
+            return group.with_view(replace(group.views[0], media=media))
+
+        (number,) = fill(at(10))
+        state = load_group_state(store, number)
+        key = state.group.views[0].key
+        edit = make_set_ball_edit(key, BALL)
+        submit_edit(store, number, edit, if_match=state.etag, actor="ann")
+        report = import_groups(store, "demo", [at(12)], source="test", actor="ann")
+        (view, *_) = load_group_state(store, number).group.views
+        assert view.media is not None
+        assert (report.findings, view.media.frame, view.balls) == (1, 12, (BALL,))
 
 
 class TestOtherMatches:
