@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -126,7 +126,11 @@ class TestOtherPictures:
 
 class TestOtherFrames:
     def test_an_edited_view_of_a_video_follows_its_camera_and_is_to_be_checked(
-        self, store: Store, fill, make_static, tmp_path: Path
+        self,
+        store: Store,
+        fill: Callable[..., list[int]],
+        make_static: Callable[..., Group],
+        tmp_path: Path,
     ) -> None:
         def at(frame: int) -> Group:
             group = make_static(10)
