@@ -13,7 +13,7 @@ from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 from app.soccer.pitch import GoalEdge
 
-SOLVER_VERSION = "9"
+SOLVER_VERSION = "10"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -46,6 +46,8 @@ class MarkingFit:
         length_px: Length of the projected marking inside the image, pixels; 0 when not visible.
             Where it lies follows from camera and pitch (``solving.jaccard.project_markings``).
         used: False when the solver left the marking out.
+        judged_px: Largest distance of an annotated point from the marking as the public evaluator
+            has it, pixels, infinite where that is not visible; None where it is ``largest_px``.
     """
 
     marking: str
@@ -54,11 +56,18 @@ class MarkingFit:
     nearest: tuple[ImagePoint, ...] = ()
     length_px: float = 0.0
     used: bool = True
+    judged_px: float | None = field(default=None, metadata={"later": True})
 
     @property
     def largest_px(self) -> float | None:
         """Largest distance of an annotated point, pixels; None without one."""
         return max(self.distances_px, default=None)
+
+    @property
+    def counted_px(self) -> float:
+        """Largest distance by which JaC counts, pixels; infinite without one."""
+        counted = self.largest_px if self.judged_px is None else self.judged_px
+        return math.inf if counted is None else counted
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -30,6 +31,7 @@ from app.soccer.solution import (
 )
 from app.solving.camera_positions import PositionPrior, make_match_position_prior
 from app.solving.jaccard import (
+    ProjectedMarking,
     classify_markings,
     find_unannotated_not_missing,
     jaccard,
@@ -487,6 +489,9 @@ def measure_calibration(
                 nearest=tuple(map(ImagePoint._make, nearest)),
                 length_px=round(seen.length, DRAWN_DIGITS),
             )
+        counted = _largest_judged_distance(judged.get(marking))
+        if counted != fit.counted_px:
+            fit = replace(fit, judged_px=counted)
         markings.append(fit)
     distances = np.concatenate([np.array(fit.distances_px) for fit in markings] or [np.empty(0)])
     has_lines = any(lines.values())
@@ -497,6 +502,13 @@ def measure_calibration(
         error_px=float(np.median(distances)) if len(distances) else None,
         markings=tuple(markings),
     )
+
+
+def _largest_judged_distance(judged: ProjectedMarking | None) -> float:
+    """Largest distance of an annotated point, pixels; infinite where there is none to measure."""
+    if judged is None or not len(judged.distances):
+        return math.inf
+    return float(judged.distances.max())
 
 
 def compute_calibration_key(

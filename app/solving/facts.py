@@ -66,7 +66,8 @@ class GroupFacts:
             the ball is, pixels, shape (V, 2).
         view_noise: Sigma of its click beside that of the dataset's balls.
         mark_view: Row of the view, shape (M,).
-        mark_px: Largest distance of an annotated point of the marking, infinite without one.
+        mark_px: Largest distance of an annotated point of the marking, as JaC counts it; infinite
+            without one.
         pair_group: Row of the group, shape (P,), like ``pair_...``.
         pair_view: Rows of both views, shape (P, 2).
         pair_errors: Reprojection errors in both, pixels, shape (P, 2).
@@ -260,7 +261,7 @@ def collect_facts(
         pair_points: Of every two of its observations.
     """
     marks = [
-        (place, fit.largest_px)
+        (place, fit.counted_px)
         for place, calibration in enumerate(calibrations)
         for fit in calibration.markings
     ]
@@ -297,7 +298,7 @@ def collect_facts(
             [np.nan if item.agreement is None else item.agreement for item in calibrations], float
         ),
         mark_view=np.array([place for place, _ in marks], np.int64),
-        mark_px=np.array([np.inf if apart is None else apart for _, apart in marks], float),
+        mark_px=np.array([apart for _, apart in marks], float),
         pair_group=np.zeros(len(pair_points), np.int64),
         pair_view=np.array(
             [(places[item.a.view], places[item.b.view]) for item in pair_points], np.int64

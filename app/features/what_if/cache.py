@@ -105,8 +105,8 @@ def _map_with_checksum(path: Path) -> tuple[ArraysFile, int | None]:
     return ArraysFile(head["about"], arrays), head.get("checksum")
 
 
-FORMAT = 5
-"""Raised with every change of ``GroupFacts``."""
+FORMAT = 6
+"""Raised with every change of ``GroupFacts``, or of what it holds."""
 LIST, BARE = "table.json", "bare.heads"
 ARRAYS = (".facts", ".judged", ".heads", ".counted")
 """How names of files of arrays end."""

@@ -1,15 +1,21 @@
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.evaluation.cameras import measure_error_without_marking
+from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.soccer.annotation import make_lines
-from app.soccer.group import Station
+from app.soccer.frames import ImageSize
+from app.soccer.group import Station, View
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
+from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate, calibrate_station, compute_calibration_key
-from app.solving.jaccard import camera_jaccard
+from app.solving.facts import collect_facts_of_views
+from app.solving.jaccard import camera_jaccard, project_markings
+from app.solving.judgement import compute_view_jac
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
 
@@ -289,6 +295,33 @@ class TestGoals:
         assert "fp" in {fit.outcome for fit in goals}
         assert max(fit.largest_px for fit in goals) < 0.1
         assert found.goal == "middle"
+
+    def test_the_gate_counts_as_jac_does_where_the_evaluator_sees_another_goal(self):
+        closer = looking((45.0, -12.0, -4.0), (52.5, 0.0, -1.2), 3500.0)
+        lines = click(closer, pitch=PITCH.with_goal_edge("middle"))
+        station = Station("a", SIZE, lines=lines, given=closer)
+        found = calibrate_station(station, PITCH, CLICKED)
+        assert found.jac is not None and found.jac[0] < 1 == max(found.jac)
+        facts = collect_facts_of_views([View("a", station, ())], [found])
+        counted = [compute_view_jac(facts, gamma).tolist() for gamma in (0.5, 1.0, 2.0)]
+        assert counted == [[jac] for jac in found.jac]
+
+    def test_a_goal_that_the_evaluator_does_not_see_is_missed_by_the_gate_too(self):
+        bar = "Goal right crossbar"
+        closer = looking((37.0, 0.0, -4.0), (52.5, 0.0, -1.2), 1500.0)
+        clicked = PITCH.with_goal_edge("middle")
+        rows = [project_markings(closer, pitch, SIZE)[bar][:, 1] for pitch in (clicked, PITCH)]
+        # The picture ends between the middle of the bar and its lower edge.
+        size = ImageSize(SIZE.width, int(min(rows[1])))
+        assert min(rows[0]) < size.height - 1
+        inside = [p for p in click(closer, pitch=clicked)[bar] if p.y < size.height]
+        station = Station("a", size, lines=make_lines({bar: inside}), given=closer)
+        found = calibrate_station(station, PITCH, CLICKED)
+        (missed,) = [fit for fit in found.markings if fit.marking == bar]
+        assert (missed.outcome, missed.judged_px) == ("fn", np.inf) and missed.distances_px
+        facts = collect_facts_of_views([View("a", station, ())], [found])
+        assert compute_view_jac(facts, 0.5).tolist() == [found.jac[0]]
+        assert from_json(Calibration, json.loads(solution_json_text(to_json(found)))) == found
 
     def test_a_left_out_marking_is_predicted_by_what_is_fitted(self):
         name = "Small rect. right main"

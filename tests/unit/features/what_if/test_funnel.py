@@ -29,7 +29,7 @@ from app.soccer.thresholds import THRESHOLDS
 from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.facts import collect_facts_of_views, join_facts
 from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups
-from app.solving.solve import solve_group
+from app.solving.solve import solve_and_collect_facts, solve_group
 from tests.scenes import make_scenes
 
 SEEDS = 9
@@ -220,6 +220,22 @@ class TestJudgeTable:
                 for view in solution.views
             ]
             assert np.array_equal(compute_view_jac(table.facts, gamma), stored, equal_nan=True)
+
+    @pytest.mark.parametrize("goal", ["inner", "middle", "laws"])
+    def test_jac_is_that_of_the_calibrations_whatever_goals_are_fitted(self, groups, goal) -> None:
+        policy = replace(PAPER, calibration=replace(PAPER.calibration, goal=goal))
+        apart = 0
+        for group in groups[:12]:
+            solution, facts = solve_and_collect_facts(group, policy, {})
+            fits = [fit for view in solution.views for fit in view.calibration.markings]
+            apart += sum(fit.judged_px is not None for fit in fits)
+            for place, gamma in enumerate((0.5, 1.0, 2.0)):
+                stored = [
+                    view.calibration.jac[place] if view.calibration.jac else np.nan
+                    for view in solution.views
+                ]
+                assert np.array_equal(compute_view_jac(facts, gamma), stored, equal_nan=True)
+        assert (apart > 0) == (goal != "inner")
 
 
 def counted(found: Yield) -> None:
