@@ -142,6 +142,14 @@ MAX_MAHALANOBIS = 13.8
 """Squared, of two coordinates: one honest view in a thousand lies beyond."""
 
 
+MAX_EXHAUSTIVE_VIEWS = 10
+"""Up to so many views each set of them is tried."""
+NEAR_PERCENT = 1.0
+"""Of the diagonal: a view that is farther from the point of a pair says nothing for it."""
+GROWN_PAIRS = 5
+"""Of more views so many pairs are grown: one that contradicts itself little may still be wrong."""
+
+
 @dataclass(frozen=True)
 class _BallEstimate:
     """A point from some views, its covariance, and each view's squared Mahalanobis distance."""
@@ -204,7 +212,12 @@ def find_best_ball(
 def _find_most_consistent_estimate(
     views: _ViewSubsets, starts: dict[frozenset[str], FloatArray]
 ) -> _BallEstimate | None:
-    """The estimate from the largest set of views that agree, else from the best pair."""
+    """The estimate from the largest set of views that agree, else from the best pair.
+
+    Of many views not each set is tried, for their number doubles with a view.
+    """
+    if len(views.observations) > MAX_EXHAUSTIVE_VIEWS:
+        return _grow_most_consistent_estimate(views, starts)
     fallback: list[_BallEstimate] = []
     for count in range(len(views.observations), 1, -1):
         chosen, origins = [], []
@@ -220,6 +233,40 @@ def _find_most_consistent_estimate(
             return min(agreeing, key=lambda item: float(item.distances.sum()))
         fallback = found or fallback
     return min(fallback, key=lambda item: float(item.distances.sum()), default=None)
+
+
+def _grow_most_consistent_estimate(
+    views: _ViewSubsets, starts: dict[frozenset[str], FloatArray]
+) -> _BallEstimate | None:
+    """The same for many views: pairs to which most views are near grow by one view after another."""
+    numbers = {observation.view: row for row, observation in enumerate(views.observations)}
+    chosen = [
+        tuple(sorted(numbers[key] for key in pair)) for pair in starts if pair <= numbers.keys()
+    ]
+    origins = [point for pair, point in starts.items() if pair <= numbers.keys()]
+    pairs = [pair for pair in views.estimate_subsets(chosen, origins) if pair is not None]
+    agreeing = [pair for pair in pairs if pair.is_consistent]
+    if not agreeing:
+        return min(pairs, key=lambda pair: float(pair.distances.sum()), default=None)
+    # A view that is far away counts no more than one that just is not near.
+    errors = np.minimum(views.relative_errors(np.array([pair.point for pair in agreeing])), 1.0)
+    order = np.argsort((errors**2).sum(axis=1), kind="stable")[:GROWN_PAIRS].tolist()
+    grown = [_grow_estimate(views, agreeing[place]) for place in order]
+    return min(grown, key=lambda item: (-len(item.numbers), float(item.distances.sum())))
+
+
+def _grow_estimate(views: _ViewSubsets, estimate: _BallEstimate) -> _BallEstimate:
+    """An estimate with every further view that agrees, the nearest to its point first."""
+    left = set(range(len(views.observations))) - set(estimate.numbers)
+    while left:
+        errors = views.relative_errors(estimate.point[None])[0]
+        nearest = min(left, key=lambda number: (errors[number], number))
+        left.remove(nearest)
+        numbers = tuple(sorted((*estimate.numbers, nearest)))
+        (found,) = views.estimate_subsets([numbers], [estimate.point])
+        if found is not None and found.is_consistent:
+            estimate = found
+    return estimate
 
 
 def _compute_leave_one_out_shifts(
@@ -275,6 +322,18 @@ class _ViewSubsets:
             else None
             for row, numbers in enumerate(chosen)
         ]
+
+    def relative_errors(self, points: FloatArray) -> FloatArray:
+        """How far each view's pixel lies from points, as a share of ``NEAR_PERCENT``, shape (N, V).
+
+        Infinite where the view does not see the point.
+        """
+        errors = np.empty((len(points), len(self.observations)))
+        for column, observation in enumerate(self.observations):
+            apart = observation.camera.project(points) - self._centers[column]
+            errors[:, column] = 100 / NEAR_PERCENT * np.hypot(*apart.T) / observation.size.diagonal
+        errors[np.isnan(errors)] = np.inf
+        return errors
 
     def _compute_click_covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""

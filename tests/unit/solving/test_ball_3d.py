@@ -13,6 +13,9 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Calibration
 from app.solving.ball_3d import (
+    MAX_EXHAUSTIVE_VIEWS,
+    _find_most_consistent_estimate,
+    _grow_most_consistent_estimate,
     _ViewSubsets,
     choose_exported_ball,
     compute_mean_ball,
@@ -25,6 +28,7 @@ from app.solving.facts import collect_facts
 from app.solving.judgement import judge_groups
 from app.solving.solve import solve_group
 from app.solving.triangulate import collect_ball_observations, triangulate_observation_pairs
+from tests.cameras import looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_views
 from tests.unit.solving.test_solve import shifted
@@ -202,3 +206,67 @@ class TestBestBall:
         # NumPy gives up on all matrices of a call where one has no eigenvalues.
         lost = views.estimate_subsets(chosen, [np.full(3, np.nan), start])
         assert repr(lost) == repr([None, *alone])
+
+
+class CountingSubsets(_ViewSubsets):
+    """Says how many estimates were asked for."""
+
+    asked = 0
+
+    def estimate_subsets(self, chosen, starts):
+        self.asked += len(chosen)
+        return super().estimate_subsets(chosen, starts)
+
+
+def around(count, bad, seed):
+    """Views and pairs of cameras around the pitch; the balls of ``bad`` are somewhere else."""
+    generator = np.random.default_rng(seed)
+    angles = 2 * np.pi * (np.arange(count) + generator.uniform(0, 0.8, count)) / count
+    seen = []
+    for number, angle in enumerate(angles.tolist()):
+        place = (75 * np.cos(angle), 60 * np.sin(angle), -generator.uniform(5, 25))
+        camera = looking(place, (38.0, 2.0, 0.0), 1800.0)
+        off = generator.normal(0, 0.6, 2)
+        if number in bad:
+            turn = generator.uniform(0, 2 * np.pi)
+            off = generator.uniform(15, 90) * np.array([np.cos(turn), np.sin(turn)])
+        seen.append(moved(given_view(f"{number:02}", camera, BALL), *off))
+    calibrations = [Calibration("given", view.station.given) for view in seen]
+    observations = collect_ball_observations(seen, calibrations)
+    points = triangulate_observation_pairs(combinations(observations, 2))
+    starts = {frozenset((pair.a.view, pair.b.view)): pair.point for pair in points if pair.in_front}
+    return CountingSubsets(observations, PAPER), starts
+
+
+class TestManyViews:
+    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize(
+        ("count", "bad"), [(26, {3, 8, 9, 20}), (40, set(range(0, 40, 3))), (30, set(range(18)))]
+    )
+    def test_the_views_that_agree_are_found_with_few_estimates(self, count, bad, seed) -> None:
+        views, starts = around(count, bad, seed)
+        found = _find_most_consistent_estimate(views, starts)
+        assert set(found.numbers) >= set(range(count)) - bad
+        assert len(set(found.numbers) & bad) <= 1
+        assert np.linalg.norm(found.point - BALL) < 0.1
+        assert views.asked <= count * (count - 1) / 2 + 5 * count
+
+    @pytest.mark.parametrize("seed", range(12))
+    def test_they_are_those_that_trying_each_set_finds(self, seed) -> None:
+        views, starts = around(MAX_EXHAUSTIVE_VIEWS, {1, 4, 7}, seed)
+        every = _find_most_consistent_estimate(views, starts)
+        grown = _grow_most_consistent_estimate(views, starts)
+        assert every.numbers == grown.numbers
+        assert grown.point == pytest.approx(every.point, abs=1e-5)
+
+    def test_a_group_of_many_views_has_a_best_ball(self) -> None:
+        generator = np.random.default_rng(3)
+        seen = []
+        for number, angle in enumerate(np.linspace(0, 6, 25).tolist()):
+            camera = looking((75 * np.cos(angle), 60 * np.sin(angle), -15.0), (38, 2, 0), 1800.0)
+            view = given_view(f"{number:02}", camera, BALL)
+            seen.append(moved(view, *generator.normal(0, 0.6, 2)))
+        seen[5] = moved(seen[5], 0.0, 40.0)
+        best = solve_group(group(*seen), PAPER).best_ball
+        assert best.contradicting == ("05",)
+        assert np.linalg.norm(np.array(best.point) - BALL) < 0.1
