@@ -10,8 +10,9 @@ from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
-from app.solving.ball_covariance import calibration_pixel_covariance
+from app.solving.ball_covariance import calibration_pixel_covariance, given_camera_sigma_px
 
 
 def measure_ball_fit(
@@ -65,7 +66,7 @@ def measure_ball_fit(
 
 
 def predict_ball_in_view(
-    calibration: Calibration, size: ImageSize, ball: Ball3D, diameter_m: float
+    calibration: Calibration, size: ImageSize, ball: Ball3D, policy: Policy
 ) -> ExpectedBall | None:
     """Where a view should show the 3D ball; None where it has no camera or the ball is behind it.
 
@@ -73,7 +74,7 @@ def predict_ball_in_view(
         calibration: The view's calibration.
         size: Annotated size.
         ball: The triangulated ball.
-        diameter_m: True diameter, metres.
+        policy: Its diameter, and how far a given camera is off of which nothing is known.
     """
     if calibration.camera is None:
         return None
@@ -84,10 +85,12 @@ def predict_ball_in_view(
     jacobian = calibration.camera.jacobian(point)
     covariance = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
     covariance = covariance + calibration_pixel_covariance(calibration, size, point)
+    if calibration.is_given_without_uncertainty:
+        covariance = covariance + given_camera_sigma_px(size.diagonal, policy) ** 2 * np.eye(2)
     return ExpectedBall(
         place=ImagePoint(x, y),
         covariance=flatten_covariance(covariance),
-        box=_compute_tight_box(calibration.camera, point, diameter_m),
+        box=_compute_tight_box(calibration.camera, point, policy.ball_diameter_m),
     )
 
 

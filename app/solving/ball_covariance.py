@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from threading import Lock
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,14 @@ _BITS = 62
 """Pairs of a group whose validity fits into one integer, a bit for each."""
 _ROUNDING = 1e-9
 """Sums this close to a limit, relatively, are computed once more the exact way."""
+
+
+Pixels = TypeVar("Pixels", float, FloatArray)
+
+
+def given_camera_sigma_px(diagonal: Pixels, policy: Policy) -> Pixels:
+    """How far a given camera of which nothing is known is off at the ball, pixels."""
+    return policy.given_sigma_px * diagonal / CLICK_DIAGONAL
 
 
 def ball_click_variance(
@@ -45,7 +54,7 @@ def ball_click_variance(
     click = policy.click_sigma_px * diagonal / CLICK_DIAGONAL
     sigma = np.hypot(click, policy.box_sigma_share * ball_px)
     if bare is not None and policy.given_sigma_px:
-        given = policy.given_sigma_px * diagonal / CLICK_DIAGONAL
+        given = given_camera_sigma_px(diagonal, policy)
         sigma = np.where(bare, np.hypot(sigma, given), sigma)
     # As Python squares a float; the square of an array differs in the last bit now and then.
     return np.float_power(noise * sigma, 2)
@@ -171,7 +180,7 @@ def calibration_pixel_covariance(
     """Covariance of the projected point due to that of the calibration, square pixels, (2, 2).
 
     Args:
-        calibration: With a camera; nothing is known of the uncertainty of a given one: zeros.
+        calibration: With a camera; zeros for a given one of whose uncertainty nothing is known.
         size: Annotated size.
         point: In front of the camera, pitch frame, metres, shape (3,).
     """

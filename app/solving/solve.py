@@ -148,7 +148,7 @@ def _add_ball_to_view(
     solved = replace(
         solved,
         included=view.key in ball.views,
-        expected=predict_ball_in_view(solved.calibration, view.size, ball, policy.ball_diameter_m),
+        expected=predict_ball_in_view(solved.calibration, view.size, ball, policy),
     )
     if solved.calibration.camera is None or view.ball is None:
         return solved

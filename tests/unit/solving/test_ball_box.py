@@ -14,11 +14,17 @@ from app.geometry.resection import camera_from_parameters
 from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
 from app.solving.ball_box import measure_ball_fit, predict_ball_in_view
+from app.solving.solve import solve_group
+from tests.cameras import SIZE as STADIUM
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 
 SIZE = ImageSize(600, 800)  # a diagonal of 1000 px
 BALL_M = 0.2
+POLICY = replace(PAPER, ball_diameter_m=BALL_M)
+BALL = (38.0, 2.0, -1.4)
 # 1000 px a radian, level, from 20 m before the origin: a pixel is 2 cm there, a ball 10 px.
 CAMERA = Camera(
     np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
@@ -127,7 +133,7 @@ class TestExpectBall:
 
     def test_a_place_by_hand_with_the_uncertainty_of_the_ball(self):
         found = predict_ball_in_view(
-            self.GIVEN, SIZE, ball3d(2.0, 0.0, -1.0, variance=0.04), BALL_M
+            self.GIVEN, SIZE, ball3d(2.0, 0.0, -1.0, variance=0.04), POLICY
         )
         assert found.place == pytest.approx((400.0, 350.0))
         assert isinstance(found.place, ImagePoint)
@@ -147,18 +153,41 @@ class TestExpectBall:
         point = np.array([[0.0, 0.0, 0.0]])
         assert np.allclose(camera.project(point), [[300.0, 400.0]])
         lines = Calibration("lines", camera, covariance=tuple(moved.ravel()))
-        found = predict_ball_in_view(lines, SIZE, ball3d(0.0, 0.0, 0.0), BALL_M)
+        found = predict_ball_in_view(lines, SIZE, ball3d(0.0, 0.0, 0.0), POLICY)
         assert np.allclose(np.reshape(found.covariance, (2, 2)), [[25.0, 0.0], [0.0, 0.0]])
 
     def test_without_a_camera_nothing_is_expected(self):
         assert (
-            predict_ball_in_view(Calibration("lines", None), SIZE, ball3d(0, 0, 0), BALL_M) is None
+            predict_ball_in_view(Calibration("lines", None), SIZE, ball3d(0, 0, 0), POLICY) is None
         )
 
     def test_behind_the_camera_nothing_is_expected(self):
-        assert predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -21.0, 0.0), BALL_M) is None
+        assert predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -21.0, 0.0), POLICY) is None
 
     def test_a_ball_that_reaches_the_camera_is_expected_without_a_box(self):
-        found = predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -19.95, 0.0), BALL_M)
+        found = predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -19.95, 0.0), POLICY)
         assert found.place == pytest.approx((300.0, 400.0))
         assert found.box is None
+
+    def test_the_truth_lies_in_the_ellipse_of_a_given_camera_as_often_as_it_says(self):
+        """Nothing is known of the given cameras but how far off they are."""
+        policy = replace(PAPER, given_sigma_px=6.0, click_sigma_px=1.0)
+        scale = STADIUM.diagonal / np.hypot(1920, 1080)
+        generator = np.random.default_rng(7)
+        cameras = (MAIN, BEHIND_GOAL, OPPOSITE)
+        views = [given_view(key, camera, BALL) for key, camera in zip("abc", cameras, strict=True)]
+        inside = 0
+        for _ in range(400):
+            seen = [replace(views[2], balls=())]
+            for view in views[:2]:
+                off = generator.normal(0, scale * np.hypot(6.0, 1.0), 2)
+                center = view.ball.center
+                point = ImagePoint(center.x + off[0], center.y + off[1])
+                seen.append(replace(view, balls=(BallAnnotation(point=point),)))
+            expected = solve_group(group(*seen), policy).view("c").expected
+            # The picture is that of a camera which is off as far as the policy says.
+            shown = views[2].ball.center + generator.normal(0, scale * 6.0, 2)
+            apart = shown - np.array(expected.place)
+            covariance = np.reshape(expected.covariance, (2, 2))
+            inside += apart @ np.linalg.solve(covariance, apart) < 5.991
+        assert 0.92 <= inside / 400 <= 0.98
