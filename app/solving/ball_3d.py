@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtrc
 
-from app.geometry.arrays import FloatArray, IntArray, flatten_covariance
+from app.geometry.arrays import BoolArray, FloatArray, IntArray, flatten_covariance
 from app.geometry.likely_point import CameraTable, find_most_likely_points
 from app.soccer.frames import height_above_grass
 from app.soccer.pitch import Pitch
@@ -26,6 +27,8 @@ from app.solving.judgement import PASSES, Judgement
 from app.solving.triangulate import BallObservation, PairPoint
 from app.wording import format_metres
 
+Metres = TypeVar("Metres", float, FloatArray)
+
 LOW_BALL_M = 2.0
 """Up to this height beside the pitch a ball counts as one that lies there."""
 
@@ -38,7 +41,34 @@ def is_plausible_position(point: tuple[float, float, float], pitch: Pitch, polic
         pitch: The pitch.
         policy: Holds the limits.
     """
-    return not explain_implausible_position(point, pitch, policy)
+    places, size = np.array([point], float), np.array([[pitch.length, pitch.width]], float)
+    return not find_implausible_positions(places, size, policy)[0]
+
+
+def find_implausible_positions(points: FloatArray, sizes: FloatArray, policy: Policy) -> BoolArray:
+    """Where a ball cannot be, as ``explain_implausible_position`` says; not where a place is NaN.
+
+    Args:
+        points: Pitch frame, metres, shape (N, 3).
+        sizes: Length and width of the pitch of each, metres, shape (N, 2).
+        policy: Holds the limits.
+    """
+    x, y, z = points.T
+    height = height_above_grass(z)
+    outside = np.maximum(np.abs(x) - sizes[:, 0] / 2, np.abs(y) - sizes[:, 1] / 2)
+    reach = _reach_outside_pitch(height, policy)
+    wrong: BoolArray = (
+        (z > policy.below_grass_m)
+        | (height > policy.max_height_m)
+        | (outside > policy.outside_pitch_m)
+        | ((height > LOW_BALL_M) & (outside > reach))
+    )
+    return wrong
+
+
+def _reach_outside_pitch(height: Metres, policy: Policy) -> Metres:
+    """How far outside the pitch a ball may fly at a height, metres."""
+    return policy.outside_pitch_m * (1 - height / policy.max_height_m)
 
 
 def explain_implausible_position(
@@ -52,7 +82,7 @@ def explain_implausible_position(
     x, y, z = point
     height = height_above_grass(z)
     outside = max(abs(x) - pitch.length / 2, abs(y) - pitch.width / 2)
-    reach = policy.outside_pitch_m * (1 - height / policy.max_height_m)
+    reach = _reach_outside_pitch(height, policy)
     if LOW_BALL_M < height <= policy.max_height_m and reach < outside <= policy.outside_pitch_m:
         words = f"is {outside:.0f} m outside the pitch at a height of {format_metres(height)}"
         return [(outside, reach, words)]

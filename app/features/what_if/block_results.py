@@ -17,6 +17,7 @@ from app.features.what_if.table import JAC_STEPS, YieldTable
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
+from app.solving.ball_3d import find_implausible_positions
 from app.solving.ball_covariance import CovarianceOfMeanBall, major_axis_sigma
 from app.solving.chi_square import p_values
 from app.solving.facts import GroupFacts
@@ -39,7 +40,8 @@ Made = TypeVar("Made")
 DISTANCES = (0.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """Where the bins of distance begin, metres; the last one has no end."""
 FINDINGS = ("implausible_ball", "low_parallax")
-"""Findings about the ball that follow from thresholds, though they are no gates."""
+"""Findings about the ball that follow from thresholds, though they are no gates; the ball is the mean
+of the pairs also where the policy's ``point`` is ``best``, of which the facts know nothing."""
 
 
 @dataclass
@@ -315,12 +317,7 @@ def _count_by_distance(judgement: Judgement, live: BoolArray | slice) -> IntArra
 def _count_findings(
     table: YieldTable, live: BoolArray | slice, policy: Policy, judgement: Judgement
 ) -> IntArray:
-    x, y, z = judgement.point.T
-    half = table.pitch.T / 2
-    outside = np.maximum(np.abs(x) - half[0], np.abs(y) - half[1])
-    implausible = (
-        (z > policy.below_grass_m) | (-z > policy.max_height_m) | (outside > policy.outside_pitch_m)
-    )
+    implausible = find_implausible_positions(judgement.point, table.pitch, policy)
     low = judgement.parallax < policy.low_parallax_degrees
     return np.array(
         [

@@ -20,6 +20,7 @@ from app.solving.ball_3d import (
     choose_exported_ball,
     compute_mean_ball,
     explain_implausible_position,
+    find_implausible_positions,
     is_plausible_position,
     judge_pairs,
 )
@@ -62,6 +63,16 @@ class TestImplausible:
         ]
         ((number, limit, words),) = explain_implausible_position((0.0, 0.0, -41.0), PITCH, PAPER)
         assert (number, limit, words) == (41.0, 40.0, "flies 41.00 m above the grass")
+
+    def test_many_places_are_judged_as_each_alone(self) -> None:
+        generator = np.random.default_rng(5)
+        points = generator.uniform((-75, -55, -50), (75, 55, 3), (2000, 3))
+        points[:4] = [(0, 34 + 8, -8), (52.5 + 8, 0, -14), (0, 44, -2), (0, 0, -40)]
+        wrong = find_implausible_positions(points, np.tile((105.0, 68.0), (2000, 1)), PAPER)
+        told = [bool(explain_implausible_position((x, y, z), PITCH, PAPER)) for x, y, z in points]
+        alone = [not is_plausible_position((x, y, z), PITCH, PAPER) for x, y, z in points]
+        assert wrong.tolist() == told == alone
+        assert 0 < sum(told) < 2000
 
 
 BALL = (38.0, 2.0, -1.4)

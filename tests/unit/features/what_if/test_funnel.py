@@ -30,7 +30,9 @@ from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.facts import collect_facts_of_views, join_facts
 from app.solving.judgement import PASSES, Judgement, compute_view_jac, judge_groups
 from app.solving.solve import solve_and_collect_facts, solve_group
+from tests.cameras import looking
 from tests.scenes import make_scenes
+from tests.unit.solving.conftest import given_view
 
 SEEDS = 9
 
@@ -304,6 +306,21 @@ class TestGetYield:
             having = [s for s in again if part.name in {item.kind for item in s.findings}]
             assert (part.groups, part.passing) == (len(having), sum(s.passes for s in having))
             assert part.groups > 0
+
+    def test_a_high_ball_beside_the_pitch_is_the_finding_that_the_solver_has(
+        self, store, fill
+    ) -> None:
+        """Within both limits, and too high for so far outside."""
+        places = {"a": (-30.0, 90.0, -20.0), "b": (40.0, 85.0, -20.0)}
+        views = tuple(
+            given_view(key, looking(place, (0.0, 42.0, -14.0), 1500.0), (0.0, 42.0, -14.0))
+            for key, place in places.items()
+        )
+        fill(Group("high", views))
+        found = count_yield(YieldStore(store), 1)
+        (part,) = [part for part in found.findings if part.name == "implausible_ball"]
+        assert (part.groups, part.passing) == (1, 1)
+        assert list_groups(store, 1, "finding:implausible_ball").total == 1
 
     def test_given_cameras_without_lines_are_counted_apart(self, store, fill, make_static) -> None:
         bare = make_static(10)
