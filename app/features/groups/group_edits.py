@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from app.db.json_columns import Json
 from app.db.log import (
@@ -83,17 +83,74 @@ def edit_groups(
 def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
     """Who placed the ball of each view last, by id of the group and key of the view.
 
-    A ball that somebody accepted from predictions is not placed by them.
+    A ball that somebody accepted from predictions is not placed by them, and one that undo or redo
+    brings back is of whoever placed it.
     """
-    placed: dict[int, dict[str, str]] = {}
+    histories = _read_ball_histories(session, groups)
+    return {number: history.placed for number, history in histories.items()}
+
+
+def read_ball_actors_after_step(
+    session: Session, group_id: int, kind: str, step: int
+) -> dict[str, str]:
+    """Who will have placed the ball of each view once a step is undone or done again.
+
+    Args:
+        session: Any session.
+        group_id: The group.
+        kind: ``undo`` or ``redo``.
+        step: Entry of the edit.
+    """
+    history = _read_ball_histories(session, [group_id]).get(group_id, _BallHistory())
+    history.move(kind, step)
+    return history.placed
+
+
+@dataclass
+class _BallHistory:
+    """Who placed the balls of a group's views, and before and after each edit that placed any."""
+
+    placed: dict[str, str] = field(default_factory=dict)
+    around: dict[int, tuple[dict[str, str | None], dict[str, str | None]]] = field(
+        default_factory=dict
+    )
+
+    def place(self, step: int, actors: Mapping[str, str | None]) -> None:
+        """An edit places balls; None: of nobody."""
+        self.around[step] = {view: self.placed.get(view) for view in actors}, dict(actors)
+        self._put(actors)
+
+    def move(self, kind: str, step: int) -> None:
+        """An edit is undone, or done again."""
+        before, after = self.around.get(step, ({}, {}))
+        self._put(before if kind == "undo" else after)
+
+    def _put(self, actors: Mapping[str, str | None]) -> None:
+        for view, actor in actors.items():
+            self.placed.pop(view, None)
+            if actor is not None:
+                self.placed[view] = actor
+
+
+def _read_ball_histories(session: Session, groups: Sequence[int]) -> dict[int, _BallHistory]:
+    """Of groups whose balls were ever edited."""
+    found: dict[int, _BallHistory] = {}
     for entry in iterate_group_entries_of_kinds(session, groups, GROUP_KINDS):
-        for edit in iterate_single_edits(entry.body.get("edit") or {}):
-            if edit.get("edit") == "set_balls" and entry.group_id is not None:
-                of_group = placed.setdefault(entry.group_id, {})
-                of_group.pop(edit["view"], None)
-                if not any(ball.get("predicted_by") for ball in edit["balls"]):
-                    of_group[edit["view"]] = entry.actor
-    return placed
+        actors: dict[str, str | None] = {
+            edit["view"]: None
+            if any(ball.get("predicted_by") for ball in edit["balls"])
+            else entry.actor
+            for edit in iterate_single_edits(entry.body.get("edit") or {})
+            if edit.get("edit") == "set_balls"
+        }
+        if not actors or entry.group_id is None:
+            continue
+        history = found.setdefault(entry.group_id, _BallHistory())
+        if GROUP_KINDS[entry.kind] == "edit":
+            history.place(entry.id, actors)
+        else:
+            history.move(GROUP_KINDS[entry.kind], entry.body["of"])
+    return found
 
 
 def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, actor: str) -> int:
@@ -119,8 +176,8 @@ def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, act
     return edit_groups(session, dataset_id, NOISE, ids, make_noise_edits, actor=actor)
 
 
-def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
-    """The edit with the noise of who makes it, where it places a ball."""
+def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str | None) -> Edit:
+    """The edit with the noise of who makes it, where it places a ball; None: nobody who is known."""
     if isinstance(edit, CompositeEdit):
         own = (add_noise_of_actor(factors, group, one, actor) for one in edit.edits)
         return CompositeEdit(tuple(own))
@@ -134,6 +191,29 @@ def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -
         if factors
         else edit
     )
+
+
+def renew_noise(factors: Factors, group: Group, edit: Edit, placed: Mapping[str, str]) -> Edit:
+    """An edit of before with the noise that its balls have by now.
+
+    Args:
+        factors: The accepted ones.
+        group: The group.
+        edit: As it was saved.
+        placed: Who placed its balls, by key of the view.
+    """
+    if isinstance(edit, CompositeEdit):
+        return CompositeEdit(tuple(renew_noise(factors, group, one, placed) for one in edit.edits))
+    if not isinstance(edit, SetBalls):
+        return edit
+    return add_noise_of_actor(factors, group, replace(edit, noise=1.0), placed.get(edit.view))
+
+
+def places_balls(edit: Edit) -> bool:
+    """Whether an edit sets the balls of a view."""
+    if isinstance(edit, CompositeEdit):
+        return any(map(places_balls, edit.edits))
+    return isinstance(edit, SetBalls)
 
 
 def keep_view_noise(group: Group, edit: Edit) -> Edit:

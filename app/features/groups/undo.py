@@ -9,7 +9,13 @@ from app.db.log import read_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.groups.edit_codec import edit_from_json
+from app.features.groups.edit import Edit
+from app.features.groups.edit_codec import edit_from_json, edit_to_json
+from app.features.groups.group_edits import (
+    places_balls,
+    read_ball_actors_after_step,
+    renew_noise,
+)
 from app.features.groups.state import GroupState, GroupWithoutSolution
 from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
 from app.features.groups.undo_stacks import UndoStacks
@@ -35,14 +41,28 @@ def _make_undo_or_redo_planner(kind: str) -> Plan:
     ) -> GroupChange:
         body = make_undo_entry_body(session, record.stacks, kind, "in this group")
         try:
-            group = edit_from_json(body["edit"]).apply(record.stored.group)
+            edit = _renew_noise_of_balls(session, record, kind, body)
+            group = edit.apply(record.stored.group)
         except NotFoundError as error:
             raise ConflictError(
                 f"this can no longer be undone or redone: {error.message}"
             ) from error
-        return GroupChange(kind, body, group)
+        return GroupChange(kind, {**body, "edit": edit_to_json(edit)}, group)
 
     return plan_undo_or_redo
+
+
+def _renew_noise_of_balls(
+    session: Session, record: GroupWithoutSolution, kind: str, body: Json
+) -> Edit:
+    """The edit of an undo or a redo; noise may have been estimated since its balls were placed."""
+    edit, stored = edit_from_json(body["edit"]), record.stored
+    if not places_balls(edit):
+        return edit
+    placed = {}
+    if stored.factors:
+        placed = read_ball_actors_after_step(session, stored.id, kind, body["of"])
+    return renew_noise(stored.factors, stored.group, edit, placed)
 
 
 def make_undo_entry_body(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:

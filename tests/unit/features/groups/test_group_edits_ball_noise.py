@@ -23,7 +23,7 @@ from app.features.groups.submit import (
     submit_edit,
     submit_edits,
 )
-from app.features.groups.undo import undo_group_edit
+from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.imports.edits_export import group_to_export_json
 from app.features.imports.ingest import import_groups
 from app.features.match_estimates.queries import (
@@ -200,6 +200,28 @@ class TestWithNoise:
         undo_group_edit(store, static, if_match=load_group_state(store, static).etag, actor="ann")
         assert noise(store, static) == given
 
+    def test_undo_and_redo_bring_balls_back_with_the_noise_that_is_accepted_by_now(
+        self, store: Store, static: int
+    ) -> None:
+        give(store, *FACTORS)
+        key = place(store, static, "eve", OTHER)
+        assert place(store, static, "ann") == key
+        give(store, NoiseFactor(None, None, 1.25), NoiseFactor(None, "ann", 3.0))
+        assert noise(store, static)[key] == 3.0
+        for step, expected in (
+            (undo_group_edit, 1.25),
+            (redo_group_edit, 3.0),
+            (undo_group_edit, 1.25),
+            (undo_group_edit, 1.25),
+            (redo_group_edit, 1.25),
+        ):
+            # Whoever takes back has not placed the ball.
+            step(store, static, if_match=load_group_state(store, static).etag, actor="ann")
+            assert noise(store, static)[key] == expected
+        give(store)
+        step(store, static, if_match=load_group_state(store, static).etag, actor="ann")
+        assert noise(store, static) == {}
+
     def test_a_prediction_that_somebody_accepts_is_not_theirs(
         self, store: Store, static: int
     ) -> None:
@@ -224,6 +246,22 @@ class TestFactorOf:
 
 
 class TestReadPlaced:
+    def test_undo_and_redo_give_a_ball_back_to_who_placed_it(
+        self, store: Store, static: int
+    ) -> None:
+        key = place(store, static, "eve", OTHER)
+        place(store, static, "ann")
+        for step, person in (
+            (undo_group_edit, "eve"),
+            (undo_group_edit, None),
+            (redo_group_edit, "eve"),
+            (redo_group_edit, "ann"),
+        ):
+            step(store, static, if_match=load_group_state(store, static).etag, actor="lea")
+            with store.read() as session:
+                found = read_last_ball_actors(session, [static])[static]
+            assert found == ({} if person is None else {key: person})
+
     def test_knows_who_placed_balls_of_several_views_in_one_edit(
         self, store: Store, static: int
     ) -> None:
