@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,14 @@ from app.features.groups.suggested_edits import (
     move_ball_edit,
     rank_of_fix,
 )
+from app.features.groups.view_paint import PaintUpdaterWithoutPictures
 from app.geometry.arrays import FloatArray
 from app.soccer.finding import SuggestedFix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View, make_view_letter
 from app.soccer.policy import Policy
-from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
+from app.soccer.solution import Gate, MarkingFit, Solution, ViewSolution
+from app.solving.calibrate import compute_paint_search_key, find_wanted_paint_reading
 from app.solving.jaccard import project_markings
 from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.solve import solve_group
@@ -73,8 +75,8 @@ class Suggestion:
             None for other actions.
         offers: The edits that carry it out; none where only a person can.
         guide: Where that person is led.
-        value: What the gate would measure.
-        passes: Whether the whole group would pass.
+        value: What the gate would measure; None where paint would have to be read to know.
+        passes: Whether the whole group would pass; not where paint would have to be read to know.
     """
 
     gate: str
@@ -110,42 +112,72 @@ def find_suggestions(group: Group, policy: Policy, solution: Solution) -> list[S
     failing = solution.first_failing
     if failing is None:
         return []
-    known = {view.calibration_key: view.calibration for view in solution.views}
+    trials = _Trials(group, policy, solution, failing)
     found = []
     for candidate in _collect_distinct_candidates(group, solution, failing)[:MOST_TRIALS]:
-        suggestion = _try_candidate(group, policy, solution, failing, candidate, known)
+        suggestion = trials.try_candidate(candidate)
         if suggestion is not None:
             found.append((not suggestion.passes, rank_of_fix(candidate.fix), suggestion))
     return [suggestion for *_, suggestion in sorted(found, key=lambda item: item[:2])]
 
 
-def _try_candidate(
-    group: Group,
-    policy: Policy,
-    solution: Solution,
-    failing: Gate,
-    candidate: _SuggestionCandidate,
-    known: dict[str, Calibration],
-) -> Suggestion | None:
-    """The suggestion, or None where the edit changes nothing for the better."""
-    edit = candidate.trial or edit_of_fix(group, candidate.fix, candidate.point)
-    if edit is None:
-        return None
-    then = solve_group(edit.apply(group), policy, known)
-    gate = next(gate for gate in then.gates if gate.name == failing.name)
-    if not then.passes and not _is_improvement(failing, gate, solution, then, candidate.fix.view):
-        return None
-    return Suggestion(
-        gate=failing.name,
-        view=candidate.fix.view,
-        sentence=candidate.sentence,
-        fix=candidate.fix,
-        point=candidate.point,
-        offers=list_edits_of_fix(group, candidate.fix, candidate.point),
-        guide=find_guide_of_fix(candidate.fix, candidate.point),
-        value=gate.value,
-        passes=then.passes,
-    )
+class _Trials:
+    """Tries candidates out on a group."""
+
+    def __init__(self, group: Group, policy: Policy, solution: Solution, failing: Gate):
+        self._group, self._policy = group, policy
+        self._solution, self._failing = solution, failing
+        self._known = {view.calibration_key: view.calibration for view in solution.views}
+        self._clicked: dict[frozenset[str], Solution] = {}
+
+    def try_candidate(self, candidate: _SuggestionCandidate) -> Suggestion | None:
+        """The suggestion, or None where the edit changes nothing for the better.
+
+        Paint is read for the lines that are there. Of other lines it is not read here, for that takes
+        long: cameras of clicks are compared then, and nobody knows whether the group would pass.
+        """
+        group, fix = self._group, candidate.fix
+        edit = candidate.trial or edit_of_fix(group, fix, candidate.point)
+        if edit is None:
+            return None
+        edited, reader = edit.apply(group), PaintUpdaterWithoutPictures()
+        reader.update_paint(edited, self._policy.calibration, self._known)
+        then = solve_group(edited, self._policy, self._known)
+        now = self._solve_with_clicks_as(edited)
+        before, gate = (
+            next(gate for gate in of.gates if gate.name == self._failing.name) for of in (now, then)
+        )
+        passes = then.passes and not now.passes
+        if not passes and not _is_improvement(before, gate, now, then, fix.view):
+            return None
+        return Suggestion(
+            gate=self._failing.name,
+            view=fix.view,
+            sentence=candidate.sentence,
+            fix=fix,
+            point=candidate.point,
+            offers=list_edits_of_fix(group, fix, candidate.point),
+            guide=find_guide_of_fix(fix, candidate.point),
+            value=None if reader.missed else gate.value,
+            passes=passes and not reader.missed,
+        )
+
+    def _solve_with_clicks_as(self, edited: Group) -> Solution:
+        """The group as it is, with cameras of clicks where the edited one has them for want of paint."""
+        policy = self._policy.calibration
+        outdated = frozenset(
+            view.key
+            for view in edited.views
+            for reading in [find_wanted_paint_reading(edited, view, policy)]
+            if reading and reading.sought_for != compute_paint_search_key(edited, view, policy)
+        )
+        if not outdated:
+            return self._solution
+        if outdated not in self._clicked:
+            left = {key: read for key, read in self._group.paint.items() if key not in outdated}
+            group = replace(self._group, paint=left)
+            self._clicked[outdated] = solve_group(group, self._policy, self._known)
+        return self._clicked[outdated]
 
 
 def _is_improvement(

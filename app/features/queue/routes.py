@@ -378,8 +378,14 @@ class SuggestionDocument(Document):
     guide: FixGuideDocument | None = Field(
         description="Where that person is led; null where edits are offered."
     )
-    value: float | None = Field(description="The gate's value after the edit.")
-    passes: bool = Field(description="Whether the whole group would pass after the edit.")
+    value: float | None = Field(
+        description="The gate's value after the edit; null where the paint would have to be read again "
+        "to know."
+    )
+    passes: bool = Field(
+        description="Whether the whole group would pass after the edit; false where the paint would "
+        "have to be read again to know."
+    )
 
     @model_validator(mode="before")
     @classmethod

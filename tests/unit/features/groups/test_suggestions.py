@@ -8,12 +8,15 @@ from app.features.groups.suggestions import find_suggestions
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.frames import ImagePoint
+from app.soccer.paint_evidence import PaintReading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.soccer.solution import SuspectLabel
+from app.solving.calibrate import compute_paint_search_key
 from app.solving.solve import solve_group
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
+from tests.unit.solving.test_paint_camera import painted
 
 BALL = (36.0, 3.0, -0.5)
 
@@ -169,6 +172,40 @@ class TestFindRemedies:
         (remedy,) = find_suggestions(bad, PAPER, solution)
         assert (remedy.fix, remedy.passes) == (SuggestedFix("include_view", "b"), True)
         assert "B left out by a person" in solution.first_failing.sentence
+
+
+class TestPaint:
+    """The cameras come from the paint that was read for the lines as they are."""
+
+    POLICY = replace(PAPER, calibration=replace(PAPER.calibration, source="paint"))
+
+    def painted(self):
+        bad, policy = TestFindRemedies().bad_point()
+        policy = replace(policy, calibration=self.POLICY.calibration)
+        seen = bad.views[1]
+        key = compute_paint_search_key(bad, seen, policy.calibration)
+        reading = PaintReading("f" * 32, key, painted(BEHIND_GOAL), None, 0.9, 0.8)
+        return replace(bad, paint={seen.key: reading}), policy
+
+    def test_no_edit_of_lines_is_said_to_make_it_pass_before_its_paint_is_read(self):
+        bad, policy = self.painted()
+        solution = solve_group(bad, policy)
+        assert solution.views[1].calibration.source == "paint"
+        assert solution.first_failing.name == "jac"
+        found = find_suggestions(bad, policy, solution)
+        drawn = [one for one in found if one.fix.action != "hide_marking"]
+        assert {one.fix.action for one in drawn} >= {"move_point"}
+        assert {(one.passes, one.value) for one in drawn} == {(False, None)}
+        # What is said not to be visible moves no camera.
+        assert any(one.passes for one in found)
+
+    def test_an_edit_that_the_cameras_of_clicks_gain_nothing_by_is_no_suggestion(self):
+        bad, policy = self.painted()
+        found = find_suggestions(bad, policy, solve_group(bad, policy))
+        clicked = replace(bad, paint={})
+        alone = find_suggestions(clicked, policy, solve_group(clicked, policy))
+        named = {(one.fix, one.point) for one in alone}
+        assert {one.fix.marking for one in found} <= {fix.marking for fix, _ in named}
 
 
 class TestInfluences:
