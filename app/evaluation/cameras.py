@@ -180,7 +180,7 @@ def score_cameras(
 ) -> Scores:
     """Every frame with lines against its camera; a static camera's same lines are measured once."""
     scores: Scores = {}
-    known: dict[tuple[str, Camera], FrameScore] = {}
+    known: dict[tuple[str, Camera, Pitch, ImageSize], FrameScore] = {}
     for number, frame in enumerate(frames):
         if progress is not None:
             progress(number)
@@ -190,7 +190,7 @@ def score_cameras(
         if camera is None:
             scores[frame.id] = None
             continue
-        key = (frame.station or str(frame.id), camera)
+        key = (frame.station or str(frame.id), camera, frame.pitch, frame.size)
         if key not in known:
             known[key] = score_frame(camera, frame.lines, frame.pitch, frame.size)
         scores[frame.id] = known[key]

@@ -18,6 +18,7 @@ from app.evaluation.cameras import (
 from app.evaluation.result import FrameFieldRange
 from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
+from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from tests.cameras import SIZE
@@ -65,6 +66,18 @@ class TestScoreCameras:
         same = [replace(frame, station="cam1") for frame in frames[:2]]
         score_cameras(same, {frame.id: frames[0].camera for frame in same})
         assert len(calls) == 1
+
+    def test_a_static_camera_is_measured_on_each_pitch_and_size(self, frames) -> None:
+        camera = frames[0].camera
+        one = replace(frames[0], station="cam1")
+        small = replace(one, id=2, pitch=Pitch(95.0, 60.0))
+        half = ImageSize(one.size.width // 2, one.size.height // 2)
+        every = [one, small, replace(one, id=3, size=half)]
+        scores = score_cameras(every, {frame.id: camera for frame in every})
+        for frame in every:
+            alone = score_frame(camera, frame.lines, frame.pitch, frame.size)
+            assert scores[frame.id] == alone
+        assert len({repr(score) for score in scores.values()}) == 3
 
 
 class TestCamerasTable:
