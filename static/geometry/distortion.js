@@ -94,8 +94,11 @@ export function foldRadius(coefficients) {
 		return k1 < 0 ? Math.sqrt(-1 / (3 * k1)) : Infinity;
 	}
 	const radial = [k1, k2, 0, 0, k3, k4, k5, k6, 0, 0, 0, 0];
+	// Where the denominator is zero the picture ends too: behind it the radius grows from far on the other side.
 	/** @param {number} r */
-	const grows = (r) => distortJacobian([r, 0], radial)[0] > 0;
+	const denominator = (r) => 1 + r * r * (k4 + r * r * (k5 + r * r * k6));
+	/** @param {number} r */
+	const grows = (r) => denominator(r) > 0 && distortJacobian([r, 0], radial)[0] > 0;
 	const step = 0.01;
 	for (let r = step; r <= 5; r += step) {
 		if (grows(r)) continue;

@@ -87,4 +87,16 @@ describe('foldRadius', () => {
 	it('is infinite for a lens that only stretches', () => {
 		assert.equal(foldRadius([0.3, ...Array(11).fill(0)]), Infinity);
 	});
+
+	it('ends where the denominator of a rational model is zero, as on the server', () => {
+		for (const [k1, k2, k3, k4, k5, k6, radius] of [
+			[0.1, 0.02, 0.01, -0.3, 0, 0, 1.8257418583505538],
+			[0, 0, 0, -0.25, 0, 0, 2],
+			[-0.2, 0.05, -0.01, 0.1, -0.02, 0.001, 1.5324175515362053],
+			[0.3, -0.1, 0.02, 0.25, -0.05, -0.01, 2.1762980140265027],
+		]) {
+			const lens = [k1, k2, 0, 0, k3, k4, k5, k6, 0, 0, 0, 0];
+			close([foldRadius(lens)], [radius], 1e-9);
+		}
+	});
 });
