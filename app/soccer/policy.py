@@ -250,10 +250,10 @@ class Policy:
         10.0, FINDINGS, "Finding: outside the pitch by more than", "m", 0.0, 50.0
     )
     pitch_length_m: float = _threshold_field(
-        105.0, PITCH, "Length of the pitch, if not known", "m", 90.0, 120.0
+        105.0, PITCH, "Length of the pitch, without effect: a match has its own", "m", 90.0, 120.0
     )
     pitch_width_m: float = _threshold_field(
-        68.0, PITCH, "Width of the pitch, if not known", "m", 45.0, 90.0
+        68.0, PITCH, "Width of the pitch, without effect: a match has its own", "m", 45.0, 90.0
     )
 
     def tau_px(self, diagonal: Pixels) -> Pixels:
