@@ -103,9 +103,9 @@ def _restore_through_folder(settings: Settings, source: Path, folder: Path) -> R
     files = sum(1 for path in folder.rglob("*") if path.is_file()) - 1
     # The files of the backup, and those of its database's log, which SQLite may have left.
     os.sync()
-    aside = _move_replaced_files_aside(
-        settings, [path.name for path in folder.iterdir() if path.is_dir()]
-    )
+    # Exports are called after their jobs, whose ids another database may give to others.
+    replaced = {*EXPORTS, *(path.name for path in folder.iterdir() if path.is_dir())}
+    aside = _move_replaced_files_aside(settings, sorted(replaced))
     _move_into_home(settings, folder, anchor)
     make_home_private(settings)
     return RestoreResult(

@@ -286,8 +286,10 @@ def list_exports(
         visibility=visibility,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
-    days, find = services.settings.export_days, services.exports.find
-    items = [ExportDocument.of_job(job, find(str(job.id)), days) for job in jobs[:limit]]
+    days = services.settings.export_days
+    items = [
+        ExportDocument.of_job(job, _find_entry_of_job(services, job), days) for job in jobs[:limit]
+    ]
     return ExportPage(items=items, next=more)
 
 
@@ -316,7 +318,7 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None
         raise NotFoundError("there is no such export")
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
-    services.exports.delete_export(export)
+    services.exports.delete_export(document.id)
     record_audit_event(services.store, actor, "export deleted", None, export=export)
 
 
@@ -346,7 +348,7 @@ def get_content(
     through this server, or from an address of the store that is good for a minute.
     """
     document = _export_document(services, export)
-    entry = services.exports.find(export)
+    entry = services.exports.find(document.id) if document.state == "done" else None
     if entry is not None and entry.stored is not None:
         return redirect_or_stream_stored_file(
             services.settings, entry.stored, _file_name(document), request
@@ -384,14 +386,22 @@ def _export_document(services: Services, export: str) -> ExportDocument:
     Raises:
         NotFoundError: There is none of that id.
     """
-    entry, days = services.exports.find(export), services.settings.export_days
-    if entry is not None:
-        return ExportDocument.of(entry, days)
+    days = services.settings.export_days
     if _may_be_job_id(export):
         job = services.jobs.get(int(export))
         if job.kind == KIND:
-            return ExportDocument.of_job(job, None, days)
-    raise NotFoundError("there is no such export")
+            return ExportDocument.of_job(job, _find_entry_of_job(services, job), days)
+        raise NotFoundError("there is no such export")
+    return ExportDocument.of(services.exports.get(export), days)
+
+
+def _find_entry_of_job(services: Services, job: Job) -> ExportEntry | None:
+    """What a job left behind; None of another with its id, as there was before a restore."""
+    if job.kind != KIND or job.state != DONE or job.result.get("export") != str(job.id):
+        return None
+    entry = services.exports.find(str(job.id))
+    same = entry is not None and entry.request["dataset"] == job.request["dataset"]
+    return entry if same else None
 
 
 def _may_be_job_id(export: str) -> bool:

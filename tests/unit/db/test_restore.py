@@ -55,6 +55,17 @@ class TestRestore:
         shutil.rmtree(restored.aside / "uploads")
         assert entries(restored.aside) == 8
 
+    def test_exports_are_moved_aside_for_the_ids_of_their_jobs_are_given_again(
+        self, own_store: Store, backup: Path
+    ) -> None:
+        exports = own_store.settings.exports
+        exports.mkdir()
+        (exports / "57.json").write_bytes(b"{}")
+        restored = restore_database(own_store.settings, backup)
+        assert restored.aside is not None
+        assert (restored.aside / "exports" / "57.json").exists()
+        assert not exports.exists()
+
     def test_another_home_becomes_the_same(self, backup: Path, tmp_path: Path) -> None:
         restored = restore_database(Settings(home=tmp_path / "new"), backup)
         assert restored.aside is None

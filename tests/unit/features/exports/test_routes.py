@@ -15,6 +15,7 @@ import pytest
 
 from app.features.datasets.service import dataset_id
 from app.features.exports import routes as module
+from app.features.exports.service import ExportReport
 from app.features.imports.ingest import import_groups
 from app.features.jobs import job_run
 from app.features.jobs.service import Jobs
@@ -214,6 +215,43 @@ class TestGetContent:
         for name in (other.id, 99, "x", "0" * 32, "1" * 30):
             assert api.get(f"{API}/{name}/content").status_code == 404
             assert api.get(f"{API}/{name}").status_code == 404
+
+
+class TestExportsOfEarlierJobs:
+    """What lies in the folder under the id of another job, as where a restore took job ids back."""
+
+    def leave(self, app: Any, number: int) -> None:
+        folder = app.state.services.exports
+        folder.folder.mkdir(exist_ok=True)
+        path = folder.get_zip_path(str(number))
+        path.write_bytes(b"PK\x05\x06" + b"\0" * 18)
+        report = ExportReport(path, "cameras", 2, {"cameras": 2}, {}, ())
+        folder.save_entry(str(number), {**ORDER, "dataset": "secret"}, report)
+
+    def test_are_not_served_under_the_id_of_a_job_of_another_kind(self, app, api, busy) -> None:
+        (other,) = app.state.services.jobs.find()
+        self.leave(app, other.id)
+        for address in (f"{API}/{other.id}", f"{API}/{other.id}/content"):
+            assert api.get(address).status_code == 404
+        assert api.delete(f"{API}/{other.id}").status_code == 404
+
+    def test_are_not_taken_for_what_a_job_left_that_waits(
+        self, app, api, busy, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "PATIENCE", 0.1)
+        job = api.post(API, json=ORDER).json()
+        self.leave(app, job["id"])
+        assert api.get(f"{API}/{job['id']}").json()["request"]["dataset"] == ORDER["dataset"]
+        assert [item["state"] for item in api.get(API).json()["items"]] == ["waiting"]
+        assert api.get(job["content"]).status_code == 409
+
+    def test_are_not_taken_for_what_a_job_of_another_dataset_left(self, app, api) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.get(job["content"]).status_code == 200
+        self.leave(app, job["id"])
+        assert api.get(job["content"]).status_code == 404
+        assert api.get(f"{API}/{job['id']}").json()["state"] == "gone"
+        assert [item["state"] for item in api.get(API).json()["items"]] == ["gone"]
 
 
 class TestCancel:
