@@ -36,7 +36,7 @@ from app.db.dialects.dialect import (
     select_json_array_items,
 )
 from app.db.home import DAY, find_last_write_time
-from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
+from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
@@ -52,7 +52,7 @@ from app.features.solutions.queries import CalibrationModel, SolutionModel
 from app.features.tables import Base
 from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
-from app.features.versions.queries import VersionModel
+from app.features.versions.queries import BATCH, VersionGroupModel, VersionModel
 from app.json_text import MAX_ID, canonical_json_text
 from app.object_store.path import is_address
 from app.soccer.codec import policy_from_json, policy_to_json
@@ -359,9 +359,9 @@ def _has_unsolved_groups(session: Session) -> bool:
 
 
 def list_unused_uploads(session: Session, settings: Settings) -> list[str]:
-    """Ids of uploads that are kept for their frames, though no view has its frame there and none is a
-    recording."""
-    folders = {folder for path in _paths_in_use(session) for folder in path.parents}
+    """Ids of uploads that are kept for their frames, though no view and no frozen version has a frame
+    there and none is a recording."""
+    folders = {folder for path in _find_paths_in_use(session) for folder in path.parents}
     return [
         upload.id
         for upload in list_uploads(settings)
@@ -379,8 +379,8 @@ def is_upload_in_use(session: Session, settings: Settings, upload_id: str) -> bo
 
 
 def list_unused_frame_files(session: Session, settings: Settings) -> list[str]:
-    """Folders and files of the home's recordings that no view and no recording uses."""
-    used = {path.parent.name for path in _paths_in_use(session)}
+    """Folders and files of the home's recordings that no view, no frozen version and no recording uses."""
+    used = {path.parent.name for path in _find_paths_in_use(session)}
     cameras = ShotCamerasModel
     for column in (RecordingModel.sha256, cameras.digest, cameras.before):
         used |= {sha256 for sha256 in session.scalars(select(column)) if sha256}
@@ -393,11 +393,15 @@ def list_unused_frame_files(session: Session, settings: Settings) -> list[str]:
     )
 
 
-def _paths_in_use(session: Session) -> list[Path]:
-    """Where frames of views and recordings lie on this disk."""
+def _find_paths_in_use(session: Session) -> set[Path]:
+    """Where frames of views, of frozen versions and of recordings lie on this disk."""
     statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
-    found = [*session.scalars(statement), *session.scalars(select(RecordingModel.path))]
-    return [Path(path) for path in found if path and not is_address(path)]
+    found = {*session.scalars(statement), *session.scalars(select(RecordingModel.path))}
+    frozen = select(VersionGroupModel.frames).where(VersionGroupModel.frames.is_not(None))
+    # A group may be gone, or have other frames by now; its versions are exported with theirs.
+    for frames in session.scalars(frozen.execution_options(yield_per=BATCH)):
+        found |= {frame["path"] for frame in decompress_json(frames).values() if "path" in frame}
+    return {Path(path) for path in found if path and not is_address(path)}
 
 
 def delete_expired_cache_entries(settings: Settings) -> int:

@@ -29,7 +29,7 @@ from app.db.log import (
 from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, format_utc_time
 from app.db.store import Store
-from app.errors import ConflictError, InputError, ReviewError, StorageError
+from app.errors import ConflictError, DamagedError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
 from app.features.datasets.queries import (
     list_unused_calibrations,
@@ -451,17 +451,28 @@ def _check_unused_calibrations(session: Session) -> CheckResult:
 
 
 def _check_unused_uploads(session: Session, settings: Settings) -> CheckResult:
-    found = list_unused_uploads(session, settings)
+    try:
+        found = list_unused_uploads(session, settings)
+    except DamagedError as error:
+        return _unknown_use("uploads", error)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return CheckResult("uploads", True, sentence, mend)
 
 
 def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResult:
-    found = list_unused_frame_files(session, settings)
+    try:
+        found = list_unused_frame_files(session, settings)
+    except DamagedError as error:
+        return _unknown_use("recordings", error)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
     mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
     return CheckResult("recordings", True, sentence, mend)
+
+
+def _unknown_use(name: str, error: DamagedError) -> CheckResult:
+    sentence = f"which files are used cannot be read: {error.message}"
+    return CheckResult(name, False, sentence, error.hint)
 
 
 def examine_everything(settings: Settings) -> list[CheckResult]:

@@ -15,6 +15,7 @@ from app.config import Settings
 from app.db.check import CheckResult
 from app.db.home import make_home
 from app.db.store import Store
+from app.features.groups.submit import load_group_state
 from app.features.imports.upload_queries import UploadWriter, mark_upload_permanent
 from app.features.integrity import checks
 from app.features.integrity.checks import (
@@ -24,6 +25,8 @@ from app.features.integrity.checks import (
 from app.features.people.login_queries import put_identity
 from app.features.people.roles import Role
 from app.features.people.service import invite
+from app.features.verdicts.service import set_verdict
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from tests.databases import said_for_sqlite
 from tests.provider import CLIENT, SECRET, providing, tell
 from tests.smtp import MailBox, serving
@@ -189,3 +192,29 @@ class TestExamineSurroundings:
         assert found["leftovers"].sentence.startswith("1 half-written")
         assert found["unused calibrations"].sentence.startswith("1 that")
         assert all(found[name].ok for name in ("uploads", "leftovers", "unused calibrations"))
+
+    def test_frames_that_a_frozen_version_alone_needs_are_used(
+        self, store: Store, fill, make_group
+    ) -> None:
+        (group,) = fill(make_group(7))
+        writer = UploadWriter(store.settings, "frames.zip")
+        writer.write(b"frames")
+        upload = writer.finish()
+        mark_upload_permanent(store.settings, upload.id)
+        in_upload = store.settings.uploads.absolute() / upload.id / "frames.zip"
+        for name in ("frozen", "unknown"):
+            (store.settings.recordings / name).mkdir(parents=True)
+        in_recording = store.settings.recordings.absolute() / "frozen" / "7.png"
+        media = text("UPDATE view SET media_path = :path WHERE position = :position")
+        with store.write() as session:
+            for position, path in enumerate((in_upload, in_recording)):
+                session.execute(media, {"path": str(path), "position": position})
+        etag = load_group_state(store, group).etag
+        set_verdict(store, group, "accepted", None, None, if_match=etag, actor="ann")
+        freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
+        with store.write() as session:
+            session.execute(text("UPDATE view SET media_path = NULL"))
+        found = around(store)
+        assert found["uploads"].sentence.startswith("0 kept")
+        assert found["recordings"].sentence.startswith("1 indices")
+        assert str(store.settings.recordings / "unknown") in str(found["recordings"].mend)
