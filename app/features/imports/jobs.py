@@ -159,7 +159,8 @@ def run_import_job(jobs: Jobs, store: Store, settings: Settings, progress: JobPr
         jobs.set_dataset(progress.job_id, int(found.id))
     if outcome.nothing is not None:
         raise FailedWithReportError(*outcome.nothing, _make_import_result(outcome, request))
-    if request.dry_run or not outcome.fresh:
+    # What an earlier server brought is not new here, and nothing may follow on it yet.
+    if request.dry_run or not (outcome.fresh or progress.was_begun_before):
         return _make_import_result(outcome, request)
     return _make_import_result(
         outcome, request, **_request_following_jobs(jobs, store, request, actor)
@@ -248,12 +249,12 @@ def _request_following_jobs(
     if request.format == "frames":
         if not request.options.get("propose", True):
             return {"solve_job": solve.id}
-        proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor)
+        proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor, follows=True)
         return {"solve_job": solve.id, "proposals_job": proposals.id}
     if found.policy.calibration.source == "paint" and has_pictures_to_read_paint_from(
         store, found.id
     ):
-        paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
+        paint = PAINT.request(jobs, store, found.id, None, actor=actor, follows=True).id
     rig = None
     if request.format in ("issia", "issia-3d"):
         rig = _request_rig_adjustment(jobs, store, found.id, actor)
@@ -268,7 +269,7 @@ def _request_rig_adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: st
             return None
     try:
         nothing = {"what": None, "inputs": None}
-        return RIG.request(jobs, store, dataset_id, actor=actor, **nothing).id
+        return RIG.request(jobs, store, dataset_id, actor=actor, follows=True, **nothing).id
     except (InputError, ConflictError):
         return None
 

@@ -109,6 +109,11 @@ class JobProgress:
         """The job's dataset; 0, which none is, where it has none."""
         return self.job.dataset_id or 0
 
+    @property
+    def was_begun_before(self) -> bool:
+        """Whether an earlier server was at it, which may have done some of it."""
+        return self.job.tries > 0 or self.job.done > 0
+
     def require_not_cancelled(self) -> None:
         """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
         if self.cancelled.is_set():

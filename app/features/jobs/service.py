@@ -40,6 +40,7 @@ class Jobs(JobRunner):
         actor: str,
         request: Json = None,
         once: bool = False,
+        follows: bool = False,
         then: Then = Session.respond,
     ) -> Job:
         """Queue work; not to be called inside a transaction.
@@ -53,6 +54,7 @@ class Jobs(JobRunner):
             request: What was asked for; a kind that is resumed finds its way from it.
             once: Where a job of this kind waits for this dataset already, answer that one; without
                 a dataset one's own, for nobody sees another person's.
+            follows: It goes on with a job that ends now, whose place it takes: it needs no room.
             then: Ends the transaction; default: the request is answered with the job.
 
         Raises:
@@ -63,7 +65,7 @@ class Jobs(JobRunner):
             # Others that enter wait for the write lock, so that none of them is counted twice.
             enter = entry.enter_context(self._hold_start_until_recorded())
             known = self._find_waiting_job(session, new) if once else None
-            if not once:
+            if not once and not follows:
                 self._require_queue_room(session, actor)
             job = require_job(session, insert_job(session, new) if known is None else known)
             if known is None:

@@ -140,9 +140,11 @@ class MatchJobType:
         match: str | None = None,
         *,
         actor: str,
+        follows: bool = False,
         **beside: Json,
     ) -> Job:
-        """Have it done soon, in one match or all; ``beside`` is what else its work is asked for.
+        """Have it done soon, in one match or all; ``beside`` is what else its work is asked for,
+        ``follows`` as in ``Jobs.submit``.
 
         Raises:
             ReviewError: As ``require`` does, at once.
@@ -156,6 +158,7 @@ class MatchJobType:
             dataset_id=found.id,
             actor=actor,
             request=request,
+            follows=follows,
         )
 
     def register_with_jobs(self, jobs: Jobs, store: Store) -> None:

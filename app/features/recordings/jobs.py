@@ -205,12 +205,14 @@ def run_instants_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
         )
     solve = proposals = None
     dry_run = asked.get("dry_run", False)
-    if (taken["new"] or taken["changed"]) and not dry_run:
+    begun = progress.was_begun_before
+    if (taken["new"] or taken["changed"] or begun) and not dry_run:
         solve = request_solve_job(jobs, store, recording.dataset_id, actor=actor).id
         views = taken["new"] + taken["changed"] + taken["linked_views"]
-        if asked["propose"] and taken["cameras"] < views:
+        if asked["propose"] and (taken["cameras"] < views or begun):
             number, match = recording.dataset_id, recording.name
-            proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
+            job = PROPOSALS.request(jobs, store, number, match, actor=actor, follows=True)
+            proposals = job.id
     groups = find_group_ids_by_frame(store, recording)
     return {
         **taken,

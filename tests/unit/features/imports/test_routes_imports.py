@@ -26,6 +26,7 @@ from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE
 from tests.rigs import groups
+from tests.unit.features.jobs.steps import Gate, submit
 from tests.waiting import SECONDS
 
 API = "/api/v1/imports"
@@ -103,6 +104,20 @@ class TestStartImport:
         assert (read.kind, read.result["views"]) == ("paint", len(group.views))
         assert read.result["without_picture"] == 0 < read.result["read"]
         assert finished(app, api.post(API, json=body())).result["paint_job"] is None
+
+    def test_what_follows_is_asked_for_however_many_jobs_wait(
+        self, app, api, tree, group, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        add_pictures(tree, group)
+        jobs, gate = app.state.services.jobs, Gate()
+        submit(jobs, gate)
+        assert gate.started.wait(SECONDS)
+        answer = api.post(API, json=body())
+        submit(jobs, lambda _: None)
+        monkeypatch.setattr(jobs, "_capacity", 1)
+        gate.finish.set()
+        job = finished(app, answer)
+        assert (job.state, job.result["paint_job"] is not None) == ("done", True)
 
     def test_for_pictures_alone_cameras_are_proposed(self, app, api, tree) -> None:
         for path in tree.rglob("*.json"):
@@ -242,6 +257,21 @@ class TestStartImport:
         services.jobs.start()
         job = services.jobs.wait(identity, SECONDS)
         assert (job.state, job.result["new"]) == ("done", 1)
+
+    def test_one_that_was_killed_when_all_was_read_asks_for_what_follows(
+        self, app, api, tree, group
+    ) -> None:
+        add_pictures(tree, group)
+        services = app.state.services
+        request = finished(app, api.post(API, json=body())).request
+        with services.store.write() as session:
+            identity = insert_job(session, NewJob("import", "Import", "ann", None, request))
+            update_job(session, identity, state="running", begun=1)
+        resume_imports(services.jobs, services.store, services.settings)
+        register_solve_resume(services.jobs, services.store)
+        services.jobs.start()
+        job = services.jobs.wait(identity, SECONDS)
+        assert (job.result["new"], job.result["paint_job"] is not None) == (0, True)
 
 
 class TestListImportFolders:
