@@ -21,9 +21,10 @@ import structlog
 
 from app.db.session import now
 from app.db.store import Store
-from app.errors import StorageError
+from app.errors import NotFoundError, StorageError
 from app.features.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.features.jobs.queries import (
+    CANCELLED,
     FAILED,
     OPEN,
     RUNNING,
@@ -46,6 +47,10 @@ PROMPT = frozenset({"solve"})
 KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 """How many finished jobs of a kind are remembered; kinds that are not named keep all."""
 
+END_TRIES = 5
+"""So many times, a second apart, a worker tries to write how its job ended before it goes on."""
+LOOK_SECONDS = 5.0
+"""Between two looks of a worker that has nothing to do for ends that could not be written."""
 MOST_TRIES = 2
 """So many times a server may die at a job before it is left alone."""
 
@@ -71,6 +76,8 @@ class JobRunner(JobRecords):
         self._changed = threading.Condition()
         self._closing = threading.Event()
         self._workers: list[threading.Thread] = []
+        self._unwritten: dict[int, dict[str, Any]] = {}
+        """How jobs ended whose records could not be written yet, by their ids."""
         self._turns: dict[str, int] = {}
         """When each person had a turn last, by the number of the turn."""
         self._resumers: dict[str, Work] = {}
@@ -134,6 +141,7 @@ class JobRunner(JobRecords):
         until = monotonic() + seconds
         for worker in self._workers:
             worker.join(max(until - monotonic(), 0.0))
+        self._write_missed_ends()
         if any(worker.is_alive() for worker in self._workers):
             for run in self._queue.running:
                 log.warning("a job did not end in time", job=run.job.id)
@@ -168,6 +176,8 @@ class JobRunner(JobRecords):
 
     def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
+        if job.ending:
+            return {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
         if self._is_resumable(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
         sentence = "The server stopped before this was done. Start it again."
@@ -179,7 +189,7 @@ class JobRunner(JobRecords):
         return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
 
     def _is_resumable(self, job: Job) -> bool:
-        return job.kind in self._resumers and job.tries < MOST_TRIES
+        return job.kind in self._resumers and job.tries < MOST_TRIES and not job.ending
 
     def _make_resumed_run(self, job: Job) -> JobRun:
         return JobRun(self._resumers[job.kind], JobProgress(job, self._closing))
@@ -199,7 +209,10 @@ class JobRunner(JobRecords):
         self._changed.notify_all()
 
     def _run_ready_jobs(self, ready: Callable[[], list[JobRun]]) -> None:
-        while (run := self._wait_for_next_run(ready)) is not None:
+        while not self._closing.is_set():
+            self._write_missed_ends()
+            if (run := self._wait_for_next_run(ready)) is None:
+                continue
             try:
                 self._execute_run(run)
             except Exception:
@@ -212,12 +225,13 @@ class JobRunner(JobRecords):
                 run.over.set()
 
     def _wait_for_next_run(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
-        """The next job to run, of those that may; None when the server stops."""
+        """The next job to run, of those that may; None when the server stops, or none came for a
+        while."""
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._closing.is_set() or (not self._entering and ready())
+            found = self._changed.wait_for(
+                lambda: self._closing.is_set() or (not self._entering and ready()), LOOK_SECONDS
             )
-            if self._closing.is_set():
+            if self._closing.is_set() or not found:
                 return None
             run = min(ready(), key=self._priority)
             self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
@@ -261,16 +275,35 @@ class JobRunner(JobRecords):
                 self._save_columns(run.job.id, begun=-1)
 
     def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
-        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
-        place, job = run.columns, None
+        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written yet."""
+        columns, job = {**run.columns, "ended": now(), **values}, None
         # Where the disk is full for a moment, the record waits for it.
-        for _ in range(5):
+        for _ in range(END_TRIES):
             try:
-                job = self._save_end(run.job.id, by, **{**place, "ended": now(), **values})
+                job = self._save_end(run.job.id, by, **columns)
             except StorageError as error:
                 log.warning("the record of a job could not be written", error=str(error))
                 self._closing.wait(1.0)
             else:
                 break
+        else:
+            with self._changed:
+                self._unwritten[run.job.id] = columns
         run.over.set()
         return job
+
+    def _write_missed_ends(self) -> None:
+        """Write how jobs ended where that could not be written before."""
+        with self._changed:
+            unwritten, self._unwritten = self._unwritten, {}
+        for job_id, columns in unwritten.items():
+            try:
+                if self.get(job_id).state in OPEN:
+                    self._save_end(job_id, **columns)
+            except NotFoundError:
+                pass
+            except StorageError:
+                with self._changed:
+                    self._unwritten[job_id] = columns
+            except Exception:
+                log.exception("the record of a job could not be written", job=job_id)

@@ -7,12 +7,22 @@ from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import replace
 
 from app.db.json_columns import Json
-from app.db.session import Session
+from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, OverloadedError
 from app.features.audit.service import log_job_request
 from app.features.jobs.job_run import JobProgress, JobRun, Work
-from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job, NewJob, insert_job
+from app.features.jobs.queries import (
+    CANCELLED,
+    DONE,
+    FAILED,
+    OPEN,
+    Job,
+    NewJob,
+    insert_job,
+    read_job,
+    update_job,
+)
 from app.features.jobs.records import Then, record_cancellation, require_job
 from app.features.jobs.runner import CLOSE_SECONDS, JobRunner, Pool
 
@@ -21,6 +31,12 @@ CAPACITY = 32
 LEFT_TO_OTHERS = 4
 """One person leaves this part of the waiting places (one of so many) to others."""
 WAIT_FOR_JOB = "Wait until it ends (page Jobs), then try again."
+
+
+def require_not_over(job: Job) -> None:
+    """Raise ConflictError where a job is done or failed."""
+    if job.state in (DONE, FAILED):
+        raise ConflictError(f"job {job.id} has already ended")
 
 
 class Jobs(JobRunner):
@@ -79,7 +95,7 @@ class Jobs(JobRunner):
         return job
 
     def cancel(self, job_id: int, *, by: str | None = None) -> Job:
-        """End a job: one that waits at once, one that runs at its next step.
+        """End a job: one that runs at its next step, any other at once.
 
         Args:
             job_id: Which.
@@ -90,9 +106,9 @@ class Jobs(JobRunner):
             NotFoundError: There is none of that id.
             ConflictError: It is done or failed already.
         """
+        self._write_missed_ends()
         job = self.get(job_id)
-        if job.state in (DONE, FAILED):
-            raise ConflictError(f"job {job_id} has already ended")
+        require_not_over(job)
         with self._changed:
             run = next((item for item in self._queue.waiting if item.job.id == job_id), None)
             running = self._queue.find_running(job_id)
@@ -103,10 +119,18 @@ class Jobs(JobRunner):
         if run is not None:
             sentence = "Cancelled before it began."
             return self._record_end(run, by, state=CANCELLED, sentence=sentence) or self.get(job_id)
-        if by is None:
+        if by is None and (running is not None or job.state not in OPEN):
             return self.get(job_id)
         with self._store.write() as session:
-            return record_cancellation(session, require_job(session, job_id), by)
+            job = require_job(session, job_id)
+            require_not_over(job)
+            if job.state in OPEN:
+                # The next server ends it where this one dies before the next step.
+                ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
+                update_job(session, job_id, **(ended if running is None else {"ending": True}))
+            job = record_cancellation(session, require_job(session, job_id), by)
+        self._announce_job_change(job)
+        return job
 
     def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
@@ -129,6 +153,10 @@ class Jobs(JobRunner):
 
     def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin, once a transaction is kept."""
+        for number in ids:
+            job = read_job(session, number)
+            if job is not None and job.state in OPEN:
+                update_job(session, number, ending=True)
         session.call_after_commit(lambda: self.signal_cancel(ids))
 
     def signal_cancel(self, ids: Collection[int]) -> None:

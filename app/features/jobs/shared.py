@@ -21,8 +21,6 @@ from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
 from app.features.jobs.job_run import JobProgress, JobRun, Work
 from app.features.jobs.queries import (
     CANCELLED,
-    DONE,
-    FAILED,
     OPEN,
     RUNNING,
     WAITING,
@@ -37,7 +35,7 @@ from app.features.jobs.queries import (
 )
 from app.features.jobs.records import record_cancellation, require_job
 from app.features.jobs.runner import CLOSE_SECONDS, KEPT, Pool
-from app.features.jobs.service import WAIT_FOR_JOB, Jobs
+from app.features.jobs.service import WAIT_FOR_JOB, Jobs, require_not_over
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -122,8 +120,7 @@ class SharedJobs(Jobs):
     def cancel(self, job_id: int, *, by: str | None = None) -> Job:
         """See ``Jobs``."""
         with self._store.write() as session:
-            if require_job(session, job_id).state in (DONE, FAILED):
-                raise ConflictError(f"job {job_id} has already ended")
+            require_not_over(require_job(session, job_id))
             self._request_cancellation(session, [job_id])
             job = record_cancellation(session, require_job(session, job_id), by)
         self._announce_job_change(job)
@@ -251,6 +248,7 @@ class SharedJobs(Jobs):
         with self._changed:
             for run in self._queue.waiting:
                 self._queue = self._queue.without_run(run)
+            self._unwritten = {}
         if lost is not None:
             lost.set()
 
@@ -260,18 +258,29 @@ class SharedJobs(Jobs):
             for kind, keep in KEPT.items():
                 delete_oldest_jobs(session, kind, keep)
             for job in read_jobs(session, states=(RUNNING,), limit=MOST):
-                ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
-                update_job(
-                    session, job.id, **(ended if job.ending else self._build_recovered_columns(job))
-                )
+                update_job(session, job.id, **self._build_recovered_columns(job))
 
     def _enqueue_waiting_jobs(self) -> None:
         with self._store.read_for_one_statement() as session:
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._apply_cancellation(job)
+            if job.state == RUNNING and job.ending:
+                self._end_job_without_run(job.id)
             if job.state == WAITING and all(run.job.id != job.id for run in self._queue.all_runs):
                 self._enqueue_job(job)
+
+    def _end_job_without_run(self, job_id: int) -> None:
+        """End a job that shall end and that nobody works on, as where its end could not be written."""
+        if job_id in self._unwritten or self._queue.find_running(job_id) is not None:
+            return
+        with self._store.write() as session:
+            job = read_job(session, job_id)
+            if job is None or job.state != RUNNING or self._queue.find_running(job_id) is not None:
+                return
+            update_job(session, job_id, **self._build_recovered_columns(job))
+            job = require_job(session, job_id)
+        self._announce_job_change(job)
 
     def _apply_cancellation(self, job: Job) -> None:
         run = self._queue.find_running(job.id)
@@ -324,6 +333,11 @@ class SharedJobs(Jobs):
             job = require_job(session, run.job.id)
         self._announce_job_change(job)
         return True
+
+    def _write_missed_ends(self) -> None:
+        """See ``Jobs``."""
+        if self._alone or self.is_leader():
+            super()._write_missed_ends()
 
     def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         if self._alone or self.is_leader():

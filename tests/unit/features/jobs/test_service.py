@@ -25,7 +25,7 @@ from app.errors import (
 from app.features.imports.ingest import ensure_dataset
 from app.features.jobs import runner as module
 from app.features.jobs.job_run import JobProgress
-from app.features.jobs.queries import Job, NewJob, insert_job
+from app.features.jobs.queries import Job, NewJob, insert_job, update_job
 from app.features.jobs.service import Jobs
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from tests.unit.features.jobs.steps import Gate, submit
@@ -264,6 +264,52 @@ class TestCancel:
         with pytest.raises(NotFoundError):
             jobs.cancel(job.id + 1)
 
+    def test_of_one_that_runs_is_kept_where_the_server_dies_before_its_next_step(
+        self, store: Store
+    ) -> None:
+        dying, later = Jobs(store), Jobs(store)
+        started, finish = threading.Event(), threading.Event()
+
+        def take_no_step(_progress: JobProgress) -> Json:
+            started.set()
+            assert finish.wait(SECONDS)
+
+        job = submit(dying, take_no_step, kind="import")
+        assert started.wait(SECONDS)
+        dying.cancel(job.id, by="ann")
+        later.register_resume("import", lambda _: 7)
+        later.start()
+        assert later.wait(job.id, SECONDS).state == "cancelled"
+        assert later.is_idle()
+        finish.set()
+        dying.close()
+
+    def test_of_what_ends_with_other_work_is_kept_with_it(self, store: Store) -> None:
+        dying, later = Jobs(store), Jobs(store)
+        started, finish = threading.Event(), threading.Event()
+
+        def take_no_step(_progress: JobProgress) -> Json:
+            started.set()
+            assert finish.wait(SECONDS)
+
+        running = submit(dying, take_no_step, kind="import")
+        assert started.wait(SECONDS)
+        waiting = submit(dying, lambda _: 7, kind="import")
+        with store.write() as session:
+            dying.cancel_on_commit(session, [running.id, waiting.id])
+        later.register_resume("import", lambda _: 7)
+        later.start()
+        assert [later.get(job.id).state for job in (running, waiting)] == ["cancelled"] * 2
+        finish.set()
+        dying.close()
+
+    def test_a_record_that_nobody_works_on_is_ended_at_once(self, jobs: Jobs, store: Store) -> None:
+        with store.write() as session:
+            job = insert_job(session, NewJob("import", "Import", "ann"))
+            update_job(session, job, state="running")
+        assert jobs.cancel(job, by="ann").state == "cancelled"
+        assert jobs.get(job).ended is not None
+
     def test_all_of_a_dataset_are_ended_and_no_others(self, jobs: Jobs, store: Store) -> None:
         one, other = ensure_dataset(store, "one", "ann"), ensure_dataset(store, "other", "ann")
         gate = Gate()
@@ -274,6 +320,42 @@ class TestCancel:
         jobs.cancel_all(one)
         assert [jobs.get(job.id).state for job in (running, waiting)] == ["cancelled"] * 2
         assert jobs.wait(kept.id, SECONDS).result == 7
+
+
+class TestEnd:
+    @pytest.fixture
+    def missed(self, jobs: Jobs, monkeypatch: pytest.MonkeyPatch) -> tuple[Job, Callable[[], None]]:
+        """A job that is over and of which that cannot be written, until the function is called."""
+        monkeypatch.setattr(module, "END_TRIES", 1)
+        monkeypatch.setattr(module, "LOOK_SECONDS", 0.05)
+        whole = jobs._save_end
+
+        def fail(*_arguments: Any, **_values: Any) -> Job | None:
+            raise StorageError("the disk is full")
+
+        monkeypatch.setattr(jobs, "_save_end", fail)
+        job = submit(jobs, lambda _: 7)
+        jobs.wait(job.id, SECONDS)
+        until(jobs.is_idle)
+        assert jobs.get(job.id).state == "running"
+        return job, lambda: monkeypatch.setattr(jobs, "_save_end", whole)
+
+    def test_that_cannot_be_written_is_written_later(
+        self, jobs: Jobs, missed: tuple[Job, Callable[[], None]]
+    ) -> None:
+        job, mend = missed
+        mend()
+        until(lambda: jobs.get(job.id).state == "done")
+        assert jobs.get(job.id).result == 7
+
+    def test_that_was_not_written_yet_is_no_job_to_cancel(
+        self, jobs: Jobs, missed: tuple[Job, Callable[[], None]]
+    ) -> None:
+        job, mend = missed
+        mend()
+        with pytest.raises(ConflictError):
+            jobs.cancel(job.id, by="ann")
+        assert jobs.get(job.id).state == "done"
 
 
 def job_that_servers_died_at(store: Store, deaths: int) -> int:

@@ -10,7 +10,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, JobCancelled
 from app.features.jobs.job_run import JobProgress
-from app.features.jobs.queries import Job, update_job
+from app.features.jobs.queries import Job, NewJob, insert_job, update_job
 from app.features.jobs.shared import SharedJobs
 from tests.waiting import SECONDS
 
@@ -127,6 +127,17 @@ class TestSharedJobs:
         work.go_on.release()
         assert leads.wait(second.id, SECONDS).state == "done"
         assert work.times == 1
+
+    def test_a_record_that_nobody_works_on_is_ended_by_who_leads(
+        self, opened: Open, work: Work, store: Store
+    ) -> None:
+        asked, leads = opened(), opened()
+        leads.start()
+        with store.write() as session:
+            job = insert_job(session, NewJob("solve", "Solve", "ann"))
+            update_job(session, job, state="running")
+        asked.cancel(job, by="ann")
+        assert leads.wait(job, SECONDS).state == "cancelled"
 
     def test_what_runs_writes_nothing_after_it_was_told_to_end_elsewhere(
         self, store: Store, opened: Open, work: Work
