@@ -6,10 +6,11 @@ import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import cv2
 import numpy as np
@@ -36,6 +37,7 @@ _CACHE_VERSION = 2
 frames of videos are found by their times."""
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes in which a header is looked for; a JPEG may have a small picture and a profile before it."""
+_CHUNK = 1 << 20
 _DECODED_BYTES = 6
 """Of a pixel while it is decoded: three channels of 16 bits at most."""
 
@@ -229,17 +231,24 @@ def make_video_stamp(media: Media) -> str:
     return make_frame_stamp(replace(media, frame=None))
 
 
-def read_media_size_and_crc(media: Media) -> dict[str, int]:
+def read_media_size_and_crc(media: Media, whole: bool = False) -> dict[str, int]:
     """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone.
 
     Empty, too, of a frame in an object store: it is known by its address.
+
+    Args:
+        media: Where it lies.
+        whole: Read a picture that is a file of its own for its CRC-32; videos are too large for that.
     """
     if is_in_object_store(media):
         return {}
     try:
         status = _require_regular_file(Path(media.path))
         if media.member is None:
-            return {"bytes": status.st_size}
+            size = {"bytes": status.st_size}
+            if not whole or media.frame is not None:
+                return size
+            return {**size, "crc32": _read_crc(Path(media.path))}
         size, crc = _ARCHIVES.read_size_and_crc(Path(media.path), media.member)
     except (NotFoundError, ImageError, StorageError):
         return {}
@@ -305,9 +314,23 @@ def _read_first_bytes(media: Media, count: int) -> bytes:
 
 
 def _read_file(path: Path, count: int) -> bytes:
+    with _open_file(path) as file:
+        return file.read(count)
+
+
+def _read_crc(path: Path) -> int:
+    crc = 0
+    with _open_file(path) as file:
+        while chunk := file.read(_CHUNK):
+            crc = zlib.crc32(chunk, crc)
+    return crc
+
+
+@contextlib.contextmanager
+def _open_file(path: Path) -> Iterator[IO[bytes]]:
     try:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            return file.read(count)
+            yield file
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 

@@ -366,7 +366,7 @@ class ExportImageWriter:
             )
         if self._images == "none":
             return
-        if frozen and frozen != read_media_size_and_crc(media):
+        if frozen and frozen != read_media_size_and_crc(media, whole="crc32" in frozen):
             self._note_missing(group, view, "not the file that was frozen")
             return
         try:

@@ -414,7 +414,7 @@ def _select_dismissed_findings(findings: Sequence[Finding], dismissals: GroupDis
 
 def _collect_media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
     return {
-        view.key: read_media_size_and_crc(view.media)
+        view.key: read_media_size_and_crc(view.media, whole=True)
         for view in group.views
         if view.media is not None
     }

@@ -383,6 +383,12 @@ class TestMediaFacts:
         }
         assert read_media_size_and_crc(Media(str(file))) == {"bytes": len(PNG)}
 
+    def test_a_picture_of_its_own_is_read_for_its_checksum_and_a_video_is_not(self, file) -> None:
+        read = {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
+        assert read_media_size_and_crc(Media(str(file)), whole=True) == read
+        film = Media(str(file), frame=3)
+        assert read_media_size_and_crc(film, whole=True) == {"bytes": len(PNG)}
+
     def test_a_missing_file_has_no_facts(self, tmp_path, archive) -> None:
         assert read_media_size_and_crc(Media(str(tmp_path / "gone.png"))) == {}
         assert read_media_size_and_crc(Media(str(archive), "gone.png")) == {}

@@ -251,6 +251,22 @@ class TestEveryFormat:
         pictures = [file for file in on_disk(tmp_path / "frozen") if is_picture(file)]
         assert len(pictures) == 6
 
+    def test_a_version_takes_no_other_picture_of_the_same_size(
+        self, store, fill, tmp_path: Path
+    ) -> None:
+        groups = made("alike", tmp_path / "in")
+        for group_id in fill(*groups):
+            etag = load_group_state(store, group_id).etag
+            set_verdict(store, group_id, "accepted", None, "known", if_match=etag, actor="ann")
+        freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
+        picture = next(Path(view.media.path) for view in groups[0].views if view.media)
+        picture.write_bytes(picture.read_bytes()[:-1] + b"?")
+        out = tmp_path / "out"
+        report = export_dataset(
+            store, "demo", "coco", out, images="copy", views="all", version="v1"
+        )
+        assert len(report.missing_images) == 1
+
     @pytest.mark.parametrize("name", ["issia", "issia-3d"])
     def test_views_of_one_camera_that_differ_in_it_are_named_together(
         self, store, fill, tmp_path: Path, name: str
