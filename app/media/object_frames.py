@@ -202,9 +202,10 @@ def _fetch_object(media: Media, settings: Settings) -> bytes:
     try:
         data = _read_object_or_member(store, key, media.member, etag, settings)
     except ChangedObjectError:
-        if etag:
+        if etag and media.member is None:
             raise
-        # The zip is another than that whose list is known here; its member may be the same.
+        # The zip is another than that whose list is known here: its member may be the same, or the
+        # zip of then may be back.
         _make_stored_zip_path.cache_clear()
         data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:

@@ -247,6 +247,22 @@ class TestBadDays:
         with pytest.raises(NotFoundError, match="was changed in its store"):
             read_encoded_frame(media, None, False, settings)
 
+    def test_an_archive_that_was_put_back_is_read_again(
+        self, settings: Settings, tree: Path, tmp_path: Path
+    ) -> None:
+        store = fill_store(settings, tree, "back")
+        media = first_media(settings, "s3://frames/back")
+        name = media.path.partition("#")[0].removeprefix("s3://frames/")
+        first = store.read_whole(name, 10**9)[0]
+        with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
+            archive.writestr("7.png", b"x")
+        store.put(name, (tmp_path / "other.zip").read_bytes())
+        with pytest.raises(NotFoundError, match="was changed in its store"):
+            read_encoded_frame(media, None, False, settings)
+        store.put(name, first)
+        picture = read_encoded_frame(media, None, False, settings)
+        assert guess_content_type(picture) == "image/png"
+
     def test_an_object_that_is_gone_is_said_to_be_gone(
         self, settings: Settings, picture_object: Media
     ) -> None:
