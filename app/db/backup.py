@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import shutil
+import time
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +30,7 @@ from app.db.dialects.dialect import (
     make_engine,
     translate_storage_errors,
 )
-from app.db.home import is_half_written, make_file_access_error
+from app.db.home import find_last_write_time, is_half_written, make_file_access_error
 from app.db.locks import DatabaseOpenLock
 from app.db.log import verify_chain
 from app.db.recovery.anchor import (
@@ -50,6 +51,8 @@ FRAMES = ("uploads", "recordings", "sample", "practice")
 EXPORTS = ("exports",)
 _CHUNK = 1 << 20
 _QUICK = 1
+_ABANDONED_S = 3600.0
+"""A folder in which nothing began for so long, and that nobody has locked, is a killed run's."""
 _COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
 """Tables whose rows a backup counts."""
 
@@ -257,7 +260,8 @@ def _require_writable_destination(out: Path, replace: bool) -> None:
 
 @contextmanager
 def _temporary_folder(out: Path) -> Iterator[Path]:
-    """A folder beside the backup, gone at the end; what a killed run left in it goes first."""
+    """A folder beside the backup, gone at the end; what killed runs left goes first."""
+    _delete_abandoned_folders(out.parent)
     folder = out.with_name(f".{out.name}{PARTIAL}")
     folder.mkdir(mode=0o700, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
@@ -273,6 +277,22 @@ def _temporary_folder(out: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         os.close(handle)
+
+
+def _delete_abandoned_folders(parent: Path) -> None:
+    """Delete folders of backups of any name that were killed; a run that is at one holds its lock."""
+    for folder in parent.glob(f".*.zip{PARTIAL}"):
+        written = find_last_write_time(folder)
+        # One that began this moment may not have its lock yet.
+        if written is None or written > time.time() - _ABANDONED_S:
+            continue
+        with suppress(OSError):
+            handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(folder, ignore_errors=True)
+            finally:
+                os.close(handle)
 
 
 def _copy_database(settings: Settings, copy: Path) -> None:

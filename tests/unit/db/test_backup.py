@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
+import os
 import zipfile
 from contextlib import closing
 from pathlib import Path
@@ -181,6 +183,21 @@ class TestBackUp:
         (left / "touchline.db").write_bytes(b"half")
         back_up_home(own_store.settings, tmp_path / "b.zip")
         assert not left.exists()
+
+    def test_what_killed_ones_of_other_names_left_goes_with_the_next(
+        self, own_store: Store, tmp_path: Path
+    ) -> None:
+        old, held, new = (tmp_path / f".{name}.zip.partial" for name in ("old", "held", "new"))
+        for folder in (old, held, new):
+            folder.mkdir()
+            (folder / "touchline.db").write_bytes(b"half")
+        for path in (old, old / "touchline.db", held, held / "touchline.db"):
+            os.utime(path, (1, 1))
+        handle = os.open(held, os.O_RDONLY)
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        back_up_home(own_store.settings, tmp_path / "b.zip")
+        os.close(handle)
+        assert [folder.exists() for folder in (old, held, new)] == [False, True, True]
 
     def test_a_damaged_database_makes_no_backup(self, own_store: Store, tmp_path: Path) -> None:
         say(own_store, 40)
