@@ -11,14 +11,14 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from app.features.datasets import service as deletion
 from app.features.datasets import service as review
 from app.features.datasets.service import Dataset, DatasetContents, read_contents
-from app.features.jobs.queries import Job
+from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.policies.schemas import PolicyDocument
 from app.features.queue.service import summarize_groups
 from app.features.solve.jobs import request_solve_job
 from app.http.access import get_current_login
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees, Services
 from app.http.documents import Document, ListDocument, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
@@ -183,12 +183,18 @@ def delete_dataset(
     """
     contents = read_contents(services.store, dataset)
     if not dry_run:
-        exports = services.jobs.list_job_ids(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
+            # First, so that none is left of a dataset that is gone where the server dies.
+            _delete_exports(services, contents.id)
         contents = deletion.delete_dataset(
             services.store, contents.id, confirm=request.confirm, actor=actor
         )
-        for export in exports:
-            services.exports.delete_export(str(export))
+        # Of those that were asked for meanwhile.
+        _delete_exports(services, contents.id)
     return contents
+
+
+def _delete_exports(services: Services, number: int) -> None:
+    for export in services.jobs.list_job_ids(dataset_id=number, kind=EXPORT):
+        services.exports.delete_export(str(export))

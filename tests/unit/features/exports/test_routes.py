@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from app.errors import StorageError
 from app.features.datasets.service import dataset_id
 from app.features.exports import routes as module
 from app.features.exports.service import ExportReport
@@ -215,6 +216,23 @@ class TestGetContent:
         for name in (other.id, 99, "x", "0" * 32, "1" * 30):
             assert api.get(f"{API}/{name}/content").status_code == 404
             assert api.get(f"{API}/{name}").status_code == 404
+
+
+class TestDeleteDataset:
+    def test_leaves_no_export_where_it_is_stopped_half_way(
+        self, app, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.get(job["content"]).status_code == 200
+
+        def fail(*_arguments: Any, **_options: Any) -> None:
+            raise StorageError("the disk is full")
+
+        monkeypatch.setattr("app.features.datasets.service.delete_dataset", fail)
+        confirmed = {"confirm": ORDER["dataset"]}
+        answer = api.request("DELETE", f"/api/v1/datasets/{ORDER['dataset']}", json=confirmed)
+        assert not answer.is_success
+        assert list(app.state.services.exports.folder.iterdir()) == []
 
 
 class TestExportsOfEarlierJobs:
