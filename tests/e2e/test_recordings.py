@@ -131,6 +131,15 @@ SLOW = {"downloadThroughput": -1, "uploadThroughput": 4e6, "latency": 0}
 class TestSending:
     """Uploads go on where they were."""
 
+    @pytest.fixture(autouse=True)
+    def _without_uploads_of_others(self, server: str) -> None:
+        """The page shows all that are under way, and tests share the server."""
+        uploads = f"{server}/api/v1/uploads"
+        for one in httpx.get(uploads).json()["items"]:
+            if not one["kept"]:
+                gone = httpx.delete(f"{uploads}/{one['id']}")
+                assert gone.is_success, gone.text
+
     @pytest.fixture
     def films(self, film: Path, tmp_path: Path) -> list[Path]:
         """Two videos, the first of 30 MB: readers pass over what follows its boxes."""
