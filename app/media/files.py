@@ -245,10 +245,10 @@ def read_media_size_and_crc(media: Media, whole: bool = False) -> dict[str, int]
     try:
         status = _require_regular_file(Path(media.path))
         if media.member is None:
-            size = {"bytes": status.st_size}
-            if not whole or media.frame is not None:
-                return size
-            return {**size, "crc32": _read_crc(Path(media.path))}
+            facts = {"bytes": status.st_size}
+            if whole and media.frame is None:
+                facts["crc32"] = _read_crc(Path(media.path))
+            return facts
         size, crc = _ARCHIVES.read_size_and_crc(Path(media.path), media.member)
     except (NotFoundError, ImageError, StorageError):
         return {}

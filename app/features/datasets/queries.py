@@ -399,8 +399,9 @@ def _find_paths_in_use(session: Session) -> set[Path]:
     found = {*session.scalars(statement), *session.scalars(select(RecordingModel.path))}
     frozen = select(VersionGroupModel.frames).where(VersionGroupModel.frames.is_not(None))
     # A group may be gone, or have other frames by now; its versions are exported with theirs.
-    for frames in session.scalars(frozen.execution_options(yield_per=BATCH)):
-        found |= {frame["path"] for frame in decompress_json(frames).values() if "path" in frame}
+    for body in session.scalars(frozen.execution_options(yield_per=BATCH)):
+        frames = decompress_json(body or b"").values()
+        found |= {frame["path"] for frame in frames if "path" in frame}
     return {Path(path) for path in found if path and not is_address(path)}
 
 

@@ -268,8 +268,10 @@ def _request_rig_adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: st
         if not has_more_groups(session, dataset_id, RIG_FRAMES):
             return None
     try:
-        nothing = {"what": None, "inputs": None}
-        return RIG.request(jobs, store, dataset_id, actor=actor, follows=True, **nothing).id
+        job = RIG.request(
+            jobs, store, dataset_id, actor=actor, follows=True, what=None, inputs=None
+        )
+        return job.id
     except (InputError, ConflictError):
         return None
 

@@ -224,8 +224,14 @@ def adjust_rig(
     were used and on instants that were held out. With `accept` and the `inputs` of the
     proposal that was looked at it is saved as an edit of each camera.
     """
-    subject = {"what": request.accept, "inputs": request.inputs}
-    return RIG.request(services.jobs, services.store, dataset, actor=actor, **subject)
+    return RIG.request(
+        services.jobs,
+        services.store,
+        dataset,
+        actor=actor,
+        what=request.accept,
+        inputs=request.inputs,
+    )
 
 
 def _make_take_back_response(count: int) -> Response:
