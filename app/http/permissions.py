@@ -224,15 +224,14 @@ def is_any_mention_hidden(store: Store, owned: list[OwnedMention]) -> bool:
 
 def needs_database(subject: RequestSubject, login: Login) -> bool:
     """Whether ``require_allowed`` has to ask the database."""
-    named = (mention.named for mention in subject.mentions)
-    return not login.roles.is_admin and any(_needs_ownership(one, login.roles) for one in named)
+    return bool(subject.mentions) and not login.roles.is_admin
 
 
 def _find_owned_mentions(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMention]:
     """Where everything is that a request mentions.
 
-    Each is found by one indexed statement, and none is asked for where it decides nothing: an
-    admin sees everything, and who is the same everywhere is so there.
+    Each is found by one indexed statement; an admin, who sees everything, is asked for none. Who is
+    the same everywhere is not so in what belongs to others alone: their copies and practice.
     """
     if login.roles.is_admin:
         return []
@@ -240,7 +239,7 @@ def _find_owned_mentions(store: Store, subject: RequestSubject, login: Login) ->
     visibility = login.visibility
     # What a query names comes first: it says which of the versions of a name is meant.
     for mention in sorted(subject.mentions, key=lambda item: item.place != "query"):
-        ownership = _find_ownership_if_needed(store, mention.named, login, visibility)
+        ownership = _find_visible_ownership(store, mention.named, login, visibility)
         if mention.place == "query" and ownership is not None and ownership.dataset is not None:
             visibility = Visibility(False, frozenset({ownership.dataset}), login.ownership_name)
         found.append(OwnedMention(mention, ownership))
@@ -263,7 +262,12 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
     for item in owned:
         if item.mention.named.kind is OwnedKind.NEW_DATASET:
             _require_create_permission(item.ownership, roles, action)
-        elif item.ownership is not None:
+        elif item.ownership is None:
+            same = not roles.single and item.mention.named.kind not in OWNED
+            if same and roles.everywhere is not Role.NONE:
+                # Wherever it were they might not: that is said of what is there and what is not.
+                require_permission(roles.everywhere, action)
+        else:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = find_role_by_ownership(item.ownership, roles, login.ownership_name)
             require_permission(role, action, here)
@@ -320,28 +324,15 @@ def _require_create_permission(
     )
 
 
-def _find_ownership_if_needed(
+def _find_visible_ownership(
     store: Store, named: NamedResource, login: Login, visibility: Visibility
 ) -> Ownership | None:
-    roles: DatasetRoles = login.roles
-    if not _needs_ownership(named, roles):
-        return (
-            None
-            if roles.everywhere is Role.NONE
-            else Ownership(None, frozenset({login.ownership_name}))
-        )
     found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
-    hidden = find_role_by_ownership(
-        found, roles, login.ownership_name
-    ) is Role.NONE or is_hidden_from(store, named, found, login.restricted_reader)
+    role = find_role_by_ownership(found, login.roles, login.ownership_name)
+    hidden = role is Role.NONE or is_hidden_from(store, named, found, login.restricted_reader)
     return None if hidden else found
-
-
-def _needs_ownership(named: NamedResource, roles: DatasetRoles) -> bool:
-    """Whether it matters where something is: who is the same everywhere is so there."""
-    return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
 
 def _list_mentions(
@@ -359,16 +350,15 @@ def _list_mentions(
             yield from _make_mention("query", name, names[name], value)
     for name, kind in permission.body.items():
         found = None if kind is OwnedKind.FOLDER else _get_body_field(body, name)
-        if isinstance(found, str if kind in TEXTS else int) and not isinstance(found, bool):
+        if found is not None:
             yield from _make_mention("body", name, kind, found)
 
 
-def _make_mention(
-    place: str, name: str, kind: OwnedKind, value: str | int
-) -> Iterator[RequestMention]:
-    """Nothing for what is no id: the route refuses it by the same rule."""
+def _make_mention(place: str, name: str, kind: OwnedKind, value: Any) -> Iterator[RequestMention]:
+    """Nothing for what is no id: the route refuses it by the same rule, or a stricter one."""
     if kind in TEXTS:
-        yield RequestMention(place, name, NamedResource(kind, value))
+        if isinstance(value, str):
+            yield RequestMention(place, name, NamedResource(kind, value))
         return
     try:
         yield RequestMention(place, name, NamedResource(kind, _ID.validate_python(value)))

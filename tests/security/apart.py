@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -25,6 +26,7 @@ from app.features.people.logins import LoginSessions
 from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Role
 from app.features.people.service import give_role, invite
+from app.features.people.visibility_queries import COPIES
 from app.features.recordings.queries import insert_recording
 from app.features.solutions.service import solve_dataset
 from app.main import create_app
@@ -102,9 +104,7 @@ def mentioned(row: Row) -> list[Mentioned]:
 
 def _one(field: str) -> bool:
     """Without those that are another name of the same kind of field."""
-    return field not in (
-        "options/lines/upload",
-        "options/frames/upload",
+    return not field.startswith("options/") and field not in (
         "images_upload",
         "cameras_upload",
         "careful",
@@ -143,20 +143,27 @@ class Apart:
             sent["Content-Type"] = "application/octet-stream" if plain else "application/json"
         return self.client.request(method, API + target, content=content, headers=sent)
 
-    def answer(self, name: str, row: Row, where: Mapping[str, str]) -> Any:
+    def answer(
+        self,
+        name: str,
+        row: Row,
+        where: Mapping[str, str],
+        instead: Mapping[str, Any] = MappingProxyType({}),
+    ) -> Any:
         """The answer to a route, each of whose fields names something of a dataset, or nothing.
 
         Args:
             name: Who asks.
             row: The route.
             where: ``mine``, ``theirs`` or ``""`` (nothing) by name of the field.
+            instead: What is sent in a field, whatever ``where`` says of it.
         """
         path = {"prediction": str(NO_ID), "user": str(NO_ID), "figure": "sensitivity"}
         path |= {"table": "sensitivity", "ending": "csv", "digest": "0" * 64}
         query: list[str] = ["against=nothing"] if row.path.endswith("/diff") else []
         body: Any = json.loads(json.dumps(BODIES.get(str(row), [])))
         for item in mentioned(row):
-            value = self.value(item.kind, where[item.field])
+            value = instead.get(item.field, self.value(item.kind, where[item.field]))
             if item.place == "path":
                 path[item.field] = str(value)
             elif item.place == "query":
@@ -206,6 +213,31 @@ class Apart:
             found[OwnedKind.VIEW] = document["views"][0]["id"]
             found[OwnedKind.STATION] = document["views"][0]["station"]["id"]
             self._fill(name, rows)
+
+    def fill_hidden(self, where: str, group: int) -> None:
+        """What somebody has for themselves alone, in the dataset of one of their groups."""
+        document = self.ask("admin", "GET", f"/groups/{group}").json()
+        dataset, view = document["dataset"]["id"], document["views"][0]
+        assert dataset > COPIES
+        at, named = f"/datasets/{dataset}", {"name": f"of {where}"}
+        with self.store.write() as session:
+            recording = insert_recording(session, dataset, "film", f"/{where}.mp4", actor="admin")
+            track = insert_bare_track(session, dataset, "stretch")
+        query = {**named, "q": "status:unreviewed"}
+        saved = self.ask("admin", "POST", f"{at}/saved-views", query).json()["id"]
+        work = self.ask("admin", "POST", f"{at}/batches", {**named, "skip_given": False}).json()
+        found = {
+            OwnedKind.DATASET: str(dataset),
+            OwnedKind.GROUP: group,
+            OwnedKind.VIEW: view["id"],
+            OwnedKind.STATION: view["station"]["id"],
+            OwnedKind.RECORDING: recording,
+            OwnedKind.TRACK: track,
+            OwnedKind.SAVED_VIEW: saved,
+            OwnedKind.WORK: work["id"],
+        }
+        assert all(found.values()), found
+        self.ids[where] = {kind: self.value(kind, "") for kind in OwnedKind} | found
 
     def _fill(self, name: str, rows: str) -> None:
         found, at = self.ids[name], f"/datasets/{name}"

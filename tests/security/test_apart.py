@@ -8,10 +8,16 @@ from typing import Any
 
 import pytest
 
+from app.features.datasets.queries import list_group_ids
+from app.features.datasets.service import insert_dataset
+from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.people.ownership import OwnedKind
+from app.features.people.queries import find_person_by_name, set_dataset_role
 from app.features.people.roles import Action, Role
+from app.soccer.policy import TOUCHLINE
 from tests.openapi import openapi_of
+from tests.scenes import make_scenes
 from tests.security.apart import (
     API,
     MINE,
@@ -19,11 +25,13 @@ from tests.security.apart import (
     PERMISSIONS,
     THEIRS,
     Apart,
+    Mentioned,
     mentioned,
     opened,
 )
 from tests.security.table import Row, body_model, places_of_files, rows
 
+COPY, PRACTICE = "a copy", "a practice"
 RANKS = [role.value for role in Role]
 DATA = [
     row
@@ -46,7 +54,28 @@ def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
         for role in ("viewer", "annotator", "reviewer", "lead"):
             made.add(role, Role.NONE, **{MINE: Role(role)})
         made.add("all-but", Role.LEAD, **{THEIRS: Role.NONE})
+        # With the same role in every dataset, and nothing of their own.
+        for role in ("annotator", "reviewer", "lead"):
+            made.add(f"{role}-everywhere", Role(role))
+        made.add("owner", Role.ANNOTATOR)
+        copy = made.ask("owner", "POST", "/groups/1/independent-annotations").json()
+        made.fill_hidden(COPY, copy["group"])
+        made.fill_hidden(PRACTICE, insert_practice_group(made, "owner"))
         yield made
+
+
+def insert_practice_group(apart: Apart, person: str) -> int:
+    """Id of the group of a dataset in which a person practises."""
+    name = f"practice {person}"
+    with apart.store.write() as session:
+        made = insert_dataset(session, name, TOUCHLINE, person, hidden=True)
+        row = find_person_by_name(session, person)
+        assert row is not None
+        set_dataset_role(session, row.id, made, Role.LEAD, by=person)
+    group = make_scenes(groups=1, seed=4, faults=False)[0].group
+    import_groups(apart.store, name, [group], source="files", actor=person)
+    with apart.store.read() as session:
+        return list_group_ids(session, made)[0]
 
 
 def plain(answer: Any, apart: Apart, where: str) -> tuple[int, str]:
@@ -56,6 +85,21 @@ def plain(answer: Any, apart: Apart, where: str) -> tuple[int, str]:
         value = str(apart.value(kind, where))
         text = re.sub(rf"(?<![\w-]){re.escape(value)}(?![\w-])", "*", text)
     return answer.status_code, text
+
+
+def fields_of(schemas: dict[str, Any], schema: Any, way: tuple[str, ...] = ()) -> Iterator[str]:
+    """The fields of a body, those of its objects and lists too: ``source/upload``."""
+    if len(way) > 5 or not isinstance(schema, dict):
+        return
+    if "$ref" in schema:
+        schema = schemas[schema["$ref"].rpartition("/")[2]]
+    for word in ("anyOf", "oneOf", "allOf"):
+        for one in schema.get(word, []):
+            yield from fields_of(schemas, one, way)
+    yield from fields_of(schemas, schema.get("items"), way)
+    for name, inner in schema.get("properties", {}).items():
+        yield "/".join((*way, name))
+        yield from fields_of(schemas, inner, (*way, name))
 
 
 class TestLists:
@@ -122,13 +166,34 @@ class TestMatrix:
             for name in ("viewer", "lead", "all-but"):
                 told = []
                 for where in (THEIRS, ""):
-                    named = {one.field: MINE for one in mentioned(row)} | {item.field: where}
-                    if item.field == "dataset" and item.place == "query" and row.kind != "change":
-                        named = dict.fromkeys(named, where)
-                    told.append(plain(apart.answer(name, row, named), apart, where))
+                    told.append(self.ask_one(apart, name, row, item, where))
                 assert told[0] == told[1], (row, item, name)
                 assert told[0][0] in (403, 404, 422, 428), (row, item, name, told)
                 assert told[0][0] != 403 or name == "viewer", (row, item, name, told)
+
+    @pytest.mark.parametrize("row", ABOUT, ids=str)
+    def test_what_others_have_for_themselves_is_as_what_is_not_there(
+        self, apart: Apart, row: Row
+    ) -> None:
+        """Copies and practice, for whoever has the same role in every dataset."""
+        for item in mentioned(row):
+            if item.kind is OwnedKind.NEW_DATASET:
+                continue
+            for name in ("annotator-everywhere", "reviewer-everywhere", "lead-everywhere"):
+                nothing = self.ask_one(apart, name, row, item, "")
+                # Leads see the copies of what they lead.
+                for whose in (PRACTICE,) if name == "lead-everywhere" else (COPY, PRACTICE):
+                    found = self.ask_one(apart, name, row, item, whose)
+                    assert found == nothing, (row, item, name)
+                    assert found[0] in (403, 404, 422, 428), (row, item, name, found)
+
+    def ask_one(
+        self, apart: Apart, name: str, row: Row, item: Mentioned, where: str
+    ) -> tuple[int, str]:
+        named = {one.field: MINE for one in mentioned(row)} | {item.field: where}
+        if item.field == "dataset" and item.place == "query" and row.kind != "change":
+            named = dict.fromkeys(named, where)
+        return plain(apart.answer(name, row, named), apart, where)
 
     @pytest.mark.parametrize("row", sorted(ABOUT, key=lambda row: row.method == "DELETE"), ids=str)
     def test_ones_own_is_there_for_whom_the_role_suffices(self, apart: Apart, row: Row) -> None:
@@ -162,6 +227,28 @@ class TestMatrix:
             assert answer.status_code == (403 if refused else told), (row, answer.text)
             assert THEIRS not in answer.text, (row, answer.text)
 
+    @pytest.mark.parametrize("name", ["viewer", "lead", "lead-everywhere"])
+    def test_an_id_in_a_body_is_of_no_other_type_than_it_is_said(
+        self, apart: Apart, name: str
+    ) -> None:
+        """Another writing of an id lets nobody come by what they do not see, nor by their own."""
+        looked = 0
+        for row in ABOUT:
+            for item in mentioned(row):
+                if item.place != "body":
+                    continue
+                for where in (MINE, THEIRS):
+                    value = apart.value(item.kind, where)
+                    others = [[value], {"id": value}, True]
+                    others += [str(value), float(value)] if isinstance(value, int) else [1, 1.0]
+                    for other in others:
+                        named = {one.field: MINE for one in mentioned(row)}
+                        answer = apart.answer(name, row, named, {item.field: other})
+                        told = (row, item, other, answer.text)
+                        assert answer.status_code in (403, 404, 422), told
+                        looked += 1
+        assert looked > 50
+
 
 class TestNewDatasets:
     def test_whoever_leads_one_dataset_makes_no_other_and_learns_of_none(
@@ -178,6 +265,16 @@ class TestNewDatasets:
         assert apart.ask("lead", "POST", "/imports", {"dataset": MINE, **body}).status_code == 202
         taken = apart.ask("all-but", "POST", "/imports", {"dataset": THEIRS, **body})
         assert (taken.status_code, "in which you have no role" in taken.text) == (403, True)
+
+    @pytest.mark.parametrize("option", ["lines", "frames"])
+    def test_the_file_of_an_option_is_ones_own(self, apart: Apart, option: str) -> None:
+        mine = apart.ask("lead", "POST", "/uploads?name=c.zip", b"PK").json()["id"]
+        theirs = apart.value(OwnedKind.UPLOAD, THEIRS)
+        body = {"dataset": MINE, "format": "issia", "source": {"upload": mine}, "dry_run": True}
+        told = apart.ask(
+            "lead", "POST", "/imports", {**body, "options": {option: {"upload": theirs}}}
+        )
+        assert (told.status_code, "there is no upload" in told.text) == (404, True), told.text
 
     def test_folders_of_the_operator_are_for_leads_of_all_datasets(self, apart: Apart) -> None:
         upload = apart.ask("lead", "POST", "/uploads?name=b.zip", b"PK").json()["id"]
@@ -301,6 +398,9 @@ class TestPermissions:
         keys = {
             ("POST /api/v1/groups/{group}/threads", "view"),
             ("PUT /api/v1/groups/{group}/dismissal", "view"),
+            # Looked for in the dataset that the address names.
+            ("POST /api/v1/datasets/{dataset}/edits", "items/view"),
+            ("POST /api/v1/datasets/{dataset}/edits", "items/group"),
             # It chooses among tracks of the dataset; of any other batch there are none.
             ("GET /api/v1/datasets/{dataset}/tracks", "batch"),
         }
@@ -319,12 +419,13 @@ class TestPermissions:
                     if item["in"] == "query"
                 }
                 body = operation.get("requestBody", {}).get("content", {}).get("application/json")
-                if body and "$ref" in body["schema"]:
-                    name = body["schema"]["$ref"].rpartition("/")[2]
-                    named |= set(schemas[name].get("properties", {}))
+                if body:
+                    named |= set(fields_of(schemas, body["schema"]))
                 looked = {*permission.names, *permission.body}
                 things = {
-                    name for name in named if name in told or name.endswith(("upload", "_id"))
+                    name
+                    for name in named
+                    if name.rpartition("/")[2] in told or name.endswith(("upload", "_id"))
                 }
                 # The way to one's own file: the other things of the request are named by its path.
                 missed += [

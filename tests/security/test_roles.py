@@ -27,7 +27,7 @@ from app.http import access
 from app.http.pages import PAGES
 from app.http.route import list_routes
 from tests.security.asking import Answer, assert_guarded
-from tests.security.table import MISSING, TABLE, Row, rows
+from tests.security.table import TABLE, Row, rows
 from tests.security.team import API, BYTES, DEVICE, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
 from tests.waiting import SECONDS
 
@@ -42,7 +42,7 @@ LET_IN = {
     "stream": {200},
     "page": {200, 404},
     "change": {200, 404, 409, 422, 428},
-    "body": {422, 428},
+    "body": {404, 422, 428},
     "upload": {201, 404},
 }
 """How a route answers whom it lets in, by its kind: what is asked for is often not there, and
@@ -318,6 +318,15 @@ class TestSessions:
         links.set_password_by_link(team.store, link.token, "three other words")
         assert devices.recognise("guessed", token) is None, "it ends with its password"
 
+    def test_a_browser_stays_a_known_one_when_its_person_changes_the_password(
+        self, team: Team
+    ) -> None:
+        cookie = team.add("changes", Role.VIEWER)
+        change = {"old": SECRET, "new": "three other words"}
+        told = team.ask("PUT", f"{API}/session/password", change, Cookie=cookie)
+        token = cookie_in(told, DEVICE).partition("=")[2]
+        assert team.app.state.team.devices.recognise("changes", token)
+
     def test_a_link_sets_a_password_once_and_logs_in(self, team: Team) -> None:
         made = team.ask("POST", f"{API}/users", {"name": "new", "role": "viewer"}, role="admin")
         assert made.status == 201, made.body
@@ -350,8 +359,8 @@ class TestWhoActs:
         assert team.ask("GET", f"{API}/datasets", role="viewer", Origin="").status == 200
 
     def test_nobody_hides_behind_the_name_of_a_script(self, team: Team) -> None:
-        target = f"{API}/datasets/{MISSING}/saved-views"
-        body = {"name": "a", "q": ""}
+        ensure_dataset(team.store, "scripted", "local")
+        target, body = f"{API}/datasets/scripted/saved-views", {"name": "a", "q": ""}
         answer = team.ask("POST", target, body, role="annotator", X_Actor="bot")
         assert answer.status == 400
         assert b"is not accepted on a server with logins" in answer.body

@@ -25,7 +25,7 @@ from tests.security.sign_on_visitor import (
     name_in,
     session_in,
 )
-from tests.security.team import API, SECRET, cookie_in
+from tests.security.team import API, DEVICE, SECRET, cookie_in
 
 
 class TestComingIn:
@@ -77,6 +77,25 @@ class TestComingIn:
             "it began with the account"
         )
         assert_refused(visitor.enter(), word="no person here is linked")
+
+    def test_an_account_is_not_linked_with_whoever_gets_the_id_of_a_session_that_ended(
+        self, visitor: SignOnVisitor
+    ) -> None:
+        visitor.team.add("left", Role.LEAD)
+        visitor.team.add("next", Role.LEAD)
+        visitor.provider.who = {"sub": "s-left"}
+        cookie = cookie_in(visitor.team.log_in("left"))
+        own = f"{API}/session/identity"
+        begun = visitor.team.ask("POST", f"{own}/begin", {"password": SECRET}, Cookie=cookie)
+        told = visitor.back(json.loads(begun.body)["address"])
+        out = visitor.team.ask("DELETE", f"{API}/session", Cookie=cookie)
+        assert "touchline_sign_on=;" in out.headers["set-cookie"].replace('""', "")
+        other = cookie_in(visitor.team.log_in("next"))
+        assert_refused(visitor.finish(told, f"{cookie_in(begun)}; {other}"), 400, "has ended")
+
+    def test_a_browser_is_a_known_one_of_whoever_comes_in(self, visitor: SignOnVisitor) -> None:
+        visitor.join("known")
+        assert cookie_in(visitor.enter(), DEVICE).startswith(DEVICE)
 
     def test_the_first_admin_may_come_by_it(self, visitor: SignOnVisitor, monkeypatch: Any) -> None:
         monkeypatch.setattr("app.features.people.links.count_people_who_can_log_in", lambda *_: 0)

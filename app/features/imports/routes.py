@@ -74,6 +74,7 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
         "options/frames/upload": OwnedKind.UPLOAD,
         "source/folder": OwnedKind.FOLDER,
         "options/lines/folder": OwnedKind.FOLDER,
+        "options/frames/folder": OwnedKind.FOLDER,
         # Wherever a list of frames itself is, it names files of the operator's stores.
         "options/frames": OwnedKind.FOLDER,
     },

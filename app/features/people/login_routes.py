@@ -29,7 +29,7 @@ from app.features.people.schemas import (
     TeamSettings,
 )
 from app.features.people.second_factor import Enrolment, FactorState
-from app.features.people.session_routes import Me, make_session_document
+from app.features.people.session_routes import Me, give_session
 from app.http.cursor import paged
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, OwnedKind, may, open_to_all
@@ -146,8 +146,7 @@ def log_in_with_passkey(
     except NotLoggedInError:
         log.warning("a login with a passkey was refused", address=address)
         raise
-    response.set_cookie(**team.cookies.make_session_cookie(token))
-    return make_session_document(team.logins.find(token), store)
+    return give_session(team, store, response, token)
 
 
 second_factors_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)

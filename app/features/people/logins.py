@@ -104,6 +104,12 @@ class Login:
     """When it began."""
 
     @property
+    def session_key(self) -> str:
+        """What no other session is called, also when this one has ended: an id may come back."""
+        began = "" if self.created is None else format_utc_time(self.created)
+        return f"{self.person_id} {self.id} {began}"
+
+    @property
     def actor(self) -> str:
         """What the log calls them: a person, or a person with the name of a token."""
         return self.name if self.token is None else make_token_actor(self.name, self.token.name)

@@ -313,7 +313,7 @@ def _user_handle(person_id: int) -> bytes:
 
 
 def _session_challenge_key(login: Login) -> str:
-    return f"session {login.id}"
+    return f"session {login.session_key}"
 
 
 def _browser_challenge_key(asker: str) -> str:

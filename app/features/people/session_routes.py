@@ -159,6 +159,11 @@ def _begin_session(
         # Without the name: people type passwords into the wrong field.
         log.warning("a login was refused", address=address)
         raise
+    return give_session(team, store, response, token)
+
+
+def give_session(team: TeamLogin, store: Store, response: Response, token: str) -> SessionDocument:
+    """Give a browser the cookie of its new session, and let it be a known one of the person."""
     response.set_cookie(**team.cookies.make_session_cookie(token))
     login = team.logins.find(token)
     if login is None:
@@ -178,6 +183,8 @@ def log_out(
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookies.make_session_cookie(None))
+    # What somebody began here at the provider is not the next person's to finish.
+    response.set_cookie(**team.cookies.make_sign_on_cookie(None))
     return make_session_document(None, store)
 
 
@@ -200,8 +207,7 @@ def change_password(
     team.require_password_login_allowed()
     team.count_login_attempt(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
-    response.set_cookie(**team.cookies.make_session_cookie(token))
-    return make_session_document(me, store)
+    return give_session(team, store, response, token)
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
@@ -327,10 +333,7 @@ def finish_sign_on(
         return SignOnFinished(
             session=make_session_document(team.find_login(request), store), to=entered.to
         )
-    response.set_cookie(**team.cookies.make_session_cookie(entered.token))
-    return SignOnFinished(
-        session=make_session_document(team.logins.find(entered.token), store), to=entered.to
-    )
+    return SignOnFinished(session=give_session(team, store, response, entered.token), to=entered.to)
 
 
 @sign_on_router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))

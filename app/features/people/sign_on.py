@@ -57,7 +57,7 @@ class _PendingLogin:
         asked: What the provider was asked.
         to: The page to which they go then.
         link: The token of a link that they follow, and ``name``, which the first admin chooses.
-        session: Of whom an account is to be linked; None: somebody logs in.
+        session: The key of the session whose person links an account; None: somebody logs in.
         claims: What the provider said, where only the code of a second factor is still missing.
     """
 
@@ -66,7 +66,7 @@ class _PendingLogin:
     to: str
     link: str | None = None
     name: str | None = None
-    session: int | None = None
+    session: str | None = None
     claims: Mapping[str, Any] | None = None
 
     def to_json_bytes(self) -> bytes:
@@ -151,7 +151,7 @@ class SignOn:
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
             require_no_identity(session, login.person_id, self.rules)
-        return self._begin_login(asker, redirect, "/account", session=login.id)
+        return self._begin_login(asker, redirect, "/account", session=login.session_key)
 
     def finish(
         self,
@@ -319,7 +319,7 @@ class SignOn:
         return person_id
 
     def _link_account(self, begun: _PendingLogin, code: str, login: Login | None) -> SignOnResult:
-        if login is None or login.id != begun.session or login.token is not None:
+        if login is None or login.session_key != begun.session or login.token is not None:
             raise InputError(
                 "the session that wanted to link an account has ended", hint="Begin again."
             )

@@ -27,7 +27,7 @@ class LinkedLiveShot(BaseModel):
 class LinkedReplay(LinkedLiveShot):
     """A shot that shows it again, of the same recording or of another one of the dataset."""
 
-    recording: Annotated[int, Field(ge=1, le=MAX_ID)] = Field(
+    recording: Annotated[int, Field(strict=True, ge=1, le=MAX_ID)] = Field(
         description="Id of the recording of the replay."
     )
 

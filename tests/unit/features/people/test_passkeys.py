@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -195,6 +196,15 @@ class TestMaking:
         with pytest.raises(InputError, match="not accepted"):
             desk.passkeys.make(login, "phone", garbage, SITE)
         assert desk.passkeys.list_of_person(1) == []
+
+    def test_what_a_session_began_is_not_the_next_ones_with_its_id(self, desk: Desk) -> None:
+        desk.join("berta")
+        before = desk.login()
+        credential = desk.device.make(desk.passkeys.begin_creation(before, SECRET, SITE))
+        desk.logins.end(before, before.id)
+        after = replace(desk.login("berta"), id=before.id)
+        with pytest.raises(InputError, match="answered already"):
+            desk.passkeys.make(after, "phone", credential, SITE)
 
     def test_one_person_may_have_several_named_ones_and_none_has_two_owners(
         self, desk: Desk
