@@ -169,7 +169,7 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
             f" Touchline needs {needed} or later",
             hint="Install the version of pysqlite3 that requirements.txt requires.",
         )
-    engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
+    engine = create_engine(settings.database, module=pysqlite3.dbapi2, hide_parameters=True, **pool)
     engine.dialect.statement_compiler = _TableHintCompiler
     event.listen(engine, "connect", partial(_set_pragmas, lasting))
     event.listen(engine, "begin", _begin_transaction)

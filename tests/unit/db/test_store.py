@@ -419,6 +419,15 @@ class TestErrors:
         with pytest.raises(StorageError, match="not a database"):
             names(own_store)
 
+    def test_what_was_to_be_written_is_not_in_the_error_that_is_logged(
+        self, own_store: Store
+    ) -> None:
+        refused = text("INSERT INTO dataset (name) VALUES (:name)")
+        with pytest.raises(StorageError) as caught, own_store.write() as session:
+            session.execute(refused, {"name": "a secret"})
+        assert "INSERT" in f"{caught.value.__cause__}"
+        assert "a secret" not in f"{caught.value.__cause__}"
+
     def test_a_refused_statement_is_a_storage_error_that_shows_no_sql(
         self, own_store: Store
     ) -> None:
