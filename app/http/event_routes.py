@@ -11,6 +11,7 @@ from fastapi.responses import StreamingResponse
 
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import hides_groups_from_reader
+from app.http.access import get_current_login
 from app.http.deps import AppServices, SeesWhole, Services
 from app.http.event_stream import EVENTS, EventListener, make_first_event
 from app.http.permissions import Action, OwnedKind, RoleScope, may
@@ -40,9 +41,18 @@ STREAM: Responses = {
 }
 
 
-async def require_listener_slot(services: AppServices) -> Services:
+async def find_listening_person(request: Request) -> str | None:
+    """Who asks, themselves or by a token; None on a server without accounts."""
+    login = get_current_login(request.scope)
+    return None if login is None else login.name
+
+
+Listening = Annotated[str | None, Depends(find_listening_person)]
+
+
+async def require_listener_slot(services: AppServices, person: Listening) -> Services:
     """The services, unless as many listen as may: who is turned away costs the database nothing."""
-    services.events.require_free_slot()
+    services.events.require_free_slot(person)
     return services
 
 
@@ -93,17 +103,16 @@ class EventStreamStart:
 
 
 async def open_event_feed(
-    services: AppServices, visibility: SeesWhole, start: Annotated[EventStreamStart, Depends()]
+    services: AppServices,
+    visibility: SeesWhole,
+    person: Listening,
+    start: Annotated[EventStreamStart, Depends()],
 ) -> AsyncIterator[EventListener]:
     """A feed for as long as the request lasts."""
-    feed = services.events.subscribe(
-        start.dataset_id,
-        start.position,
-        resumed=start.resumed,
-        visibility=visibility,
-        began=start.newest,
-        numbered=start.numbered,
+    feed = EventListener(
+        start.dataset_id, start.position, visibility, start.newest, start.numbered, person
     )
+    services.events.subscribe(feed, resumed=start.resumed)
     try:
         yield feed
     finally:

@@ -46,6 +46,8 @@ POLL = 2.0
 """Seconds until the log is looked at for what other processes have committed and not told."""
 MAX_FEEDS = 100
 """Listeners at a time; a browser has one a window."""
+MAX_FEEDS_OF_ONE = 20
+"""Listeners of one person at a time: nobody takes the places of all others."""
 MAX_WAITING = 1000
 """Events that a listener may be behind."""
 _WORK = "work"
@@ -122,6 +124,7 @@ class EventListener:
         visibility: What its reader sees.
         began: Id of the newest log entry when it began to listen.
         numbered: Its events have the ids of their log entries; else they all have 0.
+        person: Who listens; None: on a server without accounts.
 
     Attributes:
         lost: It did not keep up and was let go.
@@ -136,7 +139,9 @@ class EventListener:
         visibility: Visibility,
         began: int,
         numbered: bool = True,
+        person: str | None = None,
     ):
+        self.person = person
         self.dataset_id, self.position, self._numbered = dataset_id, position, numbered
         self._sight, self._began = visibility, began
         self.lost, self.told = False, monotonic()
@@ -217,34 +222,29 @@ class EventPublisher:
         with self._lock:
             return replace(self._counts, open=len(self._feeds))
 
-    def require_free_slot(self) -> None:
-        """Raise OverloadedError where as many listen as may, or the server stops; waits for nothing."""
+    def require_free_slot(self, person: str | None = None) -> None:
+        """Raise OverloadedError where as many listen as may, or the server stops."""
+        with self._lock:
+            self._require_free_slot(person)
+
+    def _require_free_slot(self, person: str | None) -> None:
         if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
             raise OverloadedError("too many browser windows and scripts listen for events")
+        own = sum(feed.person == person for feed in self._feeds)
+        if person is not None and own >= MAX_FEEDS_OF_ONE:
+            raise OverloadedError(
+                f"{own} of your browser windows and scripts listen for events",
+                hint="Close some of them.",
+            )
 
-    def subscribe(
-        self,
-        dataset_id: int | None,
-        position: int,
-        *,
-        resumed: bool = False,
-        visibility: Visibility = EVERYTHING,
-        began: int | None = None,
-        numbered: bool = True,
-    ) -> EventListener:
-        """Begin to listen, or go on where an earlier stream ended; on the event loop.
-
-        ``began`` is the newest entry of the log by now, where that is not the position; ``numbered``
-        as ``EventListener`` has it.
+    def subscribe(self, feed: EventListener, *, resumed: bool = False) -> None:
+        """Let somebody listen, or (``resumed``) go on where an earlier stream ended.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
         """
-        feed = EventListener(
-            dataset_id, position, visibility, position if began is None else began, numbered
-        )
         with self._lock:
-            self.require_free_slot()
+            self._require_free_slot(feed.person)
             self._feeds.add(feed)
             self._counts.opened += 1
             self._counts.resumed += resumed
@@ -254,7 +254,6 @@ class EventPublisher:
                 )
                 self._thread.start()
         self._wake.set()
-        return feed
 
     def unsubscribe(self, feed: EventListener) -> None:
         """Stop listening."""

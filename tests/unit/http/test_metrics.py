@@ -24,8 +24,10 @@ from app.db.store import Store
 from app.errors import DamagedError, StorageError
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.imports.ingest import import_groups
+from app.features.people.visibility_queries import EVERYTHING
 from app.http import metrics
 from app.http.deps import Services
+from app.http.event_stream import EventListener
 from app.http.request_limits import REQUEST_CLASSES, WRITE
 from app.worker_pool import WorkerPool
 from app.worker_process import KINDS, WorkerEnded
@@ -108,9 +110,14 @@ def test_counts_windows_that_listen(app: FastAPI, read, event_loop_of_all: Block
         return [number, *(read("touchline_event_stream_total", what=what) for what in told)]
 
     assert counted() == [0, 0, 0, 0]
-    feed = event_loop_of_all.call(
-        lambda: events.subscribe(None, events.read_log_position, resumed=True)
-    )
+
+    async def listen() -> EventListener:
+        position = events.read_log_position()
+        feed = EventListener(None, position, EVERYTHING, position)
+        events.subscribe(feed, resumed=True)
+        return feed
+
+    feed = event_loop_of_all.call(listen)
     assert counted() == [1, 1, 1, 0]
     feed.lost = True
     events.unsubscribe(feed)
