@@ -86,15 +86,21 @@ def count_people(session: Session) -> int:
     return session.scalar(select(func.count()).select_from(PersonModel)) or 0
 
 
-def count_people_who_can_log_in(session: Session, role: str, *, but: int | None = None) -> int:
-    """How many people of a role can log in, one of them left out."""
+def count_people_who_can_log_in(
+    session: Session, role: str, *, but: int | None = None, only_issuer: str | None = None
+) -> int:
+    """How many people of a role can log in, one of them left out.
+
+    ``only_issuer`` is the provider by which alone people log in; None: there are other ways.
+    """
+    linked = exists().where(IdentityModel.person_id == PersonModel.id)
+    can = (
+        or_(PersonModel.password.is_not(None), linked)
+        if only_issuer is None
+        else linked.where(IdentityModel.issuer == only_issuer)
+    )
     statement = select(func.count()).where(
-        PersonModel.role == role,
-        PersonModel.disabled.is_(False),
-        or_(
-            PersonModel.password.is_not(None),
-            exists().where(IdentityModel.person_id == PersonModel.id),
-        ),
+        PersonModel.role == role, PersonModel.disabled.is_(False), can
     )
     if but is not None:
         statement = statement.where(PersonModel.id != but)

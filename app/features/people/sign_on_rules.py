@@ -320,13 +320,20 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             )
         if person is None or delete_identity(session, person_id) is None:
             raise NotFoundError("no account of a provider is linked with that person")
-        if person.role == Role.ADMIN and not count_people_who_can_log_in(session, Role.ADMIN):
+        only = find_only_issuer(store.settings)
+        left = count_people_who_can_log_in(session, Role.ADMIN, only_issuer=only)
+        if person.role == Role.ADMIN and not left:
             raise ConflictError(
                 f"without the linked account of {person.name} no admin could log in any more",
                 hint=f"Give {person.name} a password first, or make somebody admin who can log in.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
         log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)
+
+
+def find_only_issuer(settings: Settings) -> str | None:
+    """The provider by which alone people log in; None: there are other ways."""
+    return settings.sso_issuer if settings.sso_only else None
 
 
 def count_active_admins_linked_to_sign_on(store: Store, rules: SignOnRules) -> int:

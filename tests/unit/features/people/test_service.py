@@ -12,6 +12,7 @@ from pwdlib.hashers.argon2 import Argon2Hasher
 
 from app.config import Settings
 from app.db.log import read_log
+from app.db.session import now
 from app.db.store import Store
 from app.errors import (
     ConflictError,
@@ -23,6 +24,7 @@ from app.errors import (
 from app.features.groups.replay import replay_log
 from app.features.people import links
 from app.features.people import links as passwords
+from app.features.people.login_queries import put_identity
 from app.features.people.logins import IDLE, LASTS, Login, LoginSessions
 from app.features.people.queries import update_person
 from app.features.people.roles import (
@@ -34,6 +36,7 @@ from app.features.people.roles import (
     role_allows,
 )
 from app.features.people.service import change_person, find_person, invite, list_people, renew_link
+from app.features.people.sign_on_rules import unlink_person
 from tests.databases import all_that_is_kept
 
 SECRET = "correct horse battery"
@@ -303,6 +306,26 @@ class TestChangePerson:
             change_person(home, anna, actor="local", disabled=True)
         change_person(home, bob, actor="anna", disabled=False)
         assert change_person(home, anna, actor="bob", role=Role.LEAD).role is Role.LEAD
+
+    def test_with_sign_on_alone_an_admin_with_a_password_only_cannot_log_in(
+        self, home, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        issuers = {"anna": "https://now.example", "bob": "https://before.example", "eve": None}
+        for name, issuer in issuers.items():
+            join(home, name, Role.ADMIN)
+            values = {"issuer": issuer, "subject": name, "shown": name, "created": now()}
+            if issuer:
+                with home.write() as session:
+                    put_identity(session, {**values, "person_id": find_person(home, name).id})
+        anna = find_person(home, "anna").id
+        only = {"sso_only": True, "sso_issuer": issuers["anna"]}
+        monkeypatch.setattr(home, "settings", home.settings.model_copy(update=only))
+        with pytest.raises(ConflictError, match="no admin could log in"):
+            change_person(home, anna, actor="bob", disabled=True)
+        with pytest.raises(ConflictError, match="no admin could log in"):
+            unlink_person(home, anna, actor="bob")
+        monkeypatch.setattr(home, "settings", home.settings.model_copy(update={"sso_only": False}))
+        assert change_person(home, anna, actor="bob", disabled=True).disabled
 
     def test_the_log_names_who_did_it_and_still_rebuilds(self, home) -> None:
         join(home, "anna", Role.ADMIN)
