@@ -10,6 +10,7 @@ import { matchName } from '../lib/match_name.js';
 import { useResource } from '../lib/resource.js';
 import { address, navigate, pageDataset, param } from '../lib/router.js';
 import { noiseWords } from '../state/datasets.js';
+import { COPIES } from '../state/me.js';
 import { queueAddress } from '../state/navigation.js';
 import { pageAddress } from './dataset_menu.js';
 import { datasetPage } from './dataset_frame.js';
@@ -101,7 +102,7 @@ function StatisticsOf({ one }) {
 		${found.value ? html`
 			<${Body} found=${found.value} one=${one} q=${q} />
 			<h2 class="statistics__whole">Whole dataset</h2>
-			<${MembersCard} dataset=${one.name} />
+			${one.id > COPIES ? null : html`<${MembersCard} dataset=${one.name} />`}
 			<${GuidelinesCard} dataset=${one} />
 			<${GoldCard} dataset=${one} />
 			<${NoiseCard} dataset=${one.id}>
@@ -114,7 +115,7 @@ function StatisticsOf({ one }) {
 			<${Positions} dataset=${one.id} />
 			<${Proposals} dataset=${one.id} name=${one.name} />
 			<${PaintCard} dataset=${one} />
-			<${WebhooksCard} dataset=${one} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			${one.id > COPIES ? null : html`<${WebhooksCard} dataset=${one} />`}` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

@@ -344,6 +344,19 @@ class TestMembers:
         assert taken.json()["role"] == "none"
         assert apart.ask("newcomer", "GET", "/groups/1").status_code == 404
 
+    def test_what_is_one_persons_own_has_no_members_and_no_webhooks(self, apart: Apart) -> None:
+        at = f"/datasets/{apart.value(OwnedKind.DATASET, PRACTICE)}"
+        assert apart.ask("owner", "GET", at).status_code == 200
+        new = {"url": "https://hooks.example.org/a", "kinds": ["job.done"]}
+        for method, target, body in (
+            ("GET", "/members", None),
+            ("PUT", "/members/1", {"role": "viewer"}),
+            ("GET", "/webhooks", None),
+            ("POST", "/webhooks", new),
+        ):
+            told = apart.ask("owner", method, at + target, body)
+            assert (told.status_code, "one person's own" in told.text) == (409, True), told.text
+
     def test_the_session_says_where_somebody_is_what(self, apart: Apart) -> None:
         told = apart.ask("all-but", "GET", "/session").json()
         assert (told["role"], told["datasets"]) == ("lead", [])

@@ -42,6 +42,7 @@ from app.features.people.roles import (
     normalize_user_name,
     require_no_token,
 )
+from app.features.people.sign_on_rules import find_only_issuer
 from app.features.people.visibility_queries import COPIES
 from app.json_text import Moment
 from app.soccer.actors import person_of_actor
@@ -205,7 +206,10 @@ def change_person(
         wanted = person.role if role is None else role
         off = person.disabled if disabled is None else disabled
         loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
-        if loses and not count_people_who_can_log_in(session, Role.ADMIN, but=person_id):
+        only = find_only_issuer(store.settings)
+        if loses and not count_people_who_can_log_in(
+            session, Role.ADMIN, but=person_id, only_issuer=only
+        ):
             raise ConflictError(
                 f"without {person.name} no admin could log in any more",
                 hint="Make somebody admin first who can log in.",
@@ -381,6 +385,11 @@ def _require_dataset(session: Session, dataset: str | int) -> int:
     row = find_dataset(session, dataset)
     if row is None:
         raise NotFoundError.dataset(dataset)
+    if row.id > COPIES:
+        raise ConflictError(
+            "this dataset is one person's own: it has no members",
+            hint="Give roles in the dataset on which people work together.",
+        )
     return int(row.id)
 
 

@@ -15,12 +15,17 @@ from urllib.parse import SplitResult, urlsplit
 import httpx
 import structlog
 
+from app.config import Settings
 from app.db.json_columns import parse_json_column
 from app.db.session import Session, format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalled_batches
 from app.features.datasets.queries import read_dataset_names
+from app.features.people.logins import read_roles
+from app.features.people.queries import find_person_by_name
+from app.features.people.roles import Action, Role, role_allows
+from app.features.people.visibility_queries import COPIES
 from app.features.webhooks.messages import (
     WebhookMessage,
     derive_webhook_secret,
@@ -39,6 +44,7 @@ from app.features.webhooks.queries import (
     update_delivery,
     update_webhook,
 )
+from app.soccer.actors import person_of_actor
 
 _PORTS = {"http": 80, "https": 443}
 LONGEST = 2000
@@ -206,6 +212,7 @@ class WebhookSender:
 
     def queue_new_messages(self) -> int:
         """Write down what webhooks have not been told yet; returns how many messages that makes."""
+        self._turn_off_of_people_who_left()
         with self._store.read() as session:
             rows = list_active_webhooks(session)
             names = read_dataset_names(session) if rows else {}
@@ -220,6 +227,25 @@ class WebhookSender:
                 # Who was changed meanwhile is told at the next look.
                 if messages and still.get(row.id) == row
             )
+
+    def _turn_off_of_people_who_left(self) -> None:
+        """Tell nothing more where whoever made a webhook may no longer lead its dataset."""
+
+        def find_reasons(session: Session) -> dict[int, str]:
+            found = {
+                row.id: find_stop_reason(
+                    self._store.settings, session, row.dataset_id, row.created_by
+                )
+                for row in list_active_webhooks(session)
+            }
+            return {key: reason for key, reason in found.items() if reason is not None}
+
+        with self._store.read() as session:
+            if not find_reasons(session):
+                return
+        with self._store.write() as session:
+            for webhook_id, reason in find_reasons(session).items():
+                update_webhook(session, webhook_id, {"off": reason})
 
     def queue_stall_messages(self) -> int:
         """Write down which batches have stalled, now and then; returns how many messages that makes."""
@@ -346,6 +372,25 @@ class WebhookSender:
         elif not has_delivered_since(session, row.webhook_id, row.created):
             reason = f"nothing arrived since {row.created[:16].replace('T', ' ')} UTC"
             update_webhook(session, row.webhook_id, {"off": reason})
+
+
+def find_stop_reason(
+    settings: Settings, session: Session, dataset_id: int, created_by: str
+) -> str | None:
+    """Why the webhook of somebody is told nothing more; None: it is.
+
+    Made on a server without accounts, or on its own machine, it is the operator's.
+    """
+    name = person_of_actor(created_by)
+    person = find_person_by_name(session, name) if settings.team else None
+    if person is None:
+        return None
+    if person.disabled:
+        return f"the account of {name}, who made it, is disabled"
+    role = read_roles(session, person.id, Role(person.role)).find_role_in(dataset_id)
+    if dataset_id > COPIES or not role_allows(role, Action.LEAD):
+        return f"{name}, who made it, no longer leads this dataset"
+    return None
 
 
 @cache

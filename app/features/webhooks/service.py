@@ -14,6 +14,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import read_dataset_name
 from app.features.datasets.service import dataset_id
+from app.features.people.visibility_queries import COPIES
 from app.features.webhooks.messages import (
     CHOSEN,
     MessageKind,
@@ -37,7 +38,7 @@ from app.features.webhooks.queries import (
     update_delivery,
     update_webhook,
 )
-from app.features.webhooks.sender import require_allowed_address
+from app.features.webhooks.sender import find_stop_reason, require_allowed_address
 from app.json_text import Moment, canonical_json_text
 
 MOST = 20
@@ -95,7 +96,7 @@ class Delivery:
 def list_webhooks(store: Store, dataset: str) -> list[Webhook]:
     """The webhooks of a dataset."""
     with store.read() as session:
-        return _read_webhooks(session, dataset_id(store, dataset))
+        return _read_webhooks(session, _find_dataset_id(store, dataset))
 
 
 def make_webhook(
@@ -107,8 +108,8 @@ def make_webhook(
         InputError: The operator does not allow the address, or no kind is asked for.
         ConflictError: The operator allows none, or the dataset has as many as it may.
     """
+    number, salt = _find_dataset_id(store, dataset), make_salt()
     require_allowed_address(url, store.settings.webhooks, "/url")
-    number, salt = dataset_id(store, dataset), make_salt()
     secret = derive_webhook_secret(store.settings, salt)
     with store.write() as session:
         if len(read_webhooks(session, number)) >= MOST:
@@ -137,7 +138,7 @@ def change_webhook(
     """
     if url is not None:
         require_allowed_address(url, store.settings.webhooks, "/url")
-    number = dataset_id(store, dataset)
+    number = _find_dataset_id(store, dataset)
     with store.write() as session:
         found = _read_webhook(session, number, webhook_id)
         values: dict[str, Any] = {}
@@ -151,6 +152,9 @@ def change_webhook(
                 if on
                 else {"off": OFF}
             )
+            if on and find_stop_reason(store.settings, session, number, found.created_by):
+                # Whoever turns it on again answers for it from now on.
+                values["created_by"] = actor
         if values:
             update_webhook(session, webhook_id, values)
             did = "webhook turned off" if on is False else "webhook changed"
@@ -160,7 +164,7 @@ def change_webhook(
 
 def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
     """Another secret in place of the one that was; what is sent from now on is signed with it."""
-    number, salt = dataset_id(store, dataset), make_salt()
+    number, salt = _find_dataset_id(store, dataset), make_salt()
     secret = derive_webhook_secret(store.settings, salt)
     with store.write() as session:
         found = _read_webhook(session, number, webhook_id)
@@ -171,7 +175,7 @@ def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> 
 
 def remove_webhook(store: Store, dataset: str, webhook_id: int, *, actor: str) -> None:
     """Tell an address nothing more, and forget what it was told."""
-    number = dataset_id(store, dataset)
+    number = _find_dataset_id(store, dataset)
     with store.write() as session:
         found = _read_webhook(session, number, webhook_id)
         delete_webhook(session, webhook_id)
@@ -182,7 +186,7 @@ def list_deliveries(
     store: Store, dataset: str, webhook_id: int, *, before: int | None = None, most: int = 50
 ) -> list[Delivery]:
     """What a webhook was told, newest first, from below an id."""
-    number = dataset_id(store, dataset)
+    number = _find_dataset_id(store, dataset)
     with store.read() as session:
         _read_webhook(session, number, webhook_id)
         return [
@@ -192,7 +196,7 @@ def list_deliveries(
 
 def resend_delivery(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
     """Send a message once more, at once; its tries are counted anew."""
-    number = dataset_id(store, dataset)
+    number = _find_dataset_id(store, dataset)
     with store.write() as session:
         _require_webhook_enabled(_read_webhook(session, number, webhook_id))
         if find_delivery(session, webhook_id, delivery_id) is None:
@@ -203,7 +207,7 @@ def resend_delivery(store: Store, dataset: str, webhook_id: int, delivery_id: in
 
 def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Delivery:
     """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
-    number = dataset_id(store, dataset)
+    number = _find_dataset_id(store, dataset)
     with store.write() as session:
         _require_webhook_enabled(_read_webhook(session, number, webhook_id))
         waiting = find_waiting_delivery(session, webhook_id, MessageKind.PING)
@@ -213,6 +217,16 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         message = make_ping_message(webhook_id, read_dataset_name(session, number), now(), actor)
         insert_delivery(session, webhook_id, message.id, message.kind, message.body)
         return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
+
+
+def _find_dataset_id(store: Store, dataset: str) -> int:
+    found = dataset_id(store, dataset)
+    if found > COPIES:
+        raise ConflictError(
+            "this dataset is one person's own: it has no webhooks",
+            hint="Add the webhook to the dataset on which people work together.",
+        )
+    return found
 
 
 def _require_webhook_enabled(webhook: Webhook) -> None:

@@ -18,6 +18,8 @@ from app.features.groups.submit import submit_edit
 from app.features.groups.undo import undo_group_edit
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.maintenance.upkeep import delete_old_deliveries
+from app.features.people.roles import Role
+from app.features.people.service import change_person, find_person, give_role, invite
 from app.features.verdicts.service import set_verdict
 from app.features.webhooks import sender as module
 from app.features.webhooks.messages import CHOSEN, MessageKind, sign_message
@@ -333,6 +335,42 @@ class TestWhere:
         assert (sender.queue_new_messages(), sender.send_due_messages()) == (0, 0)
         with allowed.read() as session:
             assert session.execute(text("SELECT count(*) FROM webhook_delivery")).scalar_one() == 0
+
+
+class TestWhoLeft:
+    @pytest.fixture
+    def team(self, allowed: Store, hook: int, monkeypatch: pytest.MonkeyPatch) -> Store:
+        """Where ann, who made the webhook, has an account; and so has bob."""
+        settings = allowed.settings.model_copy(update={"team": True})
+        monkeypatch.setattr(allowed, "settings", settings)
+        for name in ("ann", "bob"):
+            invite(allowed, name, Role.LEAD, actor="local")
+        return allowed
+
+    @pytest.mark.parametrize("how", ["disabled", "none here", "viewer"])
+    def test_a_webhook_is_told_nothing_once_its_maker_may_not_lead(
+        self, team: Store, sender, receiver, hook, state, how: str
+    ) -> None:
+        ann = find_person(team, "ann").id
+        sender.queue_new_messages()
+        assert list_webhooks(team, "demo")[0].off is None
+        if how == "disabled":
+            change_person(team, ann, actor="local", disabled=True)
+        elif how == "viewer":
+            change_person(team, ann, actor="local", role=Role.VIEWER)
+        else:
+            give_role(team, "demo", ann, Role.NONE, actor="local")
+        judge(team, state)
+        assert sender.queue_new_messages() == 0
+        sender.send_due_messages()
+        assert receiver.kinds == []
+        off = list_webhooks(team, "demo")[0].off or ""
+        assert "ann, who made it" in off
+        # Whoever turns it on again answers for it.
+        change_webhook(team, "demo", hook, on=True, actor="bob")
+        sender.queue_new_messages()
+        told = list_webhooks(team, "demo")[0]
+        assert (told.off, told.created_by) == (None, "bob")
 
 
 class TestSecrets:
