@@ -78,6 +78,13 @@ class Cookies:
         values = self._make_cookie_arguments(DEVICE, self.devices.make(person), DEVICE_LASTS)
         return {**values, "key": self._make_device_cookie_name(person)}
 
+    def was_used_by_others(self, scope: Scope, person: str) -> bool:
+        """Whether somebody else has logged in before in the browser that sent a request."""
+        sent = ";".join(Headers(scope=scope).getlist("cookie"))
+        begins = re.escape(self._make_cookie_name(DEVICE))
+        names = re.findall(rf"(?:^|;)\s*({begins}_[0-9a-f]+)=", sent)
+        return any(name != self._make_device_cookie_name(person) for name in names)
+
     def _make_device_cookie_name(self, person: str) -> str:
         return f"{self._make_cookie_name(DEVICE)}_{self.devices.make_cookie_suffix(person)}"
 

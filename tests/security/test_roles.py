@@ -280,6 +280,16 @@ class TestSessions:
         for edit in ({"role": "viewer"}, {"disabled": True}):
             assert team.ask("PATCH", f"{API}/users/{me}", edit, role="admin").status == 403
 
+    def test_the_next_person_in_a_browser_is_shown_nothing_of_the_last(self, team: Team) -> None:
+        team.add("shares", Role.VIEWER)
+        told = team.log_in("shares")
+        assert "clear-site-data" not in told.headers, "a browser of their own"
+        browser = cookie_in(told, DEVICE)
+        assert "clear-site-data" not in team.log_in("shares", Cookie=browser).headers
+        assert team.log_in("viewer", Cookie=browser).headers["clear-site-data"] == '"cache"'
+        out = team.ask("DELETE", f"{API}/session", Cookie=cookie_in(told))
+        assert out.headers["clear-site-data"] == '"cache"'
+
     def test_too_many_tries_of_a_name_wait(self, team: Team) -> None:
         told = [team.log_in("tried", "wrong wrong wrong").status for _ in range(11)]
         assert told == [401] * 10 + [429]
@@ -443,6 +453,26 @@ class TestStreams:
         connection.close()
         if looked:
             assert team.ask("GET", f"{API}/events", Cookie=cookie).status == 401
+
+    def test_one_person_takes_the_places_of_nobody_else(
+        self, team: Team, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.http.event_stream.MAX_FEEDS_OF_ONE", 2)
+        cookie = team.add("listens-much", Role.VIEWER)
+        with ExitStack() as opened:
+
+            def listen(cookie: str) -> http.client.HTTPResponse:
+                where = team.address.partition("//")[2]
+                connection = http.client.HTTPConnection(where, timeout=SECONDS)
+                opened.callback(connection.close)
+                connection.request("GET", f"{API}/events", headers={"Cookie": cookie})
+                return connection.getresponse()
+
+            assert [listen(cookie).status for _ in range(2)] == [200, 200]
+            refused = listen(cookie)
+            assert (refused.status, refused.headers["retry-after"]) == (503, "5")
+            assert b"of your browser windows" in refused.read()
+            assert listen(team.cookies["viewer"]).status == 200
 
     def test_it_tells_of_what_is_seen_and_of_no_more_than_that(self, team: Team) -> None:
         """One dataset of two; and of none, some time after the role in it was taken away."""

@@ -146,7 +146,7 @@ def log_in_with_passkey(
     except NotLoggedInError:
         log.warning("a login with a passkey was refused", address=address)
         raise
-    return give_session(team, store, response, token)
+    return give_session(team, store, request, response, token)
 
 
 second_factors_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)

@@ -51,6 +51,8 @@ router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 log = structlog.get_logger("touchline.access")
 
 
+CLEAR_CACHE = {"Clear-Site-Data": '"cache"'}
+"""Pictures and answers that the browser has kept go; unsent changes, which lie in its storage, stay."""
 ALLOWS = {role: [action for action in Action if role_allows(role, action)] for role in Role}
 sign_on_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 
@@ -159,15 +161,22 @@ def _begin_session(
         # Without the name: people type passwords into the wrong field.
         log.warning("a login was refused", address=address)
         raise
-    return give_session(team, store, response, token)
+    return give_session(team, store, request, response, token)
 
 
-def give_session(team: TeamLogin, store: Store, response: Response, token: str) -> SessionDocument:
-    """Give a browser the cookie of its new session, and let it be a known one of the person."""
+def give_session(
+    team: TeamLogin, store: Store, request: Request, response: Response, token: str
+) -> SessionDocument:
+    """Give a browser the cookie of its new session, and let it be a known one of the person.
+
+    What it keeps of what another person was shown, pictures above all, goes.
+    """
     response.set_cookie(**team.cookies.make_session_cookie(token))
     login = team.logins.find(token)
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
+    if team.cookies.was_used_by_others(request.scope, login.name):
+        response.headers.update(CLEAR_CACHE)
     response.set_cookie(**team.cookies.make_known_device_cookie(login.name))
     return make_session_document(login, store)
 
@@ -183,6 +192,7 @@ def log_out(
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookies.make_session_cookie(None))
+    response.headers.update(CLEAR_CACHE)
     # What somebody began here at the provider is not the next person's to finish.
     response.set_cookie(**team.cookies.make_sign_on_cookie(None))
     return make_session_document(None, store)
@@ -207,7 +217,7 @@ def change_password(
     team.require_password_login_allowed()
     team.count_login_attempt(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
-    return give_session(team, store, response, token)
+    return give_session(team, store, request, response, token)
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
@@ -333,7 +343,9 @@ def finish_sign_on(
         return SignOnFinished(
             session=make_session_document(team.find_login(request), store), to=entered.to
         )
-    return SignOnFinished(session=give_session(team, store, response, entered.token), to=entered.to)
+    return SignOnFinished(
+        session=give_session(team, store, request, response, entered.token), to=entered.to
+    )
 
 
 @sign_on_router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
