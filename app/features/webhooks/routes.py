@@ -78,7 +78,7 @@ def _webhook_with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
-@router.get("", operation_id="listWebhooks", responses=responses(404))
+@router.get("", operation_id="listWebhooks", responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
@@ -120,7 +120,7 @@ def change_webhook(
 
 
 @router.delete(
-    "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404)
+    "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404, 409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
@@ -128,7 +128,7 @@ def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Ac
     webhooks.remove_webhook(store, dataset, webhook, actor=actor)
 
 
-@router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404))
+@router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def renew_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
@@ -150,7 +150,9 @@ def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Acto
     return webhooks.send_ping(store, dataset, webhook, actor=actor)
 
 
-@router.get("/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404))
+@router.get(
+    "/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404, 409)
+)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def list_deliveries(
     dataset: DatasetPath,
