@@ -266,14 +266,11 @@ class TestNewDatasets:
         taken = apart.ask("all-but", "POST", "/imports", {"dataset": THEIRS, **body})
         assert (taken.status_code, "in which you have no role" in taken.text) == (403, True)
 
-    @pytest.mark.parametrize("option", ["lines", "frames"])
-    def test_the_file_of_an_option_is_ones_own(self, apart: Apart, option: str) -> None:
+    def test_the_lines_of_an_import_are_ones_own(self, apart: Apart) -> None:
         mine = apart.ask("lead", "POST", "/uploads?name=c.zip", b"PK").json()["id"]
-        theirs = apart.value(OwnedKind.UPLOAD, THEIRS)
+        theirs = {"upload": apart.value(OwnedKind.UPLOAD, THEIRS)}
         body = {"dataset": MINE, "format": "issia", "source": {"upload": mine}, "dry_run": True}
-        told = apart.ask(
-            "lead", "POST", "/imports", {**body, "options": {option: {"upload": theirs}}}
-        )
+        told = apart.ask("lead", "POST", "/imports", {**body, "options": {"lines": theirs}})
         assert (told.status_code, "there is no upload" in told.text) == (404, True), told.text
 
     def test_folders_of_the_operator_are_for_leads_of_all_datasets(self, apart: Apart) -> None:
