@@ -31,7 +31,8 @@ class StoredRun:
         stale: Whether the video is another one by now.
         sha256: Of the video that it is of.
         groups: What accepting did: views that got the ball (``placed``), that had one already (``kept``), and that could
-            not be edited (``refused``); after an attempt to take it back those that it is still in.
+            not be edited (``refused``); after an attempt to take it back those that it is still in. While it is
+            accepted or taken back, the revision of before is there as ``accepting`` or ``removing``.
     """
 
     id: int
@@ -82,8 +83,13 @@ def build_run_from_row(row: Any, sha256: str | None) -> StoredRun:
         groups=parse_json_column(row.groups),
         actor=row.actor,
         created=row.created,
-        etag=f'"{digest_json([row.id, row.revision, row.created])[:16]}"',
+        etag=make_run_etag(row.id, row.revision, row.created),
     )
+
+
+def make_run_etag(run_id: int, revision: int, created: str) -> str:
+    """The entity tag of a run at a revision."""
+    return f'"{digest_json([run_id, revision, created])[:16]}"'
 
 
 def run_to_columns(run: BallRun) -> dict[str, Any]:

@@ -18,7 +18,11 @@ from app.features.groups.queries import read_groups
 from app.features.groups.state import read_etags, require_etag
 from app.features.groups.view_paint import PaintUpdater
 from app.features.recordings.ball_run_values import StoredRun as StoredRun
-from app.features.recordings.ball_run_values import build_run_from_row, run_to_columns
+from app.features.recordings.ball_run_values import (
+    build_run_from_row,
+    make_run_etag,
+    run_to_columns,
+)
 from app.features.recordings.follow import EACH_WAY, BallFollower, collect_follow_hints
 from app.features.recordings.queries import (
     delete_ball_run,
@@ -36,6 +40,8 @@ from app.soccer.frames import Box, ImagePoint
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
 _BATCH = 100
+_ACCEPTING, _REMOVING = "accepting", "removing"
+"""What is being done to a run: with the revision that the request for it named."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +207,10 @@ def review_ball_run(
                 found = _save_run_change(session, run, actor, did, **values)
             session.respond(found)
             return found
+        if change.accepted and present.accepted_by == actor:
+            # The same request, sent again, has finished it.
+            session.respond(present)
+            return present
     if change.accepted and present.accepted_by is None:
         # Somebody took it back while its balls were set: they may have missed the last ones.
         with without_pending_response():
@@ -218,9 +228,17 @@ def _reserve_review(
     actor: str,
 ) -> StoredRun:
     """A run as it is while its balls are set or taken away, which takes seconds: accepted, and of a new revision, so
-    that what others do then to the run that they see is refused."""
+    that what others do then to the run that they see is refused. What a server did not finish, the same request does.
+    """
     run = _require_ball_run(session, recording_id, run_id)
+    doing = _ACCEPTING if change.accepted else _REMOVING
+    begun = run.groups.get(doing)
+    is_mine = not change.accepted or run.accepted_by == actor
+    if begun is not None and is_mine and make_run_etag(run.id, begun, run.created) == if_match:
+        return run
     require_etag(run.etag, if_match, "this ball run")
+    before = find_ball_run(session, run_id)
+    assert before is not None
     if change.accepted and run.stale:
         raise ConflictError(
             "the video file has changed since the ball was followed", hint="Follow the ball again."
@@ -228,9 +246,10 @@ def _reserve_review(
     if change.confirmed is not None:
         run = _save_confirmed_frames(session, recording_id, run_id, change, if_match, actor)
     if change.accepted:
-        values = {"accepted_by": actor, "groups": "{}"}
+        values = {"accepted_by": actor, "groups": canonical_json_text({doing: before.revision})}
         return _save_run_change(session, run, actor, "ball run accepted", **values)
-    return _update_run(session, run)
+    groups = {**run.groups, doing: before.revision}
+    return _update_run(session, run, groups=canonical_json_text(groups))
 
 
 def _save_confirmed_frames(

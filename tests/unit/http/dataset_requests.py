@@ -150,11 +150,6 @@ def another_ball_click(api: Any) -> Request:
     return "POST", f"{path}/clicks", {"frame": 8, "x": x, "y": y}, etag_of(api, path)
 
 
-def accepted_ball_run(api: Any) -> Request:
-    path = ball_run(api)
-    return "PATCH", path, {"accepted": True}, etag_of(api, path)
-
-
 def no_ball_run(api: Any) -> Request:
     return "DELETE", ball_run(api), None, {}
 

@@ -103,7 +103,6 @@ KEPT: dict[str, Made] = {
     "trackCameras": dataset_requests.tracked_cameras,
     "followBall": dataset_requests.ball_click,
     "mendBallRun": dataset_requests.another_ball_click,
-    "changeBallRun": dataset_requests.accepted_ball_run,
     "deleteBallRun": dataset_requests.no_ball_run,
     "turnCameras": dataset_requests.turned_cameras,
     "withdrawSubmission": group_requests.hand_in_taken_back,
@@ -120,6 +119,7 @@ KEPT: dict[str, Made] = {
 """Operations whose answer is in the transaction of their work; where one has several ways, a word
 behind its name tells them apart."""
 HARMLESS = {
+    "changeBallRun": "It is written down before any ball is set: the rest is done, and the answer the same.",
     "addRecording": "The same file again is the same recording, and is indexed once more.",
     "changeTeam": "The same setting once more changes nothing, and has the same answer.",
     "clearMaintenance": "A notice that is taken away is away.",

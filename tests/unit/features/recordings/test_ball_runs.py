@@ -294,9 +294,42 @@ class TestAccept:
         elif kind == "deleted":
             assert (answer.status_code, mine.status_code, present.status_code) == (204, 404, 404)
         else:
-            assert (answer.status_code, mine.status_code) == (412, 200)
+            said = 200 if kind == "accepted" else 412
+            assert (answer.status_code, mine.status_code) == (said, 200)
             assert present.json() == mine.json() and mine.json()["placed"] == 2
             assert all(balls(api).values())
+
+    @pytest.mark.parametrize("accepted", [True, False])
+    def test_what_a_server_did_not_finish_the_same_request_finishes(
+        self,
+        api: Any,
+        recording: str,
+        finished: Finished,
+        monkeypatch: pytest.MonkeyPatch,
+        accepted: bool,
+    ) -> None:
+        take(api, recording, finished, 3, 20)
+        run = follow(api, recording).json()
+        if not accepted:
+            run = change(api, run, accepted=True).json()
+        path, tag = f"{recording}/ball-runs/{run['id']}", {"If-Match": run["etag"]}
+        headers = {**tag, "Idempotency-Key": "once"}
+
+        def stop(*_: Any, **__: Any) -> Any:
+            raise SystemError("stopped")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "edit_views", stop)
+            sent = api.patch(path, json={"accepted": accepted}, headers=headers)
+            assert sent.status_code == 500
+        assert change(api, run, accepted=not accepted).status_code == 412
+        done, again = (
+            api.patch(path, json={"accepted": accepted}, headers=headers) for _ in range(2)
+        )
+        assert (done.status_code, again.headers["idempotency-replayed"]) == (200, "true")
+        assert done.json() == again.json() == api.get(path).json()
+        assert (done.json()["placed"] == 2) is accepted
+        assert all(bool(found) is accepted for found in balls(api).values())
 
     def test_boxes_of_detectors_are_candidates(
         self, api: Any, recording: str, finished: Finished, store: Store
