@@ -10,6 +10,7 @@ import { matchName } from '../lib/match_name.js';
 import { JobButton } from './job_button.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
+import { isNewPicture } from './picture_proposal.js';
 
 /** @import {MatchPictureJson, PictureEstimateJson} from '../api/match_estimates.js' */
 /** @import {PictureJson} from '../api/types.js' */
@@ -33,7 +34,7 @@ function pictureWords(picture) {
 function MatchPicture({ one, shown, busy, onSet }) {
 	const { name, aside } = matchName(one.match);
 	const proposed = shown?.proposed ?? null;
-	const isNew = proposed !== null && JSON.stringify(proposed) !== JSON.stringify(one.picture);
+	const isNew = isNewPicture(one, proposed);
 	return html`
 		<tr>
 			<${MatchHead} name=${name} aside=${aside} />

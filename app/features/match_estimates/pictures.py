@@ -8,6 +8,7 @@ its own geometry, and a finding of the view offers what its own lines say.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -41,22 +42,22 @@ class MatchPictureGeometryState:
 
     Attributes:
         frames: How many of its main camera's frames have lines.
-        picture: The one in use, None as it was taken; the most frequent where they differ.
+        used: Those in use, each once, the most frequent first; None as it was taken.
         estimate: What the lines show; None where ``problem`` says why there is none.
         proposed: The picture to use instead; None where what is in use agrees.
     """
 
     match: str
     frames: int
-    picture: PictureGeometry | None
+    used: tuple[PictureGeometry | None, ...]
     estimate: PictureEstimate | None
     problem: str | None
 
     @property
     def proposed(self) -> PictureGeometry | None:
-        """What the lines certainly show and is not in use."""
+        """What the lines certainly show and is not in use, or not in all frames."""
         found = None if self.estimate is None else self.estimate.proposal
-        return None if found == self.picture else found
+        return None if all(picture == found for picture in self.used) else found
 
     @property
     def sentence(self) -> str:
@@ -218,7 +219,7 @@ def _iterate_main_camera_views(
 
 def _run_picture_task(task: _PictureGeometryTask) -> MatchPictureGeometryState:
     """Of one match; runs in a worker."""
-    used = max(set(task.used), key=task.used.count) if task.used else None
+    used = tuple(picture for picture, _ in Counter(task.used).most_common())
     try:
         found = estimate_match_picture(task.frames, task.policy)
     except GeometryError as error:

@@ -12,12 +12,15 @@ import pytest
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
+from app.features.groups.edit import SetPictureGeometry
+from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import jobs as pictures_job
 from app.features.match_estimates.jobs import PICTURES
 from app.features.match_estimates.pictures import read_picture_geometries, set_picture_geometries
+from app.features.pitches.queries import list_groups_of_match
 from app.features.solutions.service import list_stale_groups
 from app.features.solve.jobs import change_and_return_solve_job
 from app.progress import ReportProgress
@@ -166,3 +169,19 @@ def test_a_server_that_stops_leaves_an_estimate_to_the_next_one(
     second.start()
     assert [item["match"] for item in finished(second, job).result["items"]] == [WIDE]
     second.close()
+
+
+@pytest.mark.parametrize("most", [True, False])
+def test_a_picture_that_only_some_frames_have_is_proposed_for_all(
+    jobs: Jobs, two: Store, most: bool
+) -> None:
+    said = items(jobs, two, WIDE)[WIDE]["proposed"]
+    picture = PictureGeometry(said["aspect"], tuple(said["shift"]), tuple(said["sigma"]))
+    finished(jobs, say(jobs, two, {WIDE: picture}))
+    with two.read() as session:
+        ids = list_groups_of_match(session, 1, WIDE)
+    for number in ids[: 1 if most else -1]:
+        state = load_group_state(two, number)
+        edit = SetPictureGeometry(state.group.views[0].key, None)
+        submit_edit(two, number, edit, if_match=state.etag, actor="lea")
+    assert items(jobs, two, WIDE)[WIDE]["proposed"] == said
