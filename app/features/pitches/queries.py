@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ForeignKey, delete, func, insert, select
+from sqlalchemy import ForeignKey, and_, delete, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import insert_or_replace
-from app.db.json_columns import parse_json_column
+from app.db.json_columns import decompress_json, parse_json_column
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
@@ -183,7 +183,8 @@ def is_pitch_edited(session: Session, group_id: int) -> bool:
 def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
     """The newest log entry that said how large the pitch of each match is, where one did.
 
-    Of groups without a match only where it was said of all that there are, and all had one size.
+    Only where all groups of the match had one size before, so that the entry tells it of all of
+    them; of groups without a match, only where it was said of all that there are.
     """
     entries = {
         entry.group_id: entry
@@ -192,24 +193,43 @@ def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogE
     model = GroupModel
     rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
     changes = {row.match: entries[row.id] for row in rows}
-    if "" in changes and not _changes_all_groups_without_match(session, dataset_id, changes[""]):
-        del changes[""]
-    return changes
+    mixed = _list_matches_of_several_sizes_before(session, dataset_id) if changes else set()
+    return {match: entry for match, entry in changes.items() if match not in mixed}
 
 
-def _changes_all_groups_without_match(session: Session, dataset_id: int, newest: LogEntry) -> bool:
-    """Whether all groups without a match were given another size with an entry, and had one."""
-    groups = set(list_groups_of_match(session, dataset_id, ""))
-    nameless = select(GroupModel.id).where(
-        GroupModel.dataset_id == dataset_id, GroupModel.match == ""
+def _list_matches_of_several_sizes_before(session: Session, dataset_id: int) -> set[str]:
+    """Matches whose groups had no one size before the pitch of the match was changed last.
+
+    Groups without a match are among them where not all were changed.
+    """
+    model, newest = GroupModel, _select_newest_pitch_entries(dataset_id)
+    last = (
+        select(model.match, LogModel.at)
+        .join(LogModel, LogModel.group_id == model.id)
+        .where(LogModel.id.in_(newest))
+        .subquery()
     )
-    where = (LogModel.group_id.in_(nameless), LogModel.kind == PITCH, LogModel.at == newest.at)
-    same = (
-        entry.group_id
-        for entry in read_log(session, *where)
-        if entry.body["inverse"] == newest.body["inverse"]
+
+    def select_changed(*columns: Any) -> Any:
+        return (
+            select(*columns)
+            .join(model, model.id == LogModel.group_id)
+            .join(last, and_(last.c.match == model.match, last.c.at == LogModel.at))
+            .where(LogModel.kind == PITCH, model.dataset_id == dataset_id)
+        )
+
+    before: dict[str, set[tuple[float, float]]] = {}
+    for match, body in session.execute(select_changed(model.match, LogModel.body).distinct()):
+        size = decompress_json(body)["inverse"]
+        before.setdefault(match, set()).add((size["length"], size["width"]))
+    others = select(model.match, model.pitch_length, model.pitch_width).where(
+        model.dataset_id == dataset_id, model.id.not_in(select_changed(LogModel.group_id))
     )
-    return groups <= set(same)
+    unchanged = session.execute(others.distinct()).all()
+    for match, *size in unchanged:
+        before.setdefault(match, set()).add((size[0], size[1]))
+    mixed = {match for match, sizes in before.items() if len(sizes) > 1}
+    return mixed | ({""} & {match for match, *_ in unchanged})
 
 
 def _select_newest_pitch_entries(dataset_id: int) -> Any:

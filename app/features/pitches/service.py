@@ -56,7 +56,8 @@ class PitchState:
             now, and where ``problem`` says why it cannot be.
         proposed: The size to use instead, or None; where groups have several sizes that the
             estimate agrees with, the most frequent one.
-        previous: The size before it was changed last, or None.
+        previous: The size before it was changed last; None where it was not, or where its groups
+            had several sizes then.
     """
 
     match: str
@@ -229,7 +230,8 @@ def _requested_size(state: PitchState, text: str) -> Pitch:
     if state.previous is None:
         raise InputError(
             f"{state.match or 'groups without a match'}: there is no earlier pitch size to restore",
-            hint="The pitch size was never changed. Give a size, such as 105x68.",
+            hint="The pitch size was never changed, or the groups had different sizes before. "
+            "Give a size, such as 105x68.",
         )
     return state.previous
 

@@ -18,6 +18,7 @@ from app.features.groups.undo import undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,
+    choose_requested_sizes,
     estimate_pitches,
     list_matches_to_estimate,
     parse_pitch,
@@ -318,6 +319,25 @@ class TestReadPitches:
         assert (small.pitch, small.mixed) == (TRUE, True)
         assert small.proposed.length == pytest.approx(103.0, abs=0.3)
         assert small.previous == TRUE
+
+    def test_there_is_no_size_before_where_groups_had_several(self, solved):
+        with solved.write() as session:
+            set_pitch_of_groups(session, 1, [4, 5], Pitch(100.0, 64.0), "ann")
+        assert read_pitches(solved, "demo").items[0].previous == Pitch()
+        # All groups change, and have two sizes to go back to; then only those that differ do.
+        for wanted in (TRUE, Pitch(100.0, 64.0)):
+            accept(solved, pitch=wanted)
+            small, right = read_pitches(solved, "demo").items
+            assert (small.pitch, small.mixed) == (wanted, False)
+            assert small.previous == (None if wanted == TRUE else TRUE)
+            assert right.previous is None
+        with solved.write() as session:
+            set_pitch_of_groups(session, 1, [1], TRUE, "ann")
+        accept(solved, pitch=TRUE)
+        small, _ = read_pitches(solved, "demo").items
+        assert (small.mixed, small.previous) == (False, None)
+        with pytest.raises(InputError, match="no earlier pitch size"):
+            choose_requested_sizes(read_pitches(solved, "demo"), SMALL, size="previous")
 
     def test_sizes_that_both_agree_with_the_lines_become_one(self, solved):
         accept(solved)
