@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from app.db.log import read_entry
+from app.db.log import LogEntry, read_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, read_dataset_head, require_dataset_id
 from app.features.groups.edit import SetStationCamera
+from app.features.groups.edit_codec import station_edit_from_json
 from app.features.groups.queries import read_groups
 from app.features.groups.undo_stacks import read_station_stacks
 from app.features.groups.view_queries import list_station_pitches
@@ -27,7 +28,7 @@ from app.features.stations.service import (
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
-from app.soccer.codec import digest_json, lines_to_json
+from app.soccer.codec import covariance_from_json, digest_json, lines_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import View
 from app.soccer.pitch import Pitch
@@ -196,23 +197,29 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
 def undo_accepted_rig(store: Store, dataset: str | int, *, actor: str) -> int:
     """Undo an accepted rig, all its cameras at once; returns how many there were.
 
+    A camera that was edited afterwards keeps those edits: an edit gives it its camera back.
+
     Raises:
-        ConflictError: No camera's last edit is an accepted rig.
+        ConflictError: No camera is as an accepted rig made it.
+        StaleRevisionError: A camera has changed meanwhile.
     """
     with store.read() as session:
         found = require_dataset_id(session, dataset)
-        adjusted = [
-            item.id
-            for item in list_shared_stations(session, found)
-            if item.station.given_covariance is not None
-            and _is_last_edit_adjustment(session, item.id)
-        ]
-    if not adjusted:
-        raise ConflictError(
-            "there is nothing to undo: the last edit of no static camera was an adjustment of cameras"
-        )
-    states = [load_station(store, station) for station in adjusted]
-    return undo_stations(store, states, actor=actor)
+        shared = [item.id for item in list_shared_stations(session, found)]
+    states = [load_station(store, station) for station in shared]
+    undone: list[StationState] = []
+    edits: list[tuple[StationState, SetStationCamera]] = []
+    with store.read() as session:
+        for state in states:
+            done = read_station_stacks(session, state.id).done
+            step = _find_adjustment(session, state, done)
+            if step is not None and step.id == done[-1]:
+                undone.append(state)
+            elif step is not None:
+                edits.append((state, _make_edit_to_camera_before(state, step)))
+    if not undone and not edits:
+        raise ConflictError("there is nothing to undo: no adjustment of static cameras is in use")
+    return undo_stations(store, undone, edits, actor=actor)
 
 
 def rig_proposal_to_json(proposed: ProposedRig) -> dict[str, Any]:
@@ -312,6 +319,22 @@ def _ball_center(view: View) -> ImagePoint | None:
     return ball.center if view.included and ball is not None and not ball.inferred else None
 
 
-def _is_last_edit_adjustment(session: Session, station_id: int) -> bool:
-    done = read_station_stacks(session, station_id).done
-    return bool(done) and read_entry(session, done[-1]).body["edit"]["edit"] == EDIT
+def _find_adjustment(session: Session, state: StationState, done: Sequence[int]) -> LogEntry | None:
+    """The step, of those that are done, that gave a camera the covariance it has; None without one."""
+    covariance = state.station.given_covariance
+    if covariance is None:
+        return None
+    for number in reversed(done):
+        entry = read_entry(session, number)
+        edit = entry.body["edit"]
+        if edit["edit"] == EDIT and covariance_from_json(edit["covariance"]) == covariance:
+            return entry
+    return None
+
+
+def _make_edit_to_camera_before(state: StationState, step: LogEntry) -> SetStationCamera:
+    """Gives back the camera before a step, but not the choice of its lines that was made since."""
+    before = station_edit_from_json(step.body["inverse"])
+    assert isinstance(before, SetStationCamera)
+    is_lines_chosen = state.station.calibration == "lines"
+    return replace(before, calibration="lines") if is_lines_chosen else before

@@ -153,9 +153,20 @@ def submit_station_edits(
         _save_planned_changes(session, steps, actor)
 
 
-def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> int:
-    """Take the last edit of several static cameras back, of all or none; returns how many."""
+def undo_stations(
+    store: Store,
+    states: Sequence[StationState],
+    edits: Sequence[tuple[StationState, StationEdit]] = (),
+    *,
+    actor: str,
+) -> int:
+    """Take the last edit of several static cameras back, of all or none; returns how many.
+
+    ``edits`` are saved with it, as ``submit_station_edits`` does, and count: of cameras whose last
+    edit is another than the one to take back.
+    """
     steps = [(state.id, _plan_undo_or_redo("undo"), state.etag) for state in states]
+    steps += [(state.id, _plan_edit(edit), state.etag) for state, edit in edits]
     count = len(steps)
     with store.write() as session:
         _save_planned_changes(session, steps, actor)

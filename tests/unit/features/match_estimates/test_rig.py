@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, InputError, StaleRevisionError
-from app.features.groups.edit import SetStationCalibrationSource, SetStationCamera
+from app.features.groups.edit import (
+    SetStationCalibrationSource,
+    SetStationCamera,
+    SetStationLines,
+)
 from app.features.groups.replay import replay_log
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state
-from app.features.imports.ingest import import_groups
+from app.features.imports.cameras import GivenCamera, NamedStation, attach_cameras
+from app.features.imports.ingest import IngestReport, import_groups
 from app.features.match_estimates import rig
 from app.features.match_estimates.rig import (
     CAMERAS,
@@ -20,12 +26,13 @@ from app.features.match_estimates.rig import (
     describe_anchor,
     describe_time_difference,
     propose_adjustment,
+    require_adjustable_cameras,
     rig_proposal_to_json,
     undo_accepted_rig,
 )
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.solutions.service import list_stale_groups
-from app.features.stations.service import load_station, submit_station_edit
+from app.features.stations.service import load_station, submit_station_edit, undo_station
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
@@ -242,6 +249,41 @@ class TestTakeBack:
         assert undo_accepted_rig(store, "demo", actor="ann") == len(GIVEN)
         for key, state in proposed.stations.items():
             assert stations(store, proposed)[key] == state.station
+
+    def test_a_camera_that_was_edited_since_is_given_back_too_and_keeps_its_edits(
+        self, store, proposed
+    ) -> None:
+        accept_rig(store, proposed, CAMERAS, actor="ann")
+        kept: dict[str, Station] = {}
+        for key, edit in (
+            ("cam1", SetStationLines({"Middle line": ((640.0, 100.0), (640.0, 300.0))})),
+            ("cam2", SetStationCalibrationSource("lines")),
+        ):
+            state = load_station(store, proposed.stations[key].id)
+            submit_station_edit(store, state.id, edit, if_match=state.etag, actor="bob")
+            kept[key] = edit.apply(proposed.stations[key].station)
+        assert undo_accepted_rig(store, "demo", actor="ann") == len(GIVEN)
+        for key, state in proposed.stations.items():
+            assert stations(store, proposed)[key] == kept.get(key, state.station)
+        require_adjustable_cameras(store, "demo")
+        with store.read() as session:
+            assert replay_log(session) == read_state_snapshot(session)
+        # Its own undo brings the adjusted camera back, and the whole rig's takes it away again.
+        state = load_station(store, proposed.stations["cam1"].id)
+        undo_station(store, state.id, if_match=state.etag, actor="bob")
+        assert undo_accepted_rig(store, "demo", actor="ann") == 1
+        assert stations(store, proposed)["cam1"] == kept["cam1"]
+
+    def test_a_camera_that_was_brought_since_is_left_alone(self, store, proposed) -> None:
+        accept_rig(store, proposed, CAMERAS, actor="ann")
+        state = load_station(store, proposed.stations["cam1"].id)
+        brought = GivenCamera(GIVEN["cam1"], tuple((np.eye(8) / 7).ravel().tolist()))
+        with store.write() as session:
+            place = [(NamedStation(state.id, None, "rig", SIZE), brought)]
+            attach_cameras(session, state.dataset_id, place, "test", "bob", IngestReport())
+        assert undo_accepted_rig(store, "demo", actor="ann") == len(GIVEN) - 1
+        found = stations(store, proposed)["cam1"]
+        assert (found.given, found.given_covariance) == (brought.camera, brought.covariance)
 
     def test_there_must_be_something_to_take_back(self, store, ids) -> None:
         with pytest.raises(ConflictError, match="nothing to undo"):
