@@ -32,6 +32,7 @@ from app.features.policies.service import (
     apply_policy,
     read_policy,
     replace_thresholds,
+    require_policy_etag,
 )
 from app.features.solutions.queries import find_newest_solution_id, list_solved_groups
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, Policy
@@ -236,6 +237,7 @@ def adopt_estimated_noise_in_session(
         StaleRevisionError: The policy is another by now.
     """
     if noise.values and state.policy.noise == ESTIMATED:
+        require_policy_etag(session, noise.dataset_id, state.etag)
         policy = replace_thresholds(state.policy, {"noise": ESTIMATED, **noise.values})
         save_policy(session, noise.dataset_id, policy, actor)
     elif noise.values:

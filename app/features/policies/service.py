@@ -104,9 +104,7 @@ def apply_policy(
     session: Session, dataset: str | int, policy: Policy, *, if_match: str | None, actor: str
 ) -> PolicyState:
     """``change_policy`` within a write session."""
-    state = _read_policy_state(session, dataset)
-    if if_match is not None:
-        require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
+    state = require_policy_etag(session, dataset, if_match)
     if policy.noise == state.policy.noise == ESTIMATED:
         # What was estimated is the dataset's: it stays until the next solve.
         policy = copy_click_sigmas(policy, state.policy)
@@ -114,6 +112,14 @@ def apply_policy(
         return state
     save_policy(session, state.dataset_id, policy, actor)
     return _read_policy_state(session, state.dataset_id)
+
+
+def require_policy_etag(session: Session, dataset: str | int, if_match: str | None) -> PolicyState:
+    """The policy of a dataset; raises StaleRevisionError where it is not that of an ETag, if given."""
+    state = _read_policy_state(session, dataset)
+    if if_match is not None:
+        require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
+    return state
 
 
 def _read_policy_state(session: Session, dataset: str | int) -> PolicyState:

@@ -10,7 +10,7 @@ import pytest
 
 from app.db.log import NewLogEntry, append_entries
 from app.db.store import Store
-from app.errors import DegenerateGeometryError, InputError, NotFoundError
+from app.errors import DegenerateGeometryError, InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.queries import list_group_ids
 from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.edit_codec import edit_to_json
@@ -21,6 +21,7 @@ from app.features.policies import noise
 from app.features.policies.noise import (
     ASSUMED_WORDS,
     adopt_estimated_noise,
+    adopt_estimated_noise_in_session,
     estimate_dataset_noise,
     reset_noise_factors,
 )
@@ -243,6 +244,22 @@ class TestApplyNoise:
         assert (again.values, again.notices) == ({}, ())
         with pytest.raises(InputError, match="is what its policy already uses"):
             adopt_estimated_noise(store, again, actor="ben")
+
+    @pytest.mark.parametrize("noise", ["estimated", "fixed"])
+    def test_another_policy_that_was_chosen_meanwhile_is_not_overwritten(
+        self, store: Store, noise: str
+    ) -> None:
+        make(store, given=False)
+        policy = replace_thresholds(PAPER, {"noise": noise}, name="ours")
+        change_policy(store, "demo", policy, if_match=None, actor="ann")
+        solve_dataset(store, "demo")
+        found, state = estimate_dataset_noise(store, "demo"), read_policy(store, "demo")
+        assert found.values
+        theirs = replace_thresholds(policy, {"max_sigma_m": 0.31})
+        change_policy(store, "demo", theirs, if_match=state.etag, actor="lea")
+        with pytest.raises(StaleRevisionError), store.write() as session:
+            adopt_estimated_noise_in_session(session, found, state, "ben")
+        assert read_policy(store, "demo").policy.max_sigma_m == 0.31
 
     def test_a_second_estimate_is_the_first(self, store: Store) -> None:
         """Lines and balls are each known with the other's noise, not with what was used before."""
