@@ -125,16 +125,7 @@ class JobRecords:
             job = read_job(session, job_id)
             if job is not None:
                 record_cancellation(session, job, by)
-            if job is not None and job.state in _REPORTED:
-                notify_person(
-                    session,
-                    person_of_actor(job.actor),
-                    NotificationKind.JOB,
-                    f"{job.title}: {_REPORTED[job.state]}",
-                    actor=job.actor,
-                    address="/jobs",
-                    dataset_id=job.dataset_id if job.dataset is not None else None,
-                )
+                notify_of_end(session, job)
         if job is not None:
             self._announce_job_change(job)
         return job
@@ -142,6 +133,20 @@ class JobRecords:
     def _announce_job_change(self, job: Job) -> None:
         for listener in self._listeners:
             listener(job)
+
+
+def notify_of_end(session: Session, job: Job) -> None:
+    """Tell who asked for a job that it is done or failed."""
+    if job.state in _REPORTED:
+        notify_person(
+            session,
+            person_of_actor(job.actor),
+            NotificationKind.JOB,
+            f"{job.title}: {_REPORTED[job.state]}",
+            actor=job.actor,
+            address="/jobs",
+            dataset_id=job.dataset_id if job.dataset is not None else None,
+        )
 
 
 def require_job(session: Session, job_id: int) -> Job:

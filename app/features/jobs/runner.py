@@ -14,12 +14,13 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import replace
 from time import monotonic
 from typing import Any
 
 import structlog
 
-from app.db.session import now
+from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import NotFoundError, StorageError
 from app.features.jobs.job_run import JobProgress, JobRun, RunQueue, Work
@@ -34,7 +35,7 @@ from app.features.jobs.queries import (
     read_jobs,
     update_job,
 )
-from app.features.jobs.records import JobRecords
+from app.features.jobs.records import JobRecords, notify_of_end
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -78,6 +79,8 @@ class JobRunner(JobRecords):
         self._workers: list[threading.Thread] = []
         self._unwritten: dict[int, dict[str, Any]] = {}
         """How jobs ended whose records could not be written yet, by their ids."""
+        self._writing_ends = threading.Lock()
+        """Held while these are written, so that nobody takes such a job for one that nobody works on."""
         self._turns: dict[str, int] = {}
         """When each person had a turn last, by the number of the turn."""
         self._resumers: dict[str, Work] = {}
@@ -116,7 +119,7 @@ class JobRunner(JobRecords):
                 delete_oldest_jobs(session, kind, keep)
             left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
             for job in left:
-                update_job(session, job.id, **self._build_recovered_columns(job))
+                self._recover_job(session, job)
         with self._changed:
             resumed = [self._make_resumed_run(job) for job in left if self._is_resumable(job)]
             self._queue = self._queue.with_waiting_runs(*resumed)
@@ -173,6 +176,12 @@ class JobRunner(JobRecords):
             with self._changed:
                 self._entering -= 1
                 self._start_workers()
+
+    def _recover_job(self, session: Session, job: Job) -> None:
+        """Let an earlier server's job become what it shall, and tell who asked for it of its end."""
+        columns = self._build_recovered_columns(job)
+        update_job(session, job.id, **columns)
+        notify_of_end(session, replace(job, state=columns["state"]))
 
     def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
@@ -294,16 +303,17 @@ class JobRunner(JobRecords):
 
     def _write_missed_ends(self) -> None:
         """Write how jobs ended where that could not be written before."""
-        with self._changed:
-            unwritten, self._unwritten = self._unwritten, {}
-        for job_id, columns in unwritten.items():
-            try:
-                if self.get(job_id).state in OPEN:
-                    self._save_end(job_id, **columns)
-            except NotFoundError:
-                pass
-            except StorageError:
-                with self._changed:
-                    self._unwritten[job_id] = columns
-            except Exception:
-                log.exception("the record of a job could not be written", job=job_id)
+        with self._writing_ends:
+            with self._changed:
+                unwritten, self._unwritten = self._unwritten, {}
+            for job_id, columns in unwritten.items():
+                try:
+                    if self.get(job_id).state in OPEN:
+                        self._save_end(job_id, **columns)
+                except NotFoundError:
+                    pass
+                except StorageError:
+                    with self._changed:
+                        self._unwritten[job_id] = columns
+                except Exception:
+                    log.exception("the record of a job could not be written", job=job_id)

@@ -39,6 +39,11 @@ def require_not_over(job: Job) -> None:
         raise ConflictError(f"job {job.id} has already ended")
 
 
+def is_same_request(job: Job, new: NewJob) -> bool:
+    """Whether a job is its maker's and asks for the same as a new one."""
+    return job.actor == new.actor and job.request == new.request
+
+
 class Jobs(JobRunner):
     """The jobs of one server, as other features ask for them."""
 
@@ -69,7 +74,7 @@ class Jobs(JobRunner):
             actor: Who wants it.
             request: What was asked for; a kind that is resumed finds its way from it.
             once: Where a job of this kind waits for this dataset already, answer that one; without
-                a dataset one's own, for nobody sees another person's.
+                a dataset one's own that was asked for the same, for nobody sees another person's.
             follows: It goes on with a job that ends now, whose place it takes: it needs no room.
             then: Ends the transaction; default: the request is answered with the job.
 
@@ -205,12 +210,11 @@ class Jobs(JobRunner):
         return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.all_runs)
 
     def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
-        """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
-        place = (new.kind, new.dataset_id)
+        """Id of the waiting job of a kind and dataset; without a dataset see ``is_same_request``."""
         for run in self._queue.waiting:
-            if (run.job.kind, run.job.dataset_id) != place:
-                continue
-            if new.dataset_id is not None or require_job(session, run.job.id).actor == new.actor:
+            if (run.job.kind, run.job.dataset_id) == (new.kind, new.dataset_id) and (
+                new.dataset_id is not None or is_same_request(require_job(session, run.job.id), new)
+            ):
                 return run.job.id
         return None
 

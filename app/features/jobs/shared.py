@@ -35,7 +35,7 @@ from app.features.jobs.queries import (
 )
 from app.features.jobs.records import record_cancellation, require_job
 from app.features.jobs.runner import CLOSE_SECONDS, KEPT, Pool
-from app.features.jobs.service import WAIT_FOR_JOB, Jobs, require_not_over
+from app.features.jobs.service import WAIT_FOR_JOB, Jobs, is_same_request, require_not_over
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -258,7 +258,7 @@ class SharedJobs(Jobs):
             for kind, keep in KEPT.items():
                 delete_oldest_jobs(session, kind, keep)
             for job in read_jobs(session, states=(RUNNING,), limit=MOST):
-                update_job(session, job.id, **self._build_recovered_columns(job))
+                self._recover_job(session, job)
 
     def _enqueue_waiting_jobs(self) -> None:
         with self._store.read_for_one_statement() as session:
@@ -278,7 +278,7 @@ class SharedJobs(Jobs):
             job = read_job(session, job_id)
             if job is None or job.state != RUNNING or self._queue.find_running(job_id) is not None:
                 return
-            update_job(session, job_id, **self._build_recovered_columns(job))
+            self._recover_job(session, job)
             job = require_job(session, job_id)
         self._announce_job_change(job)
 
@@ -314,8 +314,8 @@ class SharedJobs(Jobs):
     def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """See ``Jobs``."""
         for job in reversed(read_jobs(session, kinds=[new.kind], states=(WAITING,), limit=MOST)):
-            mine = new.dataset_id is not None or job.actor == new.actor
-            if job.dataset_id == new.dataset_id and mine:
+            same = new.dataset_id is not None or is_same_request(job, new)
+            if job.dataset_id == new.dataset_id and same:
                 return job.id
         return None
 

@@ -114,7 +114,7 @@ def request_practice(
         partial(run_practice_job, store),
         actor=actor,
         request={"again": again, "person": person, "recording": recording},
-        once=not recording,
+        once=True,
     )
 
 

@@ -12,9 +12,13 @@ from typing import Any
 import pytest
 
 from app.db.json_columns import Json
+from app.db.store import Store
 from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
+from app.features.notifications.queries import select_notifications
+from app.features.people.queries import find_person_by_name
+from app.features.people.visibility_queries import EVERYTHING
 from tests.waiting import SECONDS
 
 
@@ -41,6 +45,14 @@ class Gate:
 def submit(jobs: Jobs, work: Callable[[JobProgress], Json], **options: Any) -> Job:
     kind = options.pop("kind", "bulk")
     return jobs.submit(kind, "Some work", work, actor="ann", **options)
+
+
+def list_sentences_told(store: Store, name: str) -> list[str]:
+    """What the bell of a person says, the newest first."""
+    with store.read() as session:
+        person = find_person_by_name(session, name)
+        seen = select_notifications(session, person.id, EVERYTHING, "", 50, None)
+    return [item.sentence for item in seen]
 
 
 class Held:

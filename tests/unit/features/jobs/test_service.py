@@ -27,8 +27,10 @@ from app.features.jobs import runner as module
 from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job, NewJob, insert_job, update_job
 from app.features.jobs.service import Jobs
+from app.features.people.roles import Role
+from app.features.people.service import invite
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from tests.unit.features.jobs.steps import Gate, submit
+from tests.unit.features.jobs.steps import Gate, list_sentences_told, submit
 from tests.waiting import SECONDS
 
 
@@ -101,6 +103,17 @@ class TestSubmit:
         ]
         assert (ids[0], ids[1]) == (ids[2], ids[3])
         assert ids[0] != ids[1]
+        first.finish.set()
+
+    def test_what_has_no_dataset_is_once_for_each_request(self, jobs: Jobs) -> None:
+        first = Gate()
+        submit(jobs, first)
+        assert first.started.wait(SECONDS)
+        one, other, again = (
+            submit(jobs, lambda _: None, kind="practice", request={"again": wanted}, once=True)
+            for wanted in (False, True, False)
+        )
+        assert (one.id, other.request) == (again.id, {"again": True})
         first.finish.set()
 
 
@@ -389,6 +402,19 @@ class TestRestart:
             found = second.get(job.id)
             assert (found.state, found.ended is not None) == ("failed", True)
             assert found.problem["detail"].startswith("The server stopped")
+
+    def test_who_asked_for_a_job_is_told_that_it_failed_with_the_server(self, store: Store) -> None:
+        invite(store, "ann", Role.REVIEWER, actor="local")
+        first, gate = Jobs(store), Gate()
+        submit(first, gate)
+        assert gate.started.wait(SECONDS)
+        submit(first, lambda _: None, kind="import")
+        first.close()
+        second = Jobs(store)
+        second.register_resume("import", lambda _: None)
+        second._start_workers = lambda: None  # type: ignore[method-assign]
+        second.start()
+        assert list_sentences_told(store, "ann") == ["Some work: it failed"]
 
     def test_a_kind_that_knows_how_starts_again_from_what_was_asked_for(self, store: Store) -> None:
         first, gate = Jobs(store), Gate()

@@ -12,6 +12,9 @@ from app.errors import ConflictError, JobCancelled
 from app.features.jobs.job_run import JobProgress
 from app.features.jobs.queries import Job, NewJob, insert_job, update_job
 from app.features.jobs.shared import SharedJobs
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from tests.unit.features.jobs.steps import list_sentences_told
 from tests.waiting import SECONDS
 
 
@@ -197,6 +200,28 @@ class TestSharedJobs:
         again = other.submit("solve", "Solve", lambda _: None, actor="ann", once=True)
         elses = other.submit("solve", "Solve", lambda _: None, actor="ben", once=True)
         assert (again.id, elses.id == first.id) == (first.id, False)
+
+    def test_one_is_answered_only_where_it_was_asked_for_the_same(self, opened: Open) -> None:
+        one, other = opened(), opened()
+        first, second, again = (
+            jobs.submit(
+                "solve", "Solve", lambda _: None, actor="ann", request={"again": wanted}, once=True
+            )
+            for jobs, wanted in ((one, False), (other, True), (other, False))
+        )
+        assert (first.id, second.request) == (again.id, {"again": True})
+
+    def test_who_asked_for_a_job_of_a_process_that_died_is_told_that_it_failed(
+        self, opened: Open, store: Store
+    ) -> None:
+        invite(store, "ann", Role.REVIEWER, actor="local")
+        with store.write() as session:
+            job = insert_job(session, NewJob("bulk", "Accept", "ann"))
+            update_job(session, job, state="running")
+        jobs = opened()
+        jobs.start()
+        assert jobs.get(job).state == "failed"
+        assert list_sentences_told(store, "ann") == ["Accept: it failed"]
 
     def test_a_row_that_no_work_can_be_made_of_holds_up_nothing(
         self, opened: Open, work: Work
