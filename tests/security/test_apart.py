@@ -249,6 +249,17 @@ class TestMatrix:
                         looked += 1
         assert looked > 50
 
+    def test_who_has_a_group_of_another_dataset_open_is_not_told_by_releasing_it(
+        self, apart: Apart
+    ) -> None:
+        mine, theirs = (apart.ids[name][OwnedKind.WORK] for name in (MINE, THEIRS))
+        group = apart.ids[THEIRS][OwnedKind.GROUP]
+        lease = f"/groups/{group}/lease"
+        assert apart.ask("other-lead", "PUT", f"/batches/{theirs}{lease}", {}).status_code == 200
+        for target in (lease, f"/groups/{NO_ID}/lease"):
+            answer = apart.ask("mine-lead", "DELETE", f"/batches/{mine}{target}")
+            assert (answer.status_code, answer.content) == (204, b"")
+
 
 class TestNewDatasets:
     def test_whoever_leads_one_dataset_makes_no_other_and_learns_of_none(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from app.db.log import LogEntry as LogEntry
@@ -71,13 +71,7 @@ def read_history(store: Store, group_id: int) -> list[LogEntry]:
     """
     with store.read() as session:
         stored = require_group(session, group_id)
-        entries = show_entries_under_aliases(session, _read_group_history(session, stored))
-        if stored.dataset_id <= COPIES and not sees_independent_work(stored.dataset_id):
-            # Whose annotations there are, and whether they agree, annotators are not to know.
-            entries = [
-                replace(entry, body=None) if entry.kind in ABOUT_COPIES else entry
-                for entry in entries
-            ]
+        entries = _show_entries(session, stored, _read_group_history(session, stored))
         if not hides_groups_from_reader():
             return entries
         return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]
@@ -102,7 +96,7 @@ def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChang
                 before = snapshot.group(group_id) if known else None
             apply_entry(snapshot, entry)
             if entry.id == entry_id and group_id in snapshot.groups:
-                (shown,) = show_entries_under_aliases(session, [entry])
+                (shown,) = _show_entries(session, stored, [entry])
                 return _compare_group_versions(
                     shown, before, snapshot.group(group_id), stored.view_ids
                 )
@@ -128,6 +122,17 @@ def read_station_before_entry(session: Session, stored: StoredStation, entry_id:
             break
         apply_entry(snapshot, entry)
     return snapshot.stations[stored.id].station
+
+
+def _show_entries(
+    session: Session, stored: StoredGroup, entries: Iterable[LogEntry]
+) -> list[LogEntry]:
+    """Entries as whoever asks may read them."""
+    shown = show_entries_under_aliases(session, entries)
+    if stored.dataset_id > COPIES or sees_independent_work(stored.dataset_id):
+        return shown
+    # Whose annotations there are, and whether they agree, annotators are not to know.
+    return [replace(entry, body=None) if entry.kind in ABOUT_COPIES else entry for entry in shown]
 
 
 def _read_group_history(session: Session, stored: StoredGroup) -> list[LogEntry]:

@@ -23,7 +23,7 @@ from app.features.agreement.service import (
     set_limits,
 )
 from app.features.groups.edit import make_set_ball_edit
-from app.features.groups.history import read_history
+from app.features.groups.history import ABOUT_COPIES, read_entry_changes, read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
@@ -37,6 +37,7 @@ from app.features.independent_annotations.service import (
 from app.features.integrity.checks import examine_database
 from app.features.people.roles import Role
 from app.features.people.service import invite
+from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.queue.service import list_groups
 from app.features.verdicts.service import set_verdict
 from tests.unit.features.independent_annotations.begun import begin_take
@@ -85,6 +86,30 @@ class TestAfterHandIn:
         assert all(get_annotation(store, one.id).settled for one in (first, second))
         assert list_open_cases(store, state.dataset) == []
         assert [str(check) for check in examine_database(store) if not check.ok] == []
+
+    def test_who_judges_nothing_is_not_told_by_the_history_whose_annotations_there_were(
+        self, store, state
+    ) -> None:
+        for person, moved in (("ann", 1.0), ("ben", 2.0)):
+            compare_or_adopt_submission(store, judged(store, state.id, person, moved).copy_id)
+        everything = {one.id: one for one in read_history(store, state.id)}
+        about = {one.id for one in everything.values() if one.kind in ABOUT_COPIES}
+        assert {everything[number].kind for number in about} == ABOUT_COPIES
+        assert {everything[number].body["person"] for number in about} == {"ann"}
+        for judges in (False, True):
+            token = READER.set(RestrictedReader("carl", {}, lambda _dataset, it=judges: it))
+            try:
+                listed = {one.id: one for one in read_history(store, state.id)}
+                single = {
+                    number: read_entry_changes(store, state.id, number).entry for number in listed
+                }
+            finally:
+                READER.reset(token)
+            assert listed == single
+            assert listed == {
+                number: one if judges or number not in about else replace(one, body=None)
+                for number, one in everything.items()
+            }
 
     @pytest.mark.parametrize(("moved", "comes_to"), [(2.0, "agreed"), (40.0, "open")])
     def test_what_a_stopped_server_left_is_compared_by_the_next_one(

@@ -240,6 +240,18 @@ class TestLeases:
         assert leases.release_group(batch, groups[0], CY).here == ()
         assert leases.lease_next_group(batch, BO).group == groups[0]
 
+    def test_giving_back_a_group_that_the_batch_does_not_have_tells_nothing_of_it(
+        self, store, dataset, groups, leases
+    ):
+        other = make_batch(store, dataset, NewBatch("a", size=1), actor="lead").id
+        batch = make_batch(store, dataset, NewBatch("b", size=1), actor="lead").id
+        assert leases.lease_next_group(other, BO).group == groups[0]
+        told = leases.release_group(batch, groups[0], CY)
+        assert (told.batch.id, told.group, told.here) == (batch, None, ())
+        assert told == leases.release_group(batch, 88888888, CY)
+        with pytest.raises(HeldGroupError, match="bo has this group open"):
+            leases.lease_group(other, groups[0], CY)
+
     def test_what_a_window_left_open_that_is_gone_comes_back_once_nothing_else_waits(
         self, store, dataset, groups, leases
     ):
