@@ -251,15 +251,15 @@ def _make_bare_view(item: ViewFileFields) -> View:
 
 
 def _build_current_record(state: GroupState) -> ExportRecord:
-    verdict = state.verdict
+    verdict, solution = state.verdict, state.solution
+    # A group that passes overrides nothing, whatever failed when it was accepted.
+    override = None if solution is not None and solution.passes else verdict.override
     return ExportRecord(
         group=state.group,
-        solution=state.solution,
+        solution=solution,
         verdict=_format_verdict(verdict),
-        reason=describe_verdict_reason(
-            verdict.state, verdict.reason, verdict.note, verdict.override
-        ),
-        override=verdict.override,
+        reason=describe_verdict_reason(verdict.state, verdict.reason, verdict.note, override),
+        override=override,
     )
 
 

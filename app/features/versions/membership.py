@@ -37,7 +37,8 @@ class Candidate:
         split: As its dataset gives it.
         views: Keys of its views.
         why: Why it does not; None: it does.
-        verdict: State, reason, note and override; None where nobody decided.
+        verdict: State, reason, note and override; None where nobody decided. A group that passes
+            overrides nothing, whatever failed when it was accepted.
         unsolved: It might enter, and nobody knows while it has no solution.
     """
 
@@ -106,7 +107,7 @@ def _verdict_to_json(row: CandidateRow) -> Json:
         "state": f"{row.status} (stale)" if row.stale else row.status,
         "reason": row.reason,
         "note": row.note,
-        "override": row.override,
+        "override": None if row.passes else row.override,
     }
 
 

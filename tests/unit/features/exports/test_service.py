@@ -84,6 +84,17 @@ class TestExport:
         assert verdicts["9"] == "accepted: overrides reprojection: seen on video"
         assert verdicts["7"] == "unreviewed"
 
+    def test_a_group_that_passes_by_now_overrides_nothing(self, store, three, tmp_path) -> None:
+        judge(store, three[2], "accepted", note="seen on video")
+        loose = replace(PAPER, name="loose", tau_percent=50.0, min_p_value=0.0, max_sigma_m=50.0)
+        change_policy(store, "demo", loose, if_match=None, actor="ann")
+        solve_dataset(store, "demo")
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
+        verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
+        assert verdicts["9"] == "accepted"
+        manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+        assert manifest["overrides"] == []
+
     def test_where_no_view_may_teach_yolo_is_refused_and_says_so(
         self, store, three, tmp_path
     ) -> None:

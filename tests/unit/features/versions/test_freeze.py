@@ -113,6 +113,18 @@ class TestFreeze:
         assert rows["9.png"].verdict["override"] == "reprojection"
         assert (version.counts["groups"], version.counts["overrides"]) == (2, 1)
 
+    @pytest.mark.parametrize("rule", ["accepted", "passing"])
+    def test_a_group_that_passes_by_now_overrides_nothing(self, store, judged, rule: str) -> None:
+        loose = replace(STRICT, name="loose", tau_percent=50.0, min_p_value=0.0, max_sigma_m=50.0)
+        change_policy(store, "demo", loose, if_match=None, actor="ann")
+        solve_dataset(store, "demo")
+        version = frozen(store, groups=rule)
+        row = next(row for row in rows_of(store, version) if row.key.endswith("9.png"))
+        assert row.member
+        assert (row.verdict["state"], row.verdict["override"]) == ("accepted", None)
+        assert version.counts["overrides"] == 0
+        assert make_version_manifest(store, version.id)["overrides"] == []
+
     def test_its_manifest_names_verdicts_overrides_and_what_was_refused(
         self, store, judged
     ) -> None:
