@@ -6,6 +6,7 @@ import { colours } from '../lib/colours.js';
 import { label, strokeBox, strokeLine } from './pen.js';
 
 /** @import {BallJson, PointJson} from '../api/types.js' */
+/** @import {Marked} from '../state/conflict.js' */
 /** @import {Scene} from './scene.js' */
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
@@ -18,7 +19,7 @@ export function drawGhosts(context, scene) {
 			{ value: mine, word: 'yours', colour: colours.value.selected },
 		]) {
 			if (kind === 'ball') ghostBall(context, scene, /** @type {BallJson[]} */ (value), word, colour);
-			else if (kind === 'lines') ghostLine(context, scene, /** @type {PointJson[] | null} */ (value), word, colour);
+			else if (kind === 'lines') ghostLine(context, scene, /** @type {Marked} */ (value).points, word, colour);
 		}
 	}
 }

@@ -4,12 +4,13 @@
 import { batch, computed } from '@preact/signals';
 
 import { leftOutBy, viewOf } from './edits.js';
-import { groupDocument, submit, submitVerdict } from './group.js';
+import { groupDocument, submit, submitDismissal, submitVerdict } from './group.js';
 import { announce } from './notice.js';
 import { discard, outbox } from './outbox.js';
 
-/** @import {GroupDocument} from '../api/types.js' */
-/** @import {BallEdit, Edit} from './edits.js' */
+/** @import {GroupDocument, PointJson} from '../api/types.js' */
+/** @import {BallEdit, Edit, LinesEdit} from './edits.js' */
+/** @import {FindingName} from './last_action.js' */
 /** @import {Item, Verdict} from './outbox.js' */
 
 /**
@@ -26,6 +27,7 @@ import { discard, outbox } from './outbox.js';
  * @property {Verdict | null} verdict
  */
 /** @typedef {{fields: Field[], mergeable: boolean}} Conflict */
+/** @typedef {{points: PointJson[] | null, hidden: boolean}} Marked one marking: its points, or that the picture does not show it */
 
 /** Writes of any group that wait for the person. */
 export const held = computed(() => outbox.value.filter((item) => item.held));
@@ -44,7 +46,8 @@ export function conflictOf(theirs, own) {
 	for (const item of own) {
 		for (const field of fieldsOf(theirs, item)) {
 			// Of several edits of one thing the first knows what was there and the last what I want.
-			const base = fields.get(field.key)?.base ?? field.base;
+			const first = fields.get(field.key);
+			const base = first ? first.base : field.base;
 			fields.set(field.key, { ...field, base, overlaps: overlap(base, field.mine, field.theirs) });
 		}
 	}
@@ -85,11 +88,27 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 			base: base?.picture ?? null, mine: edit.picture, theirs: view.station.picture ?? null,
 		}];
 	}
-	return Object.entries(edit.lines).map(([marking, points]) => ({
-		...about, key: `line ${view.key} ${marking}`, name: `${marking} of ${view.letter}`,
-		edit: { kind: 'lines', view: view.key, lines: { [marking]: points } },
-		base: base?.lines[marking] ?? null, mine: points, theirs: view.lines[marking] ?? null,
+	return Object.keys(edit.lines).map((marking) => ({
+		...about, key: `line ${view.key} ${marking}`, name: `${marking} of ${view.letter}`, edit: onlyOf(edit, marking),
+		base: marked(marking, base?.lines, base?.not_visible), mine: marked(marking, edit.lines, edit.notVisible),
+		theirs: marked(marking, view.lines, view.not_visible),
 	}));
+}
+
+/**
+ * @param {string} marking @param {Record<string, PointJson[] | null> | undefined} lines
+ * @param {string[] | undefined} hidden markings that the picture does not show @returns {Marked}
+ */
+function marked(marking, lines, hidden) {
+	return { points: lines?.[marking] ?? null, hidden: hidden?.includes(marking) ?? false };
+}
+
+/** What an edit says of one marking. @param {LinesEdit} edit @param {string} marking @returns {LinesEdit} */
+function onlyOf({ lines, proposed, notVisible, ...rest }, marking) {
+	return {
+		...rest, lines: { [marking]: lines[marking] }, ...(proposed?.includes(marking) ? { proposed: [marking] } : {}),
+		...(notVisible?.includes(marking) ? { notVisible: [marking] } : {}),
+	};
 }
 
 /** The same edit, whatever ball they have put there. @param {BallEdit} edit @returns {BallEdit} */
@@ -138,11 +157,17 @@ function resolve(wanted, said) {
 	const present = conflict.value;
 	const id = groupDocument.value?.id;
 	if (!present) return;
+	// What was said of findings meanwhile was no part of the choice.
+	const dismissals = held.value.filter((item) => item.group === id && item.path.endsWith('/dismissal'));
 	batch(() => {
 		discard((item) => item.held && item.group === id);
 		for (const field of present.fields.filter(wanted)) {
 			if (field.edit) submit(field.edit);
 			if (field.verdict) submitVerdict(field.verdict);
+		}
+		for (const { body } of dismissals) {
+			const { dismissed, ...finding } = /** @type {FindingName & {dismissed: boolean}} */ (body);
+			submitDismissal(finding, dismissed);
 		}
 	});
 	announce(said);

@@ -15,9 +15,9 @@ import { latest } from '../lib/latest.js';
 import { stored } from '../lib/storage.js';
 import { known, load, rememberAnswer } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
-import { did, learnTime } from './last_action.js';
+import { did, forgetUndoneEdit, learnTime } from './last_action.js';
 import { announce, complain } from './notice.js';
-import { discard, enqueue, outbox, revise } from './outbox.js';
+import { discard, enqueue, outbox, revise, takenBack } from './outbox.js';
 import { withDismissals } from './open_findings.js';
 import { refuses } from './rights.js';
 import { hearFrom, isAway, wake } from './sending.js';
@@ -219,8 +219,8 @@ export function submitTurn(verb) {
 
 /** What an edit or verdict found. @param {GroupDocument} at @param {string} key @returns {Base} */
 function baseOf(at, key) {
-	const { lines, balls, included, left_out, station } = viewOf(at, key);
-	return { lines, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
+	const { lines, not_visible, balls, included, left_out, station } = viewOf(at, key);
+	return { lines, not_visible, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
 }
 
 /**
@@ -292,8 +292,7 @@ function refused(item, error) {
 	const dropped = conflicting ? [] : outbox.value.filter((other) => other.group === item.group && !other.held);
 	batch(() => {
 		// What was said on top of it falls with it, or waits with it.
-		if (conflicting) discard((other) => other.group === item.group && Boolean(other.turn));
-		if (conflicting) revise((other) => (other.group === item.group ? { ...other, held: true } : other));
+		if (conflicting) holdAll(item.group, error.current);
 		else discard((other) => dropped.includes(other));
 		expected.value = null;
 		if (isGroup(error.current)) takeOver(error.current);
@@ -302,6 +301,20 @@ function refused(item, error) {
 	if (!conflicting) complain(refusalText(item, dropped, error));
 	listener(item, error);
 	for (const other of dropped) if (other.id !== item.id && other.verdict) listener(other, error);
+}
+
+/** Hold what waits of a group until the person has chosen. @param {number} id @param {any} current the group as it is now */
+function holdAll(id, current) {
+	const writes = outbox.value.filter(({ group: of, held }) => of === id && !held);
+	const back = takenBack(writes);
+	// Undo and redo are about the group as it was, and what was taken back before it was saved nobody has to choose.
+	discard((other) => back.includes(other) || (other.group === id && Boolean(other.turn)));
+	for (const other of back) if (other.edit) forgetUndoneEdit(id);
+	if (back.some(({ edit }) => edit)) announce('Undone.');
+	const rest = outbox.value.filter(({ group: of }) => of === id);
+	const isChosen = rest.some(({ edit, verdict }) => edit !== null || verdict !== null);
+	if (isChosen) revise((other) => (other.group === id ? { ...other, held: true } : other));
+	else if (isGroup(current)) revise((other) => (other.group === id ? { ...other, etag: etagFor(other, current) } : other));
 }
 
 /** @param {Item} item @param {Item[]} dropped with it @param {ApiError} error */

@@ -61,6 +61,12 @@ export function forgetUndone(action) {
 	if (rest.length < undone.value.length) undone.value = rest;
 }
 
+/** The edit of a group that was taken back last never reached the server: there is nothing to do again. @param {number} group */
+export function forgetUndoneEdit(group) {
+	const last = undone.value.findLast((action) => action.kind === 'edit' && action.group === group);
+	if (last) undone.value = undone.value.filter((other) => other !== last);
+}
+
 /** It was taken back, or cannot be. @param {Action} action */
 export function forget(action) {
 	const rest = actions.value.filter((other) => other !== action && !isSameBatch(other, action));

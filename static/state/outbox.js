@@ -16,7 +16,7 @@ import { myName } from './me.js';
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Verdict */
 /** @typedef {{field: 'undo_of' | 'redo_of', key: string}} Turn   undo or redo of the verdict that a write of that key gave */
-/** @typedef {{lines: Record<string, PointJson[] | null>, balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson}} Base */
+/** @typedef {{lines: Record<string, PointJson[] | null>, not_visible?: string[], balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson}} Base */
 /**
  * @typedef {object} Item
  * @property {string} id idempotency key: sent twice it counts once
@@ -113,6 +113,27 @@ export function discard(which) {
 	if (gone.length === 0) return;
 	outbox.value = outbox.value.filter((item) => !gone.includes(item));
 	inDatabase((db) => Promise.all(gone.map(({ id }) => db.delete(STORE, id))));
+}
+
+/**
+ * Writes of one group that come to nothing together: edits that an undo behind them takes back, and every such undo and redo.
+ *
+ * @param {Item[]} writes in their order @returns {Item[]}
+ */
+export function takenBack(writes) {
+	/** @type {Item[]} */
+	const back = [];
+	for (const [place, write] of writes.entries()) {
+		if (write.edit || write.method !== 'POST') continue;
+		// The edits of a static camera have a line of their own.
+		const before = writes.slice(0, place).filter(({ edit, station }) => edit && station === write.station);
+		const last = before.findLast((edit) => !back.includes(edit));
+		const again = back.findLast((edit) => before.includes(edit));
+		if (write.path.includes('/undo') && last) back.push(last);
+		// A new edit leaves nothing to do again.
+		else if (write.path.includes('/redo') && again && last !== before.at(-1)) back.splice(back.indexOf(again), 1);
+	}
+	return writes.filter((write) => back.includes(write) || (!write.edit && write.method === 'POST'));
 }
 
 /** Say that this tab lives, so that no other sends what it looks after. */

@@ -8,8 +8,8 @@ import { pixelText } from '../lib/format.js';
 import { conflict, keepMine, mergeBoth, takeTheirs } from '../state/conflict.js';
 import { leftOutText } from '../state/reasons.js';
 
-/** @import {BallJson, LeftOutJson, PointJson} from '../api/types.js' */
-/** @import {Field} from '../state/conflict.js' */
+/** @import {BallJson, LeftOutJson} from '../api/types.js' */
+/** @import {Field, Marked} from '../state/conflict.js' */
 
 /**
  * One side of a field, in words.
@@ -42,12 +42,13 @@ function ballWords(ball, base) {
 	return `${size}${moved > 0.005 ? `, moved ${pixelText(moved)}` : ''}${hidden}`;
 }
 
-/** @param {PointJson[] | null} points @param {PointJson[] | null} base */
-function lineWords(points, base) {
-	if (!points) return 'not drawn';
+/** @param {Marked} marked @param {Marked | null} base */
+function lineWords({ points, hidden }, base) {
+	if (!points) return hidden ? 'not visible' : 'not drawn';
 	const count = `${points.length} ${points.length === 1 ? 'point' : 'points'}`;
-	if (!base || base === points || base.length !== points.length) return count;
-	const moved = Math.max(...points.map((point, i) => Math.hypot(point.x - base[i].x, point.y - base[i].y)));
+	const before = base?.points;
+	if (before?.length !== points.length) return count;
+	const moved = Math.max(...points.map((point, i) => Math.hypot(point.x - before[i].x, point.y - before[i].y)));
 	return moved > 0.005 ? `${count}, moved ${pixelText(moved)}` : count;
 }
 

@@ -28,7 +28,7 @@ describe('conflictOf', () => {
 		const theirs = { ...group, views: [{ ...view, lines: { 'Middle line': [{ x: 0, y: 0 }] } }] };
 		const [field] = conflictOf(theirs, [item(lineEdit(moved))]).fields;
 		assert.ok(field.overlaps);
-		assert.deepEqual([field.base, field.mine], [line, moved]);
+		assert.deepEqual([field.base, field.mine], [{ points: line, hidden: false }, { points: moved, hidden: false }]);
 	});
 
 	it('does not call the same change an overlap', () => {
@@ -40,7 +40,31 @@ describe('conflictOf', () => {
 		const second = { ...base, lines: { 'Middle line': moved } };
 		const { fields } = conflictOf(group, [item(lineEdit(moved)), item(lineEdit(null), second)]);
 		assert.equal(fields.length, 1);
-		assert.deepEqual([fields[0].base, fields[0].mine], [line, null]);
+		assert.deepEqual([fields[0].base.points, fields[0].mine.points], [line, null]);
+	});
+
+	it('knows that there was nothing before the first of several edits of one thing', () => {
+		const empty = { ...group, views: [{ ...view, lines: {} }] };
+		const { fields } = conflictOf(empty, [item(lineEdit(line), { ...base, lines: {} }), item(lineEdit(moved))]);
+		assert.deepEqual([fields[0].base.points, fields[0].overlaps], [null, false]);
+	});
+
+	it('tells a marking that is not visible from one that is not drawn', () => {
+		const empty = { ...group, views: [{ ...view, lines: {} }] };
+		const mine = { ...lineEdit(null), notVisible: ['Middle line'] };
+		const { fields } = conflictOf(empty, [item(mine, { ...base, lines: {} })]);
+		assert.deepEqual([fields[0].mine.hidden, fields[0].theirs.hidden, fields[0].overlaps], [true, false, false]);
+		assert.deepEqual(fields[0].edit, mine);
+		const theirs = { ...group, views: [{ ...view, lines: {}, not_visible: ['Middle line'] }] };
+		assert.ok(conflictOf(theirs, [item(lineEdit(moved), { ...base, lines: {} })]).fields[0].overlaps);
+	});
+
+	it('says of each marking whether it is as it was proposed', () => {
+		const lines = { 'Middle line': moved, 'Side line top': line };
+		const mine = { kind: 'lines', view: '7.png', lines, proposed: ['Side line top'] };
+		const [middle, side] = conflictOf(group, [item(mine)]).fields;
+		assert.deepEqual(middle.edit, lineEdit(moved));
+		assert.deepEqual(side.edit, { ...lineEdit(line), lines: { 'Side line top': line }, proposed: ['Side line top'] });
 	});
 
 	it('can be merged when a part of mine overlaps and a part does not', () => {
