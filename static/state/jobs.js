@@ -61,12 +61,12 @@ export async function follow(job, seen, signal) {
 	return present;
 }
 
-/** The job as the server knows it; unchanged while it cannot be reached. @param {JobJson} job @param {AbortSignal} [signal] */
+/** The job as the server knows it; unchanged while it cannot be reached, is busy, or asks to log in again. @param {JobJson} job @param {AbortSignal} [signal] */
 async function asked(job, signal) {
 	try {
 		return await getJob(job.id, signal);
 	} catch (error) {
-		if (signal?.aborted || (error instanceof ApiError && error.status === 0)) return job;
+		if (signal?.aborted || (error instanceof ApiError && (error.isPassing || error.status === 401))) return job;
 		throw error;
 	}
 }

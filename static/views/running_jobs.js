@@ -38,6 +38,8 @@ export function useRunningJobs({ dataset, kind }, concerns) {
 		if (there) return there;
 		const ending = follow(begun, (moved) => { if (!signal.aborted) show(moved); }, signal);
 		endings.current.set(begun.id, ending);
+		// One that was refused says nothing of the next.
+		ending.catch(() => { if (endings.current.get(begun.id) === ending) endings.current.delete(begun.id); });
 		return ending;
 	}
 	useEffect(() => {

@@ -2,7 +2,11 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { jobToShow } from '../../static/state/jobs.js';
+import { ApiError } from '../../static/api/problem.js';
+import { follow, jobToShow } from '../../static/state/jobs.js';
+
+// A page that nobody looks at is told nothing: it asks.
+globalThis.document = /** @type {any} */ ({ hidden: true, addEventListener() {}, removeEventListener() {} });
 
 /** @param {number} id @param {string} state */
 const job = (id, state) => /** @type {any} */ ({ id, state });
@@ -19,5 +23,40 @@ describe('jobToShow', () => {
 	});
 	it('shows nothing where there is none', () => {
 		assert.equal(jobToShow([]), null);
+	});
+});
+
+describe('follow', () => {
+	/** What the server answers, one after the other. @param {[number, any][]} answers */
+	function answering(answers) {
+		globalThis.fetch = /** @type {any} */ (async () => {
+			const [status, json] = /** @type {[number, any]} */ (answers.shift());
+			return { ok: status < 400, status, headers: new Headers(), json: async () => json };
+		});
+	}
+
+	/** Let so many pauses pass. @param {import('node:test').TestContext} t @param {number} pauses */
+	async function pass(t, pauses) {
+		for (let i = 0; i < pauses; i += 1) {
+			t.mock.timers.tick(5000);
+			await new Promise((resolve) => { setImmediate(resolve); });
+		}
+	}
+
+	it('goes on where the server is busy, away behind its proxy, or asks to log in again', async (t) => {
+		t.mock.timers.enable({ apis: ['setTimeout'] });
+		answering([[503, {}], [502, null], [401, {}], [200, job(4, 'done')]]);
+		const ending = follow(job(4, 'running'), () => {});
+		await pass(t, 4);
+		assert.equal((await ending).state, 'done');
+	});
+
+	it('ends where the job is gone', async (t) => {
+		t.mock.timers.enable({ apis: ['setTimeout'] });
+		answering([[404, { detail: 'gone' }]]);
+		const ending = follow(job(4, 'running'), () => {});
+		const refused = assert.rejects(ending, ApiError);
+		await pass(t, 1);
+		await refused;
 	});
 });
