@@ -129,6 +129,11 @@ function readPage(dataset, q, page, abort) {
 	return getGroups({ dataset, q, from: page * PAGE, limit: PAGE }, abort);
 }
 
+/** Whether it is the query that cannot be read: asking once more changes nothing. @param {ApiError | null} error */
+export function isUnreadable(error) {
+	return error?.status === 400 || error?.status === 422;
+}
+
 /** What is being read, by page. @type {Map<number, AbortController>} */
 const reading = new Map();
 /** @type {ReturnType<typeof setTimeout> | undefined} */

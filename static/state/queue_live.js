@@ -3,7 +3,7 @@
 
 import { listenToGroups } from '../api/events.js';
 import { latest } from '../lib/latest.js';
-import { openQueue, queue } from './queue.js';
+import { isUnreadable, openQueue, queue } from './queue.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 
@@ -21,7 +21,7 @@ const PAUSE = 1000;
  */
 export function followQueue(dataset) {
 	const reading = latest(PAUSE, async () => {
-		if (queue.value.error === null) await openQueue(dataset, queue.value.q);
+		if (!isUnreadable(queue.value.error)) await openQueue(dataset, queue.value.q);
 	});
 	const stop = listenToGroups((/** @type {{group: number, dataset: string}} */ event) => {
 		if (event.dataset === dataset.name) reading.run(event.group);

@@ -8,7 +8,7 @@ import { param } from '../lib/router.js';
 import { dataset, datasets, failure, loadDatasets } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
 import { wordsOf } from '../state/query.js';
-import { queue } from '../state/queue.js';
+import { isUnreadable, openQueue, queue } from '../state/queue.js';
 import { NoDatasets, mayImport } from './no_datasets.js';
 
 /** What is told to people from whom groups are hidden: that it is so and why, neither which nor how many. */
@@ -27,6 +27,12 @@ function Marked({ q, pointer }) {
 	return html`<p><code>${before}<mark>${word}</mark>${rest.slice(word.length)}</code></p>`;
 }
 
+/** Read what could not be read, the list of datasets too: the dataset may be gone. @param {string} q */
+function readAgain(q) {
+	loadDatasets();
+	if (dataset.value) openQueue(dataset.value, q);
+}
+
 /** @param {{q: string}} props */
 export function QueueEmpty({ q }) {
 	const error = failure.value ?? queue.value.error;
@@ -34,12 +40,12 @@ export function QueueEmpty({ q }) {
 	if (error) {
 		return html`
 			<section class="card empty" role="alert">
-				<h2>${error.status === 400 || error.status === 422 ? 'The query cannot be read' : 'The queue cannot be shown'}</h2>
+				<h2>${isUnreadable(error) ? 'The query cannot be read' : 'The queue cannot be shown'}</h2>
 				<${Marked} q=${q} pointer=${error.pointer} />
 				<p>${capital(error.message)}.</p>
 				${error.hint ? html`<p>${error.hint}</p>` : null}
-				<p>${failure.value
-					? html`<button class="button" type="button" onClick=${loadDatasets}>Try again</button>`
+				<p>${failure.value || !isUnreadable(error)
+					? html`<button class="button" type="button" onClick=${() => readAgain(q)}>Try again</button>`
 					: html`<a class="button" href=${queueAddress(name, '')}>Show all groups</a>`}</p>
 			</section>
 		`;
