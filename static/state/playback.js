@@ -25,6 +25,8 @@ export function makePlayer() {
 	let width = 640;
 	/** Counts recordings that were opened: what was on its way for another one is nothing to this one. */
 	let turn = 0;
+	/** Counts how often it began to run: what ran before ends. */
+	let running = 0;
 	/** @type {Map<string, HTMLImageElement>} */
 	const coming = new Map();
 	const first = () => film.first ?? 0;
@@ -120,8 +122,9 @@ export function makePlayer() {
 	}
 
 	async function play() {
-		const mine = turn;
-		while (speed.value && mine === turn) {
+		running += 1;
+		const mine = running;
+		while (speed.value && mine === running) {
 			const began = performance.now();
 			const next = wanted.value + speed.value;
 			if (next < first() || next > last()) {
