@@ -31,9 +31,15 @@ export function forget(id) {
 	outdate(id);
 }
 
-/** Read every group but this one again before it is shown. @param {number | null} id */
-export function forgetOthers(id) {
-	for (const other of [...documents.keys(), ...loading.keys()]) if (other !== id) forget(other);
+/**
+ * Read every group but this one again before it is shown.
+ *
+ * @param {number | null} id @param {string | null} [dataset] only groups of that one
+ */
+export function forgetOthers(id, dataset = null) {
+	for (const [other, { dataset: of }] of documents) if (other !== id && (dataset === null || of.name === dataset)) forget(other);
+	// Of which dataset a group is that is still on its way, nobody knows yet.
+	for (const other of loading.keys()) if (other !== id) outdate(other);
 }
 
 /** Answers to writes, by group: what was asked before one knows less than it. @type {Map<number, number>} */

@@ -52,11 +52,15 @@ async function catchUp() {
 	}
 }
 
-/** Nobody was told for a while, or of no group by itself: what lies ready may be old, and so may the group on screen. */
-function missed() {
+/**
+ * Nobody was told for a while, or of no group by itself: what lies ready may be old, and so may the group on screen.
+ *
+ * @param {string | null} dataset in which something changed; null: in any
+ */
+function missed(dataset) {
 	const at = groupDocument.value;
-	forgetOthers(at?.id ?? null);
-	if (at) heard({ group: at.id, etag: null, actor: null });
+	forgetOthers(at?.id ?? null, dataset);
+	if (at && (dataset === null || dataset === at.dataset.name)) heard({ group: at.id, etag: null, actor: null });
 }
 
 /** Listen while a group is on screen. */

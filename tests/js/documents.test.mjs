@@ -8,7 +8,7 @@ import { forgetOthers, known, load, outdate } from '../../static/state/documents
 /** Answers that wait to be given, in the order in which they were asked for. */
 const asked = [];
 globalThis.fetch = () => new Promise((resolve) => {
-	asked.push((etag) => resolve({ ok: true, status: 200, headers: new Headers(), json: async () => ({ id: 4, etag, views: [] }) }));
+	asked.push((etag) => resolve({ ok: true, status: 200, headers: new Headers(), json: async () => ({ id: 4, etag, dataset: { name: 'another' }, views: [] }) }));
 });
 const turn = () => new Promise((resolve) => { setTimeout(resolve); });
 
@@ -39,4 +39,15 @@ test('where nobody was told for a while, what is on its way is old, too', async 
 	await turn();
 	asked[4]('present');
 	assert.equal((await wanted).etag, 'present');
+});
+
+test('where something changed in one dataset, the groups of others stay ready', async () => {
+	const groups = { 5: 'one', 6: 'other', 7: 'one' };
+	globalThis.fetch = async (path) => {
+		const id = Number(path.split('/').at(-1));
+		return { ok: true, status: 200, headers: new Headers(), json: async () => ({ id, etag: 'a', dataset: { name: groups[id] }, views: [] }) };
+	};
+	for (const id of [5, 6, 7]) await load(id);
+	forgetOthers(5, 'one');
+	assert.deepEqual([5, 6, 7].map((id) => known(id)?.id), [5, 6, undefined]);
 });
