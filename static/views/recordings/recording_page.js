@@ -2,15 +2,15 @@
 /** One recording: its frames, its shots as a strip, and the instants that become groups. */
 
 import { html } from 'htm/preact';
-import { useCallback, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
-import { getLinks, getRecording, getShots, putShots } from '../../api/recordings.js';
-import { ApiError } from '../../api/problem.js';
+import { getLinks, getRecording } from '../../api/recordings.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { page, param } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
-import { announce, complain } from '../../state/notice.js';
+import { announce } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
+import { makeShotList } from '../../state/shot_list.js';
 import { matchTime, shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { useEnded, useRunningJobs } from '../running_jobs.js';
@@ -31,70 +31,6 @@ import { factsOf } from './recordings_page.js';
 /** @import {Balls} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
 /** @import {RunningJobs} from '../running_jobs.js' */
-
-/** The list of shots, and what changes it: at once here, then on the server. @param {number} id */
-function useShots(id) {
-	const [list, setList] = useState(/** @type {{items: Shot[], etag: string} | null} */ (null));
-	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
-	const latest = useRef(list);
-	const before = useRef(/** @type {Shot[][]} */ ([]));
-	const sending = useRef(Promise.resolve());
-	// What was sent for builds on what was sent before: where that fails a new turn begins.
-	const turn = useRef(0);
-	/** @param {{items: Shot[], etag: string}} next */
-	function keep(next) {
-		latest.current = next;
-		setList(next);
-	}
-	const read = useCallback(async () => {
-		try {
-			keep(await getShots(id));
-			setError(null);
-		} catch (problem) {
-			if (!(problem instanceof ApiError)) throw problem;
-			setError(problem);
-		}
-	}, [id]);
-	useEffect(() => { before.current = []; read(); }, [id]);
-	/** @param {Shot[]} items */
-	function send(items) {
-		const present = latest.current;
-		if (!present) return;
-		keep({ items, etag: present.etag });
-		const mine = turn.current;
-		sending.current = sending.current.then(async () => {
-			if (mine !== turn.current) return;
-			try {
-				const saved = await putShots(id, items, latest.current?.etag ?? '');
-				// What was changed meanwhile is on its way.
-				const newest = latest.current;
-				if (newest) keep({ items: newest.items === items ? saved.items : newest.items, etag: saved.etag });
-			} catch (problem) {
-				if (!(problem instanceof ApiError)) throw problem;
-				complain(problem.status === 412 ? 'Another person changed the shots; the page shows the new state.' : problem.message);
-				await read();
-				// Also what was changed until the answer came was changed in the old list.
-				turn.current += 1;
-				before.current = [];
-			}
-		});
-	}
-	/** @param {Shot[] | null} items null: nothing can be done here @param {string} told */
-	function change(items, told) {
-		if (!items || !latest.current) return;
-		remember();
-		send(items);
-		announce(told);
-	}
-	const remember = () => { if (latest.current) before.current.push(latest.current.items); };
-	function undo() {
-		const last = before.current.pop();
-		if (!last) return;
-		send(last);
-		announce('Undone.');
-	}
-	return { list, latest, error, read, change, undo, remember };
-}
 
 /** Which frames are chosen to become groups. */
 function useInstants() {
@@ -148,7 +84,10 @@ function clock(shots, one) {
 
 /** @param {{one: RecordingJson, running: RunningJobs, reload: () => void}} props */
 function Film({ one, running, reload }) {
-	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
+	const shots = useMemo(() => makeShotList(one.id), [one.id]);
+	const { read, change, undo, remember } = shots;
+	const [list, error] = [shots.list.value, shots.error.value];
+	useEffect(() => { read(); }, [read]);
 	const instants = useInstants();
 	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
 	useEffect(() => {
@@ -161,7 +100,7 @@ function Film({ one, running, reload }) {
 	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), reload);
 	const doing = useRef({ change, undo, turn: instants.turn });
 	doing.current = { change, undo, turn: instants.turn };
-	const keys = useMemo(() => keysOfRecording(one, () => latest.current?.items ?? [], doing), [one.id]);
+	const keys = useMemo(() => keysOfRecording(one, () => shots.list.value?.items ?? [], doing), [one.id]);
 	useKeys(keys);
 	const shot = list?.items[shotAt(list.items, wanted.value)];
 	const cameras = useCameras(one, shot, running);
