@@ -8,16 +8,18 @@ import { ApiError } from '../api/problem.js';
 import { latest } from '../lib/latest.js';
 import { page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
+import { known, load } from './documents.js';
 import { applyEdit } from './edits.js';
-import { group, groupDocument, solution, submit } from './group.js';
+import { group, groupDocument, onLost, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './undo.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
 import { refuses } from './rights.js';
 import { asProposed } from './proposal_lines.js';
-import { begin, changesOf, linesOf, proposedLines, rebase, stage, stepBack, stepForward } from './staging.js';
+import { begin, changesOf, linesOf, proposedLines, rebase, stage, stageEdit, stepBack, stepForward } from './staging.js';
 
 /** @import {LinesJson, SolutionJson} from '../api/types.js' */
+/** @import {Item} from './outbox.js' */
 /** @import {Staging} from './staging.js' */
 
 /** @typedef {{marking: string, index: number | null}} Choice */
@@ -114,10 +116,13 @@ export function startAsking() {
 
 /** @param {Staging} next */
 function keep(next) {
-	const at = view.value;
-	if (!at) return;
-	const { [at.station.id]: _, ...rest } = stagings.value;
-	stagings.value = next.steps.length > 0 ? { ...rest, [at.station.id]: next } : rest;
+	if (view.value) keepOf(view.value.station.id, next);
+}
+
+/** @param {number} station @param {Staging} next */
+function keepOf(station, next) {
+	const { [station]: _, ...rest } = stagings.value;
+	stagings.value = next.steps.length > 0 ? { ...rest, [station]: next } : rest;
 }
 
 /** Stage lines that differ. @param {LinesJson} next @param {string} label @param {string} [run] */
@@ -165,7 +170,7 @@ export function commit() {
 	// What is staged stays where it cannot be saved.
 	if (refuses('annotate', groupDocument.value?.dataset.name)) return false;
 	const proposed = asProposed(changes.value, proposedLines(staging.value));
-	const edit = { kind: /** @type {const} */ ('lines'), view: at.key, lines: changes.value, ...(proposed.length ? { proposed } : {}) };
+	const edit = { kind: /** @type {const} */ ('lines'), view: at.key, lines: changes.value, ...(proposed.length ? { proposed } : {}), staged: true };
 	batch(() => {
 		held.value = null;
 		keep(begin(at.lines));
@@ -173,6 +178,24 @@ export function commit() {
 	});
 	return true;
 }
+
+/** Stage again what was staged here and could not be saved, below what was staged since. @param {Item[]} lost of one group */
+async function stageAgain(lost) {
+	const edits = lost.flatMap(({ edit }) => (edit?.kind === 'lines' && edit.staged ? [edit] : []));
+	if (edits.length === 0) return;
+	const [{ group: id }] = lost;
+	// Where the group cannot be read there is nothing to stage lines upon.
+	const at = known(id) ?? (await load(id).catch(() => null));
+	for (const { key, station, lines: saved } of at?.views ?? []) {
+		const own = edits.filter((edit) => edit.view === key);
+		if (own.length === 0) continue;
+		const again = own.reduce((staged, edit) => stageEdit(staged, edit, 'Changes that were not saved'), begin(saved));
+		const since = stagings.value[station.id];
+		keepOf(station.id, since ? stage(again, linesOf(rebase(since, linesOf(again))), 'Changes since then') : again);
+	}
+}
+
+onLost(stageAgain);
 
 /** Drop what belongs to one view only. */
 export function resetForView() {

@@ -5,7 +5,7 @@ import { leftOutText } from './reasons.js';
 
 /** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PictureJson, PointJson, ViewJson} from '../api/types.js' */
 
-/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>, proposed?: string[], notVisible?: string[]}} LinesEdit   proposed: those whose points are as they were proposed; notVisible: those without points that the picture does not show */
+/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>, proposed?: string[], notVisible?: string[], staged?: boolean}} LinesEdit   proposed: those whose points are as they were proposed; notVisible: those without points that the picture does not show; staged: it was staged in the calibration editor */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
 /** @typedef {{kind: 'include', view: string, included: boolean, reason?: string | null, note?: string | null}} IncludeEdit   reason: why it is left out, one of REASONS */
 /** @typedef {{kind: 'picture', view: string, picture: PictureJson | null}} PictureEdit   what was done to the picture since it was taken */

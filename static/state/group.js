@@ -301,6 +301,8 @@ function refused(item, error) {
 	if (!conflicting) complain(refusalText(item, dropped, error));
 	listener(item, error);
 	for (const other of dropped) if (other.id !== item.id && other.verdict) listener(other, error);
+	const back = takenBack(dropped);
+	lossListener(dropped.filter((other) => !back.includes(other)));
 }
 
 /** Hold what waits of a group until the person has chosen. @param {number} id @param {any} current the group as it is now */
@@ -332,6 +334,14 @@ let listener = () => {};
 /** Hear of refused writes, to bring their group back. @param {typeof listener} one */
 export function onRefused(one) {
 	listener = one;
+}
+
+/** @type {(lost: Item[]) => void} */
+let lossListener = () => {};
+
+/** Hear of the writes of a group that are not saved and not kept either, in their order. @param {typeof lossListener} one */
+export function onLost(one) {
+	lossListener = one;
 }
 
 /** @param {any} body @returns {body is GroupDocument} */

@@ -4,6 +4,7 @@
 import { changesBetween, sameLines } from './line_changes.js';
 
 /** @import {LinesJson, PointJson} from '../api/types.js' */
+/** @import {LinesEdit} from './edits.js' */
 
 /** @typedef {{readonly lines: LinesJson, readonly label: string, readonly run: string}} Step */
 /**
@@ -72,11 +73,23 @@ export function proposedLines({ base, steps, at }) {
  */
 export function rebase(staging, base) {
 	if (sameLines(staging.base, base)) return staging;
-	/** @type {LinesJson} */
-	const lines = { ...base };
-	for (const [marking, points] of Object.entries(changesOf(staging))) {
-		if (points) lines[marking] = points;
-		else delete lines[marking];
+	return stage(begin(base), withChanges(base, Object.entries(changesOf(staging))), 'Your staged changes, on top of theirs');
+}
+
+/** @param {LinesJson} lines @param {[string, PointJson[] | null][]} changes new points by marking; null: it goes @returns {LinesJson} */
+function withChanges(lines, changes) {
+	const next = { ...lines };
+	for (const [marking, points] of changes) {
+		if (points) next[marking] = points;
+		else delete next[marking];
 	}
-	return stage(begin(base), lines, 'Your staged changes, on top of theirs');
+	return next;
+}
+
+/** What an edit says of lines as staged steps; what it has as proposed stays so. @param {Staging} staging @param {LinesEdit} edit @param {string} label @returns {Staging} */
+export function stageEdit(staging, { lines, proposed = [] }, label) {
+	const changes = Object.entries(lines);
+	const drawn = changes.filter(([marking]) => !proposed.includes(marking));
+	const before = stage(staging, withChanges(linesOf(staging), drawn), label);
+	return stage(before, withChanges(linesOf(before), changes), label, PROPOSED);
 }
