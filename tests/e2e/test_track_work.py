@@ -11,6 +11,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.flown import COUNT, SLIP
 from tests.e2e.homes import build_flights
+from tests.e2e.screen import holding
 from tests.e2e.service import serving
 from tests.e2e.test_access import serious_in_both
 from tests.e2e.test_tracks import shows
@@ -85,6 +86,36 @@ class TestList:
         expect(flights.get_by_text("No other track of this list waits")).to_be_visible()
         assert [track["verdict"] for track in tracks(flights)] == ["accepted", "rejected"]
         assert early["id"] != late["id"]
+
+    def test_a_key_between_two_tracks_says_nothing_of_the_one_that_was_left(
+        self, flights: Page
+    ) -> None:
+        early, late = tracks(flights)
+        flights.get_by_role("link", name="early", exact=True).click()
+        flights.wait_for_selector(".track__band")
+        flights.keyboard.press("ArrowRight")
+        with holding(flights, f"**/api/v1/tracks/{late['id']}") as asked:
+            flights.keyboard.press("f")
+            flights.wait_for_url(re.compile(rf"/tracks/{late['id']}"))
+            asked.arrive()
+            flights.keyboard.press("x")
+            flights.keyboard.press("1")
+            # As long as it takes until the address tells the frame.
+            flights.wait_for_timeout(500)
+            assert "frame=" not in flights.url
+            expect(flights.get_by_text("Reading the track")).to_be_visible()
+        flights.wait_for_selector(".track__band")
+        assert [track["verdict"] for track in tracks(flights)] == [None, None]
+        left = flights.request.get(f"/api/v1/tracks/{early['id']}").json()
+        assert left["etag"] == early["etag"]
+
+    def test_nothing_is_assigned_of_a_list_that_is_still_awaited(self, flights: Page) -> None:
+        assign = flights.get_by_role("button", name="Assign…")
+        with holding(flights, "**/datasets/flights/tracks?*sort=worst*") as asked:
+            flights.get_by_label("Order").select_option("worst")
+            asked.arrive()
+            expect(assign).to_have_attribute("aria-disabled", "true")
+        expect(assign).to_have_attribute("aria-disabled", "false")
 
 
 class TestBatch:

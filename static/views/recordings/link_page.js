@@ -207,7 +207,8 @@ export function LinkPage() {
 		const [live, replay] = await Promise.all([getRecording(first.live.recording, signal), getRecording(first.replay.recording, signal)]);
 		return { first, recordings: { live, replay } };
 	}, [recording, link]);
-	const one = found.value;
+	// The answer about the link before stays until the next one is there: no key may act on it.
+	const one = found.value?.first.id === link ? found.value : null;
 	const why = one && (one.recordings.live.problem ?? one.recordings.replay.problem);
 	const back = one?.first.replay;
 	return html`

@@ -258,6 +258,8 @@ function Track({ track, setTrack }) {
 	useLayoutEffect(() => {
 		if (plays) return undefined;
 		const timer = setTimeout(() => {
+			// The next page may be asked for and not yet drawn: its address says another frame.
+			if (!isHere()) return;
 			const values = { ...Object.fromEntries(place.peek().search), frame: String(at) };
 			navigate(address(place.peek().path, values), { replace: true });
 		}, SETTLED);
@@ -313,7 +315,7 @@ function Track({ track, setTrack }) {
 	}
 	/** @param {'accepted' | 'rejected' | 'none'} verdict */
 	async function judge(verdict) {
-		if (judging.current) return;
+		if (judging.current || !isHere()) return;
 		judging.current = true;
 		const saved = await send(() => ({ verdict }), verdict === 'none' ? 'The verdict is withdrawn.' : `The track is ${verdict}.`);
 		judging.current = false;
@@ -322,6 +324,7 @@ function Track({ track, setTrack }) {
 	}
 	/** @param {EventKind} kind @param {boolean} added */
 	const correct = (kind, added) => {
+		if (!isHere()) return;
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);
 		send((present) => ({ corrections: corrected(present.corrections, { frame, kind, added }) }), added ? `Added a ${kind} in frame ${frame}.` : `Removed the ${kind} of frame ${frame}.`);
 	};
@@ -359,7 +362,10 @@ export function TrackPage() {
 	const id = 'track' in page.value ? page.value.track : 0;
 	const found = useResource((signal) => getTrack(id, signal), [id]);
 	const [changed, setChanged] = useState(/** @type {TrackJson | null} */ (null));
-	const track = changed?.id === id ? changed : found.value;
+	// What was changed is older than what is read when somebody comes back.
+	useEffect(() => setChanged(null), [id]);
+	// The answer about the track before stays until the next one is there: no key may act on it.
+	const track = [changed, found.value].find((one) => one?.id === id) ?? null;
 	return html`
 		<${PageFrame}
 			current="tracks" title=${track ? `Track of ${track.key}` : 'Track'}
