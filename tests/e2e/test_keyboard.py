@@ -67,3 +67,32 @@ class TestKeyboardAlone:
         accepted = [row["id"] for row in rows(page) if row["status"] == "accepted"]
         assert group in accepted
         withdraw_verdict(page, group)
+
+
+class TestAudit:
+    def test_its_filters_keep_the_keyboard_and_take_a_day_when_it_is_typed(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/audit")
+        words, day = page.get_by_label("Words"), page.get_by_label("From")
+        words.fill("verdict")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/audit?q=verdict")
+        expect(words).to_be_focused()
+        what = page.get_by_label("What", exact=True)
+        what.focus()
+        what.select_option("verdict")
+        page.wait_for_url("**/audit?q=verdict&family=verdict")
+        expect(what).to_be_focused()
+        day.focus()
+        page.keyboard.type("11282026")
+        expect(day).to_have_value("2026-11-28")
+        assert "since" not in page.url
+        page.keyboard.press("Enter")
+        page.wait_for_url("**&since=2026-11-28")
+        expect(day).to_be_focused()
+        page.go_back()
+        expect(day).to_have_value("")
+        page.go_back()
+        expect(what).to_have_value("")
+        expect(words).to_have_value("verdict")

@@ -2,7 +2,7 @@
 /** The audit: who said and did what, in the datasets that one leads. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { auditFile, getAudit } from '../../api/history.js';
 import { ApiError } from '../../api/problem.js';
@@ -87,11 +87,27 @@ function Choice({ name, label, all, options }) {
 }
 
 function Filters() {
+	const form = useRef(/** @type {HTMLFormElement | null} */ (null));
+	const shown = FIELDS.map(param);
+	// Also where the address was changed by the browser's Back, or a link. The fields stay, and so does the keyboard in them.
+	useLayoutEffect(() => FIELDS.forEach((name, index) => {
+		const field = /** @type {HTMLInputElement | HTMLSelectElement} */ (form.current?.elements.namedItem(name));
+		if (field.value !== shown[index]) field.value = shown[index];
+	}), shown);
 	const choose = withForm((said) => {
-		navigate(address('/audit', Object.fromEntries(FIELDS.map((name) => [name, String(said.get(name) ?? '')]))));
+		const chosen = FIELDS.map((name) => [name, String(said.get(name) ?? '')]);
+		if (chosen.some(([name, value]) => value !== param(name))) navigate(address('/audit', Object.fromEntries(chosen)));
 	});
+	/** Words and days are taken when they are complete: a day being typed is a day with each digit. @param {FocusEvent} event */
+	function leave(event) {
+		if (event.target instanceof HTMLInputElement && event.target.checkValidity()) choose(event);
+	}
+	/** @param {Event} event */
+	function change(event) {
+		if (event.target instanceof HTMLSelectElement) choose(event);
+	}
 	return html`
-		<form class="form audit__filters" onSubmit=${choose} onChange=${choose} role="search" aria-label="What is shown">
+		<form class="form audit__filters" ref=${form} onSubmit=${choose} onChange=${change} onFocusOut=${leave} role="search" aria-label="What is shown">
 			<${Field} name="q" label="Words" type="search" />
 			<${Field} name="person" label="Person" type="text" />
 			<${Choice} name="family" label="What" all="everything" options=${FAMILIES} />
@@ -113,7 +129,7 @@ export function AuditPage() {
 			<section class="card" aria-labelledby="audit-title">
 				<h2 id="audit-title">Who did what
 					<span class="card__aside buttons"><a class="button button--small" href=${auditFile(filter, 'csv')} download>CSV</a><a class="button button--small" href=${auditFile(filter, 'jsonl')} download>JSON Lines</a></span></h2>
-				<${Filters} key=${key} />
+				<${Filters} />
 				${param('group') ? html`<p>Only group ${param('group')}. <a class="link" href="/audit">Show all</a></p>` : null}
 			</section>
 			${error ? html`<${Trouble} title="The audit cannot be shown" error=${error} retry=${retry} />` : null}
