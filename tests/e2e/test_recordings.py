@@ -396,6 +396,25 @@ class TestInstants:
         rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]
         assert [row["key"] for row in rows] == [f"cup final/{n}.png" for n in (0, 40, 60)]
 
+    def test_what_is_chosen_while_groups_are_made_stays_chosen(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        page.keyboard.press("i")
+        card = page.get_by_role("region", name="Instants")
+        card.get_by_label("Propose cameras afterwards").uncheck()
+        with holding(page, f"**/api/v1/recordings/{recording}/groups", answered=True) as made:
+            card.get_by_role("button", name="Make 1 group").click()
+            made.arrive()
+            page.keyboard.press("ArrowDown")
+            shows(page, 40)
+            page.keyboard.press("i")
+            expect(card).to_contain_text("2 frames chosen")
+        card.get_by_role("link", name="1 group of this recording").wait_for()
+        expect(card).to_contain_text("1 frame chosen")
+        expect(card.get_by_role("button", name="Make 1 group")).to_be_enabled()
+        jobs_end(page)
+
 
 @pytest.fixture
 def link(recording: int, server: str) -> str:

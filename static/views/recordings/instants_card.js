@@ -2,7 +2,7 @@
 /** Instants: frames that become groups, chosen one by one or every so many of a shot. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 
 import { postInstants } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
@@ -41,15 +41,22 @@ export function InstantsCard({ one, running: { jobs, watch }, shot, instants, li
 	const job = jobToShow(jobs.filter(({ kind }) => kind === 'instants'));
 	const { error, attempt } = useAttempt();
 	const { chosen } = instants;
+	const present = useRef(chosen);
+	present.current = chosen;
 	const busy = job !== null && !isOver(job);
 	const why = busy ? 'Groups are being made' : chosen.size === 0 ? 'Choose an instant first' : '';
 	const every = withForm((said) => { if (shot) instants.add(everyOf(shot, Number(said.get('step')))); });
 	/** @param {boolean} dry */
 	function make(dry) {
 		if (why) return;
-		attempt(postInstants(one.id, [...chosen], { propose, linked: linked && usable > 0, dry_run: dry }), async (begun) => {
+		const sent = chosen;
+		attempt(postInstants(one.id, [...sent], { propose, linked: linked && usable > 0, dry_run: dry }), async (begun) => {
 			const over = await watch(begun);
-			if (over.state === 'done' && !dry) instants.clear();
+			if (over.state !== 'done' || dry) return;
+			// Others were chosen meanwhile, and wait for the next time.
+			const others = [...present.current].filter((frame) => !sent.has(frame));
+			instants.clear();
+			instants.add(others);
 		});
 	}
 	const query = `match:"${one.name.replaceAll('"', '')}"`;
