@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-import { sentenceOf } from '../api/problem.js';
+import { ApiError, sentenceOf } from '../api/problem.js';
 import { postVerdicts, previewVerdicts } from '../api/queue.js';
 import { withValue } from '../lib/field.js';
 import { count, plural, words } from '../lib/format.js';
@@ -130,6 +130,8 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 			readAgain();
 		} catch (error) {
 			setState({ busy: '', error: sentenceOf(error) });
+			// Somebody was faster: what would happen now is shown, and may be done.
+			if (error instanceof ApiError && error.status === 409) preview.reload();
 		}
 	}
 	return html`

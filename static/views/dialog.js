@@ -2,7 +2,7 @@
 /** A dialog that asks: title, form, buttons. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 
 import { withForm } from '../lib/field.js';
 
@@ -16,13 +16,22 @@ import { withForm } from '../lib/field.js';
  */
 export function FormDialog({ title, onClose, onSubmit, buttons, wide = false, children }) {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	const gone = useRef(false);
 	useEffect(() => {
 		dialog.current?.showModal();
 		// The first thing that is asked, not the way out.
 		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input:checked, input:not([type="radio"]), select, textarea'))?.focus();
 	}, []);
+	// A layout effect is cleaned up while the dialog is still in the page: closing it gives the focus back to where it was.
+	useLayoutEffect(() => {
+		const shown = dialog.current;
+		return () => {
+			gone.current = true;
+			shown?.close();
+		};
+	}, []);
 	return html`
-		<dialog class=${wide ? 'dialog dialog--wide' : 'dialog'} ref=${dialog} aria-labelledby="dialog-title" onClose=${onClose}>
+		<dialog class=${wide ? 'dialog dialog--wide' : 'dialog'} ref=${dialog} aria-labelledby="dialog-title" onClose=${() => { if (!gone.current) onClose(); }}>
 			<form class="form" onSubmit=${withForm(onSubmit)}>
 				<header class="dialog__header">
 					<h2 id="dialog-title">${title}</h2>

@@ -2,7 +2,7 @@
 /** Logging in: before anything is shown, or over a page whose session has ended. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { enterWithPasskey, passkeysWork } from '../api/passkeys.js';
 import { postSession } from '../api/people.js';
@@ -142,9 +142,12 @@ export function LoginPage() {
 /** The session has ended while somebody was at work: nothing of the page goes. */
 export function LoginAgain() {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
-	useEffect(() => {
-		dialog.current?.showModal();
-		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input[type="password"]') ?? dialog.current?.querySelector('button'))?.focus();
+	useLayoutEffect(() => {
+		const shown = dialog.current;
+		shown?.showModal();
+		/** @type {HTMLElement | null | undefined} */ (shown?.querySelector('input[type="password"]') ?? shown?.querySelector('button'))?.focus();
+		// While it is still in the page: closing it gives the focus back to where it was.
+		return () => shown?.close();
 	}, []);
 	const waiting = outbox.value.length;
 	return html`

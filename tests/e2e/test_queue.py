@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import pytest
@@ -15,6 +16,7 @@ from tests.e2e.screen import (
     holding,
     judge,
     on_present,
+    rows,
     undo_edit,
     until,
     withdraw_verdict,
@@ -251,6 +253,30 @@ class TestBulkVerdicts:
         page.locator(".bar").get_by_role("button", name="Undo").click()
         expect(page.locator(".bar")).to_contain_text("3 verdicts are undone")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
+        until(page, lambda: statuses(page) == before)
+
+    def test_another_number_is_counted_again_and_can_be_decided(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("a status of 409")
+        page = opened(open_page, "number<=3")
+        before = statuses(page)
+        opener = page.locator(".queue-tools > [data-needs=review]")
+        opener.focus()
+        page.keyboard.press("b")
+        page.get_by_label("Defer").check()
+        decide = page.get_by_role("button", name="Defer 3 groups")
+        expect(decide).to_be_enabled()
+        (first,) = (group for group in rows(page) if group["number"] == 1)
+        judge(page, first["id"], "deferred")
+        decide.click()
+        expect(page.locator(".bulk__outcome")).to_contain_text("would change, not 3")
+        page.get_by_role("button", name="Defer 2 groups").click()
+        expect(page.locator(".bar")).to_contain_text("2 groups deferred")
+        expect(opener).to_be_focused()
+        page.locator(".bar").get_by_role("button", name="Undo").click()
+        expect(page.locator(".bar")).to_contain_text("2 verdicts are undone")
+        withdraw_verdict(page, first["id"])
         until(page, lambda: statuses(page) == before)
 
     def test_what_is_below_the_answer_stays_where_it_is_when_it_comes(
