@@ -16,8 +16,14 @@ import { announce, complain, dismiss } from './notice.js';
 /** Neighbours of the group on screen; null until they are known. */
 export const neighbours = signal(/** @type {(Neighbours & {id: number, q: string}) | null} */ (null));
 
+/** Pages whose address has the query of a queue; others have words and batches of their own there. */
+const WITH_QUERY = new Set(['queue', 'review', 'calibration', 'history', 'statistics']);
+
 /** The query that makes the queue, as in the address bar. */
-export const query = computed(() => (/^\d+$/.test(param('batch')) ? `batch:${param('batch')}` : param('q')));
+export const query = computed(() => {
+	if (!WITH_QUERY.has(page.value.page)) return '';
+	return /^\d+$/.test(param('batch')) ? `batch:${param('batch')}` : param('q');
+});
 
 /** The batch that is walked; null: another queue, or a part of one. */
 export const batchId = computed(() => {
@@ -31,6 +37,14 @@ export const lastGroup = stored('last-group', 0);
 /** @param {number} id @param {string} [q] */
 export function reviewAddress(id, q = query.value) {
 	return address(`/review/${id}`, { q });
+}
+
+/** The way back to the group that was last on screen; the query of another dataset's page is none of its queue. @param {string} dataset of the page */
+export function lastGroupAddress(dataset) {
+	if (!lastGroup.value) return '/review';
+	const group = groupDocument.value;
+	const isElsewhere = group?.id === lastGroup.value && group.dataset.name !== dataset;
+	return reviewAddress(lastGroup.value, isElsewhere ? '' : query.value);
 }
 
 /** Go back to a group, wherever the person is. @param {number} id @returns {Promise<boolean>} whether it is on screen */

@@ -6,7 +6,7 @@ import { html } from 'htm/preact';
 import { dataset } from '../state/datasets.js';
 import { groupDocument } from '../state/group.js';
 import { myName } from '../state/me.js';
-import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
+import { lastGroupAddress, query, queueAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
 import { NotificationsButton } from './comments/notifications_button.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
@@ -22,12 +22,11 @@ const PAGES = [
 
 /** @param {{current: string, name: string}} props */
 function Navigation({ current, name }) {
-	const review = lastGroup.value ? reviewAddress(lastGroup.value) : '/review';
 	/** @param {string} page */
 	const mark = (page) => (current === page ? 'page' : undefined);
 	return html`
 		<nav class="header__nav" aria-label="Pages">
-			<a href=${review} aria-current=${mark('review')}>Review</a>
+			<a href=${lastGroupAddress(name)} aria-current=${mark('review')}>Review</a>
 			<a href=${queueAddress(name, query.value)} aria-current=${mark('queue')}>Queue</a>
 			${PAGES.map((page) => html`
 				<a
