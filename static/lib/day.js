@@ -13,3 +13,8 @@ export function beginningOf(day, later = 0) {
 	const at = new Date(year, month - 1, date + later);
 	return Number.isNaN(at.getTime()) ? day : at.toISOString();
 }
+
+/** Whether a day is over where the person is. @param {string} day as a field of dates has it, 2026-03-29 @param {number} [now] */
+export function isOverHere(day, now = Date.now()) {
+	return now >= Date.parse(beginningOf(day, 1));
+}

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { beginningOf } from '../../static/lib/day.js';
+import { beginningOf, isOverHere } from '../../static/lib/day.js';
 
 /** @param {string} zone @param {() => void} check */
 function where(zone, check) {
@@ -34,5 +34,16 @@ describe('the beginning of a day', () => {
 
 	it('of what is no day is left to whoever is asked', () => {
 		for (const odd of ['foo', '', '2026-11-28T10:00', '28.11.2026']) assert.equal(beginningOf(odd), odd);
+	});
+});
+
+describe('a day', () => {
+	it('is over at the midnight of whoever looks at it', () => {
+		const [late, early] = ['2026-11-28T14:59:59Z', '2026-11-28T15:00:00Z'].map((at) => Date.parse(at));
+		where('Asia/Tokyo', () => assert.deepEqual([late, early].map((at) => isOverHere('2026-11-28', at)), [false, true]));
+		where('America/New_York', () => {
+			assert.equal(isOverHere('2026-11-28', Date.parse('2026-11-29T04:59:59Z')), false);
+			assert.equal(isOverHere('2026-11-28', Date.parse('2026-11-29T05:00:00Z')), true);
+		});
 	});
 });

@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { isOverHere } from '../../lib/day.js';
 import { count, plural } from '../../lib/format.js';
 
 /** @import {BatchJson} from '../../api/work.js' */
@@ -25,7 +26,7 @@ export function Progress({ batch }) {
 /** @param {{due: string | null}} props */
 export function Due({ due }) {
 	if (!due) return null;
-	const late = due < new Date().toISOString().slice(0, 10);
+	const late = isOverHere(due);
 	const day = new Date(`${due}T00:00`).toLocaleDateString('en-GB', { day: 'numeric', month: 'short', year: 'numeric' });
 	return html` · <span class="work__due" data-grade=${late ? 'bad' : undefined}>${late ? `was due ${day}` : `due ${day}`}</span>`;
 }
