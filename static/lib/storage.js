@@ -22,6 +22,10 @@ export function stored(name, initial, area = 'localStorage') {
 			// Private windows may refuse; the setting then lasts as long as the page.
 		}
 	});
+	// A record is written as a whole: what another tab has put into it would be lost with the next change here.
+	if (area === 'localStorage' && typeof initial === 'object') {
+		globalThis.addEventListener?.('storage', (event) => { if (event.key === key || event.key === null) value.value = readStored(key, initial, area); });
+	}
 	return value;
 }
 
