@@ -143,7 +143,8 @@ function Opened({ one, reload }) {
 export function RecordingPage() {
 	const id = 'recording' in page.value ? page.value.recording : 0;
 	const found = useResource((signal) => getRecording(id, signal), [id]);
-	const one = found.value;
+	// The answer of the recording before stays until this one's is there.
+	const one = found.value?.id === id ? found.value : null;
 	return html`
 		<${PageFrame}
 			current="recordings" title=${one ? one.name : 'Recording'}
