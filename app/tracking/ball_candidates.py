@@ -80,7 +80,8 @@ def find_candidates(
         detected: What a detector says of the frame.
         earlier: Frames before, the latest first, with how their background moved since.
     """
-    border = int(np.ceil(2.2 * size)) + 8
+    longest = max((smear for smear, _ in smears), default=0.0)
+    border = int(np.ceil(2.2 * size + longest / 2)) + 8
     (width, height), (low, high) = frame.size, area
     left, right = np.clip([low[0], high[0]], 0, width - 1).astype(int)
     top, bottom = np.clip([low[1], high[1]], 0, height - 1).astype(int)

@@ -88,6 +88,19 @@ class TestFollowBall:
         assert {ball.state for ball in run.balls} == {"followed"}
         assert abs(np.median([ball.diameter for ball in run.balls]) - 8) < 0.6
 
+    def test_a_large_ball_is_followed_through_a_whip_pan(self) -> None:
+        size, ground, left = (1600, 300), grass(3200, 300), [0, 0, 0, 240, 480, 720, 960, 1200]
+
+        def read(number: int) -> Image:
+            part = ground[:, left[number] : left[number] + size[0]]
+            ball = (1450.0 - left[number], 150.0, 32.0)
+            return drawn([ball], size=size, ground=part, noise=3, seed=number)
+
+        run = follow_ball(read, BallClick(0, 1450, 150), range(0), range(1, len(left)))
+        assert run is not None and run.after == "limit"
+        places = [ball.x for ball in run.balls]
+        assert places == pytest.approx([1450 - one for one in left], abs=1.0)
+
     def test_a_kick_is_followed(self) -> None:
         steps = np.arange(FRAMES)
         way = np.column_stack([120 + 0.4 * steps, np.full(FRAMES, 120.0)])
