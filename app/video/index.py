@@ -71,8 +71,9 @@ class RecordingIndex:
 
     Attributes:
         facts: What holds of all.
-        pts: Presentation time of each frame, ticks of ``facts.time_base`` after the first one,
-            shape (N,). As the container says it: two may be equal, or come in the wrong order.
+        pts: Presentation time of each frame, ticks of ``facts.time_base`` after the start of the stream,
+            shape (N,). As the container says it: two may be equal, or come in the wrong order, and where
+            a stream was cut between key frames the first one that can be decoded comes later than 0.
         keys: Numbers of the key frames, ascending, shape (K,).
         measured: What is kept of each frame's picture, shape (N,).
     """
@@ -87,14 +88,16 @@ class RecordingIndex:
 
     @cached_property
     def times(self) -> FloatArray:
-        """Presentation time of each frame after the first one, milliseconds, shape (N,)."""
+        """Presentation time of each frame after the start of the stream, by which a reader finds it, milliseconds,
+        shape (N,)."""
         over, under = self.facts.time_base
         return np.asarray(self.pts * (1000.0 * over) / under)
 
     @cached_property
     def seconds(self) -> FloatArray:
         """When each frame is shown, seconds after the first one, never falling, shape (N,)."""
-        return np.asarray(np.maximum.accumulate(self.times) / 1000.0)
+        rising = np.maximum.accumulate(self.times)
+        return np.asarray((rising - rising[:1]) / 1000.0)
 
     @cached_property
     def step(self) -> float:

@@ -10,11 +10,13 @@ import pytest
 from app.config import Settings
 from app.errors import ImageError, JobCancelled, TooLargeError
 from app.video import indexing
+from app.video.frames import read_frames
 from app.video.indexing import index_recording
 from app.video.measures import hash_distance
 from tests.videos import (
     HEIGHT,
     WIDTH,
+    number_of,
     numbered,
     stretch_pixels,
     turn,
@@ -45,6 +47,21 @@ class TestIndexRecording:
         assert not index.facts.has_seek_table
         assert index.pts.tolist() == list(range(40))
         assert index.keys.tolist() == [0, 12, 24, 36]
+
+    def test_a_stream_cut_between_key_frames_begins_with_its_first_frame(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = write_video(tmp_path / "cam1.ts", "MPG2", 60)
+        packets = path.read_bytes()
+        # The two tables stay; of the pictures the first key frame goes.
+        path.write_bytes(packets[: 2 * 188] + packets[10 * 188 :])
+        index = index_recording(path, settings)
+        assert (len(index), index.times[0]) == (48, 400.0)
+        assert (index.fps, index.is_variable) == (25.0, False)
+        assert index.seconds[:3] == pytest.approx([0.0, 0.04, 0.08])
+        assert index.end == pytest.approx(48 / 25)
+        shown = [number_of(image) for _, image in read_frames(path, index, [0, 20, 47])]
+        assert shown == [12, 32, 59]
 
     def test_a_turned_recording_is_upright(self, tmp_path: Path, settings: Settings) -> None:
         path = turn(write_video(tmp_path / "cam1.mp4", "mp4v", 5), 90)
